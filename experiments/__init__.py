@@ -1,0 +1,1 @@
+"""Sessions, simulated participants, metrics, records and the command line."""

@@ -1,0 +1,1 @@
+"""What the person sees through the glasses: assistance conditions, HUD state and its drawing."""

@@ -1,0 +1,114 @@
+"""HudState: everything the person is shown, as one value. Drawing is a pure function of it."""
+
+import enum
+from dataclasses import dataclass
+from typing import Literal
+
+Vec3 = tuple[float, float, float]
+Rgba = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A world-locked digital object.
+
+    Attributes:
+        shape: `sphere` (size[0] radius), `cylinder` (size[0] radius, size[1] half-length, upright) or
+            `box` (half-sizes).
+        position: Centre in the house frame, m.
+        size: Sizes in m; meaning by shape.
+        rgba: Colour, components in 0..1.
+        role: What it is for: `breadcrumb`, `flagpole`, `goal`.
+        x_ray: Whether it also shows faintly through walls.
+    """
+
+    shape: Literal["sphere", "cylinder", "box"]
+    position: Vec3
+    size: Vec3
+    rgba: Rgba
+    role: str
+    x_ray: bool = False
+
+
+class MessageKind(enum.Enum):
+    """Tone of a message: decides its colour and symbol."""
+
+    INFO = "info"
+    SUCCESS = "success"
+    REFUSAL = "refusal"
+
+
+@dataclass(frozen=True)
+class Message:
+    """Text of the message bar, with the fade already worked out: 1 opaque, 0 gone."""
+
+    text: str
+    kind: MessageKind
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True)
+class ChecklistItem:
+    """A row of the task list.
+
+    Attributes:
+        text: What to do or what to find ("Pick up the blue mug", "Blue mug").
+        detail: Second line: the place or the bin ("Kitchen", "Dish bin, kitchen").
+        picture: Key of the object's picture, or None.
+        target_picture: Key of the receptacle's picture, or None.
+        number: Step number, or None where order means nothing.
+        done: Crossed out.
+        current: The step to do now.
+    """
+
+    text: str
+    detail: str
+    picture: str | None = None
+    target_picture: str | None = None
+    number: int | None = None
+    done: bool = False
+    current: bool = False
+
+
+@dataclass(frozen=True)
+class BinEntry:
+    """A receptacle in the list that every condition shows: picture, name and semantic location."""
+
+    label: str
+    place: str
+    picture: str | None = None
+
+
+@dataclass(frozen=True)
+class InventorySlot:
+    """One hand: what it holds, or nothing."""
+
+    label: str | None = None
+    picture: str | None = None
+
+
+@dataclass(frozen=True)
+class HudState:
+    """Everything that is shown.
+
+    Attributes:
+        checklist_title: Heading of the task list ("Objects to find", "Your plan").
+        checklist: Rows, in the order shown.
+        bins: The list of receptacles.
+        inventory: Left and right hand.
+        message: Message bar, or None.
+        markers: World-locked objects.
+        delivered: How many objects are in their receptacle.
+        total: How many there are.
+        clock: Elapsed task time to show, s, or None.
+    """
+
+    checklist_title: str
+    checklist: tuple[ChecklistItem, ...]
+    bins: tuple[BinEntry, ...]
+    inventory: tuple[InventorySlot, InventorySlot]
+    message: Message | None = None
+    markers: tuple[Marker, ...] = ()
+    delivered: int = 0
+    total: int = 0
+    clock: float | None = None

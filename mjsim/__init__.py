@@ -1,0 +1,1 @@
+"""Physics side of the rearrangement simulator: houses, episodes, world, observation and rendering."""

@@ -1,0 +1,146 @@
+"""An episode: one disorganized house, ready to be tidied, as a value that round-trips through JSON."""
+
+import dataclasses
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mjsim.errors import EpisodeError
+from mjsim.files import write_text_atomically
+
+FORMAT_VERSION = 1
+CAPACITY = 2  # PAPER section 2: the knapsack of the study
+
+
+@dataclass(frozen=True)
+class StartPose:
+    """Where the person stands at the start: x and y in m, heading in rad."""
+
+    x: float
+    y: float
+    heading: float
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """A misplaced object at rest on the floor.
+
+    Attributes:
+        name: Instance name, unique in the episode (`object_07`).
+        category: Category key in the catalogue (`dishes`).
+        model: Object model key in the catalogue (`mug`).
+        point: The sampled navigable point (x, y), m, where it was dropped.
+        position: Settled origin, m.
+        quaternion: Settled orientation, wxyz.
+    """
+
+    name: str
+    category: str
+    model: str
+    point: tuple[float, float]
+    position: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A house, its misplaced objects, their targets and the start (PAPER section 4).
+
+    Attributes:
+        house: Name of the house, or the path of its catalogue.
+        seed: Seed the episode was sampled with.
+        start: Start pose of the person.
+        objects: Misplaced objects; level N holds the first N sampled points.
+        receptacles: Receptacle keys of the house.
+        targets: Object instance name -> receptacle key.
+    """
+
+    house: str
+    seed: int
+    start: StartPose
+    objects: tuple[PlacedObject, ...]
+    receptacles: tuple[str, ...]
+    targets: dict[str, str]
+
+    def __post_init__(self) -> None:
+        names = [o.name for o in self.objects]
+        if len(set(names)) != len(names):
+            raise EpisodeError(f"object names must be unique, got {names}")
+        if set(self.targets) != set(names):
+            raise EpisodeError(
+                f"targets must name every object exactly once; differs at {sorted(set(self.targets) ^ set(names))}"
+            )
+        for name, receptacle in self.targets.items():
+            if receptacle not in self.receptacles:
+                raise EpisodeError(
+                    f"target of {name} is {receptacle!r}, which is none of the receptacles {list(self.receptacles)}"
+                )
+        for placed in self.objects:
+            if not all(math.isfinite(v) for v in (*placed.point, *placed.position, *placed.quaternion)):
+                raise EpisodeError(f"pose of {placed.name} is not finite: {placed.position} {placed.quaternion}")
+
+    def to_json(self) -> str:
+        """Serialise with full float precision, keys in a fixed order."""
+        return json.dumps({"format": FORMAT_VERSION, **dataclasses.asdict(self)}, indent=2) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> "Episode":
+        """Parse what `to_json` wrote.
+
+        Raises:
+            EpisodeError: Not JSON, an unknown format version, or missing or ill-typed fields.
+        """
+        try:
+            raw = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise EpisodeError(f"episode is not JSON: {error}") from error
+        if not isinstance(raw, dict) or raw.get("format") != FORMAT_VERSION:
+            found = raw.get("format") if isinstance(raw, dict) else type(raw).__name__
+            raise EpisodeError(f"episode format {found!r} is not {FORMAT_VERSION}; sample it anew with this version")
+        try:
+            return cls(
+                house=str(raw["house"]),
+                seed=int(raw["seed"]),
+                start=StartPose(**{k: float(raw["start"][k]) for k in ("x", "y", "heading")}),
+                objects=tuple(_placed_object(o) for o in raw["objects"]),
+                receptacles=tuple(str(r) for r in raw["receptacles"]),
+                targets={str(k): str(v) for k, v in raw["targets"].items()},
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise EpisodeError(f"episode is malformed: {type(error).__name__}: {error}") from error
+
+    def save(self, path: Path) -> None:
+        """Write the JSON to `path`, whole or not at all."""
+        write_text_atomically(path, self.to_json())
+
+    @classmethod
+    def load(cls, path: Path) -> "Episode":
+        """Read an episode file.
+
+        Raises:
+            EpisodeError: The file is missing or malformed; the message names the file.
+        """
+        try:
+            return cls.from_json(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise EpisodeError(f"cannot read episode {path}: {error.strerror}") from error
+        except EpisodeError as error:
+            raise EpisodeError(f"{path}: {error}") from error
+
+
+def _placed_object(raw: dict[str, Any]) -> PlacedObject:
+    point = tuple(float(v) for v in raw["point"])
+    position = tuple(float(v) for v in raw["position"])
+    quaternion = tuple(float(v) for v in raw["quaternion"])
+    if (len(point), len(position), len(quaternion)) != (2, 3, 4):
+        raise ValueError(f"{raw['name']}: point, position and quaternion need 2, 3 and 4 numbers")
+    return PlacedObject(
+        name=str(raw["name"]),
+        category=str(raw["category"]),
+        model=str(raw["model"]),
+        point=(point[0], point[1]),
+        position=(position[0], position[1], position[2]),
+        quaternion=(quaternion[0], quaternion[1], quaternion[2], quaternion[3]),
+    )

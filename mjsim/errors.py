@@ -1,0 +1,40 @@
+"""Typed errors of the physics side.
+
+    MjsimError
+    ├── AssetError        a model, texture or catalogue entry is missing or malformed
+    ├── EpisodeError      an episode file does not describe a valid episode
+    ├── SamplingError     no disorganized house satisfies the constraints
+    ├── ActionError       an action's numbers are unusable (a refusal is not an error)
+    ├── PhysicsError      MuJoCo warned, or a state is not finite
+    └── RenderError       no GL context, or a frame cannot be drawn
+
+Every message names the offending value and what to do about it.
+"""
+
+
+class MjsimError(Exception):
+    """Base of every error raised by :mod:`mjsim`."""
+
+
+class AssetError(MjsimError):
+    """A model, texture or catalogue entry is missing or malformed."""
+
+
+class EpisodeError(MjsimError):
+    """An episode file does not describe a valid episode."""
+
+
+class SamplingError(MjsimError):
+    """No disorganized house satisfies the constraints."""
+
+
+class ActionError(MjsimError):
+    """An action's numbers are unusable."""
+
+
+class PhysicsError(MjsimError):
+    """MuJoCo warned, or a state is not finite."""
+
+
+class RenderError(MjsimError):
+    """No GL context could be made, or a frame cannot be drawn."""

@@ -1,0 +1,1 @@
+"""Geodesics on a grid navmesh and the capacitated pickup-and-delivery planner."""
