@@ -1,0 +1,23 @@
+"""Where the authored houses, receptacles and objects lie on disk."""
+
+from pathlib import Path
+
+from mjsim.errors import AssetError
+
+
+def models_root() -> Path:
+    """Folder that holds `houses/`, `receptacles/` and `objects/`.
+
+    An installed wheel carries it inside the package; a checkout has it beside the package.
+
+    Raises:
+        AssetError: Neither place has it.
+    """
+    package = Path(__file__).resolve().parent
+    candidates = (package / "models", package.parent / "models")
+    for candidate in candidates:
+        if (candidate / "houses").is_dir():
+            return candidate
+    raise AssetError(
+        f"no models folder at {' or '.join(str(c) for c in candidates)}; reinstall mjsim, or run it from a full checkout"
+    )
