@@ -45,14 +45,20 @@ class RoutingProblem:
         bad = np.argwhere(~np.isfinite(d) | (d < 0))
         if bad.size:
             i, j = bad[0]
-            raise ProblemError(f"distances[{i}][{j}] is {d[i, j]}; every distance must be a finite number >= 0")
+            raise ProblemError(
+                f"distances[{i}][{j}] is {d[i, j]}; every distance must be a finite number >= 0"
+            )
         skew = np.argwhere(np.abs(d - d.T) > 1e-6)
         if skew.size:
             i, j = skew[0]
-            raise ProblemError(f"distances[{i}][{j}] = {d[i, j]} but distances[{j}][{i}] = {d[j, i]}; make it symmetric")
+            raise ProblemError(
+                f"distances[{i}][{j}] = {d[i, j]} but distances[{j}][{i}] = {d[j, i]}; make it symmetric"
+            )
         loops = np.flatnonzero(np.diagonal(d))
         if loops.size:
-            raise ProblemError(f"distances[{loops[0]}][{loops[0]}] is {d[loops[0], loops[0]]}; the diagonal must be 0")
+            raise ProblemError(
+                f"distances[{loops[0]}][{loops[0]}] is {d[loops[0], loops[0]]}; the diagonal must be 0"
+            )
         if self.capacity < 1:
             raise ProblemError(f"capacity must be at least 1, got {self.capacity}")
         if len(self.onboard) > self.capacity:
