@@ -28,8 +28,8 @@ class RoutingProblem:
         capacity: How many objects may be carried at once.
 
     Raises:
-        ProblemError: Not square, negative, not finite, asymmetric, an index out of range, or more onboard than
-            the capacity.
+        ProblemError: Not square, negative, not finite, asymmetric, an index out of range, or more onboard
+            than the capacity.
     """
 
     distances: NDArray[np.float64]
