@@ -1,0 +1,253 @@
+"""The person's body: two slides and a yaw for walking, a pitching head with the eye, two welding hands.
+
+Contact bits (the only place where they are decided). A pair meets when contype of one shares a bit with
+conaffinity of the other:
+
+    geoms                     contype   conaffinity   meets
+    static (MuJoCo default)   1         1             objects, trunk
+    objects (set here)        4         1 | 4         static, objects, foot
+    avatar trunk              0         1             static
+    avatar foot               0         4             objects
+    hands                     0         0             nothing
+
+Joint coordinates are body-frame or house-frame positions themselves: every joint's `ref` is where its body
+starts, so `qpos` of `avatar/x` is the person's x in the house, and that of `avatar/left/z` the hand's height.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+
+from mjsim.errors import AssetError
+
+STATIC_BIT = 1
+OBJECT_BIT = 4
+
+PREFIX = "avatar/"
+BODY = "avatar/body"
+HEAD = "avatar/head"
+EYE = "avatar/eye"
+TRUNK = "avatar/trunk"
+FOOT = "avatar/foot"
+HANDS = ("left", "right")
+GRIPS = (0, 1)
+
+TRUNK_RADIUS = 0.20
+EYE_HEIGHT = 1.60
+EYE_FORWARD = 0.06
+FIELD_OF_VIEW = 70.0  # vertical, degrees
+START_PITCH = math.radians(-12.0)
+PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
+CARRY = (0.46, 0.27, 1.20)  # hand in the body frame: forward, to its own side, up; m
+HAND_KP = 2000.0
+HAND_KV = 130.0
+HAND_FORCE = 80.0
+
+_TORQUESCALE = 10  # index in a weld's data
+_VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
+_GLOVE = (0.93, 0.74, 0.22, 1.0)
+_SLEEVE = (0.24, 0.34, 0.47, 1.0)
+
+
+@dataclass(frozen=True)
+class _Slide:
+    """A slide joint with its servo: names, axis, where it starts and how far it goes (m)."""
+
+    name: str
+    axis: tuple[float, float, float]
+    start: float
+    range: tuple[float, float]
+
+
+def grip_name(hand: str, instance: str, grip: int) -> str:
+    """Name of the weld that holds `instance` in `hand` at its grip site 0 or 1."""
+    return f"{PREFIX}{hand}/holds/{instance}/{grip}"
+
+
+def hand_start(hand: str) -> tuple[float, float, float]:
+    """Carrying position of a hand in the body frame, m."""
+    forward, side, up = CARRY
+    return (forward, side if hand == "left" else -side, up)
+
+
+def attach_avatar(
+    spec: mujoco.MjSpec, object_names: Sequence[str], *, start: tuple[float, float, float]
+) -> None:
+    """Add the person to a house with its objects, and the pool of welds with which hands hold objects.
+
+    Args:
+        spec: House with objects attached under `<instance>/`; modified in place.
+        object_names: Instance names.
+        start: x and y in m, heading in rad.
+
+    Raises:
+        AssetError: An instance has no body `<instance>/object` or lacks a grip site.
+    """
+    _set_object_bits(spec, object_names)
+    body = _add_body(spec, start)
+    _add_head(spec, body)
+    for hand in HANDS:
+        _add_hand(spec, body, hand)
+    _declare_welds(spec, object_names)
+
+
+def _angle(spec: mujoco.MjSpec, radians: float) -> float:
+    """An angle in the unit that the spec's compiler reads."""
+    return math.degrees(radians) if spec.compiler.degree else radians
+
+
+def _yaw_quaternion(yaw: float) -> list[float]:
+    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
+
+
+def _set_object_bits(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
+    for name in object_names:
+        body = spec.body(f"{name}/object")
+        if body is None:
+            raise AssetError(
+                f"the scene has no body '{name}/object'; attach the object model with prefix '{name}/'"
+            )
+        for geom in body.find_all(mujoco.mjtObj.mjOBJ_GEOM):
+            if geom.contype or geom.conaffinity:
+                geom.contype = OBJECT_BIT
+                geom.conaffinity = STATIC_BIT | OBJECT_BIT
+
+
+def _set_inertia(
+    body: Any, mass: float, inertia: Sequence[float], centre: Sequence[float] = (0, 0, 0)
+) -> None:
+    body.explicitinertial = True
+    body.mass = mass
+    body.inertia = list(inertia)
+    body.ipos = list(centre)
+
+
+def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
+    x, y, heading = start
+    body = spec.worldbody.add_body(name=BODY, pos=[x, y, 0.0], quat=_yaw_quaternion(heading))
+    _set_inertia(body, 70.0, (8.0, 8.0, 1.5), (0.0, 0.0, 0.9))
+    # Axes are given in the body's own frame, which starts turned by the heading.
+    c, s = math.cos(heading), math.sin(heading)
+    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    body.add_joint(name=PREFIX + "x", type=slide, axis=[c, -s, 0], ref=x)
+    body.add_joint(name=PREFIX + "y", type=slide, axis=[s, c, 0], ref=y)
+    body.add_joint(name=PREFIX + "yaw", type=hinge, axis=[0, 0, 1], ref=_angle(spec, heading))
+    for name, kv, force in (("x", 7000.0, 600.0), ("y", 7000.0, 600.0), ("yaw", 300.0, 150.0)):
+        _add_actuator(spec, name, kp=0.0, kv=kv, force=force)
+    cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
+    body.add_geom(
+        name=TRUNK, type=cylinder, size=[TRUNK_RADIUS, 0.84, 0], pos=[0, 0, 0.88], group=4, contype=0,
+        conaffinity=STATIC_BIT, condim=1, priority=2, solref=[0.02, 1], rgba=[0.4, 0.5, 0.6, 1], mass=0,
+    )  # fmt: skip
+    # Soft, and lower than any carried object: light things are pushed along the floor, never launched.
+    body.add_geom(
+        name=FOOT, type=cylinder, size=[TRUNK_RADIUS, 0.32, 0], pos=[0, 0, 0.34], group=4, contype=0,
+        conaffinity=OBJECT_BIT, condim=3, priority=1, solref=[0.07, 1], friction=[0.3, 0.005, 0.0001],
+        rgba=[0.3, 0.4, 0.5, 1], mass=0,
+    )  # fmt: skip
+    return body
+
+
+def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, force: float) -> None:
+    """A servo: velocity where kp is 0, else position with damping."""
+    spec.add_actuator(
+        name=PREFIX + joint,
+        target=PREFIX + joint,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        gainprm=[kp or kv] + [0.0] * 9,
+        biasprm=[0.0, -kp, -kv] + [0.0] * 7,
+        forcelimited=1,
+        forcerange=[-force, force],
+    )
+
+
+def _add_head(spec: mujoco.MjSpec, body: Any) -> None:
+    # The hinge's axis is -y, so that a positive pitch looks up.
+    half = -START_PITCH / 2
+    head = body.add_body(name=HEAD, pos=[0, 0, EYE_HEIGHT], quat=[math.cos(half), 0, math.sin(half), 0])
+    head.gravcomp = 1.0
+    _set_inertia(head, 4.0, (0.03, 0.03, 0.03))
+    head.add_joint(
+        name=PREFIX + "pitch",
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, -1, 0],
+        ref=_angle(spec, START_PITCH),
+    )
+    _add_actuator(spec, "pitch", kp=60.0, kv=3.0, force=30.0)
+    # Camera axes: x to the person's right, y up, looking along -z.
+    head.add_camera(name=EYE, pos=[EYE_FORWARD, 0, 0], quat=[0.5, 0.5, -0.5, -0.5], fovy=FIELD_OF_VIEW)
+
+
+def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str) -> None:
+    side = 1.0 if hand == "left" else -1.0
+    position = hand_start(hand)
+    node = body.add_body(name=f"{PREFIX}{hand}_hand", pos=list(position))
+    node.gravcomp = 1.0
+    _set_inertia(node, 1.0, (0.002, 0.002, 0.002))
+    for axis, start in zip("xyz", position, strict=True):
+        node.add_joint(
+            name=f"{PREFIX}{hand}/{axis}",
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=[float(axis == a) for a in "xyz"],
+            ref=start,
+        )
+        _add_actuator(spec, f"{hand}/{axis}", kp=HAND_KP, kv=HAND_KV, force=HAND_FORCE)
+    node.add_site(name=f"{PREFIX}{hand}_grip", pos=[0, 0, 0], size=[0.005, 0.005, 0.005], group=4)
+    _draw_hand(node, hand, side)
+
+
+def _draw_hand(node: Any, hand: str, side: float) -> None:
+    """A cleaning glove that holds from above, and a sleeve; visual only, shown in first person."""
+
+    def capsule(name: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
+        node.add_geom(
+            name=f"{PREFIX}{hand}_{name}",
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            size=[radius, 0, 0],
+            fromto=list(ends),
+            rgba=list(rgba),
+            **_VISUAL,
+        )
+
+    node.add_geom(
+        name=f"{PREFIX}{hand}_palm",
+        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        size=[0.046, 0.040, 0.019],
+        pos=[-0.012, 0, 0.030],
+        rgba=list(_GLOVE),
+        **_VISUAL,
+    )
+    for i in range(4):
+        y = side * (0.030 - 0.020 * i)
+        x = 0.052 - 0.006 * abs(i - 1)
+        capsule(f"finger_{i}", _GLOVE, 0.0095, 0.02, y, 0.030, x, y, 0.008)
+        capsule(f"tip_{i}", _GLOVE, 0.0088, x, y, 0.008, x - 0.004, y, -0.022)
+    capsule("thumb", _GLOVE, 0.0105, -0.03, -side * 0.030, 0.024, 0.012, -side * 0.048, -0.012)
+    capsule("cuff", _GLOVE, 0.034, -0.045, 0, 0.036, -0.085, side * 0.011, 0.042)
+    capsule("sleeve", _SLEEVE, 0.040, -0.085, side * 0.011, 0.042, -0.27, side * 0.06, 0.07)
+
+
+def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
+    """The pool of inactive site-to-site welds: every hand, object and grip. Inactive ones cost nothing."""
+    for name in object_names:
+        for grip in GRIPS:
+            site = f"{name}/grip_{grip}"
+            if spec.site(site) is None:
+                raise AssetError(f"object '{name}' has no site '{site}'; see docs/models.md, 'An object'")
+            for hand in HANDS:
+                weld = spec.add_equality(
+                    name=grip_name(hand, name, grip),
+                    type=mujoco.mjtEq.mjEQ_WELD,
+                    objtype=mujoco.mjtObj.mjOBJ_SITE,
+                    name1=f"{PREFIX}{hand}_grip",
+                    name2=site,
+                    active=False,
+                    solref=[0.05, 1.0],
+                    solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
+                )
+                weld.data[_TORQUESCALE] = 0.5
