@@ -33,8 +33,8 @@ class NavMesh:
         resolution: Size of a grid cell, m.
         islands: Connected polygons of free space, largest first.
         solid: Inflated obstacles, shrunk by `TOLERANCE`: what a path may not touch.
-        grid: Island of each cell's centre, -1 where it is not navigable, shape (rows, columns) int32; the centre
-            of row r, column c is (x_min + (c + 0.5) resolution, y_min + (r + 0.5) resolution).
+        grid: Island of each cell's centre, -1 where it is not navigable, shape (rows, columns) int32; the
+            centre of row r, column c is (x_min + (c + 0.5) resolution, y_min + (r + 0.5) resolution).
     """
 
     bounds: tuple[float, float, float, float]
@@ -79,8 +79,8 @@ class NavMesh:
         kept = sorted(((p, s) for p, s in snappable if s.area > 0), key=lambda pair: -pair[0].area)
         if not kept:
             raise NotNavigableError(
-                f"{len(hulls)} obstacles inflated by {agent_radius} m leave nothing navigable in {box.bounds}; "
-                "give wider bounds or a smaller agent_radius"
+                f"{len(hulls)} obstacles inflated by {agent_radius} m leave nothing navigable in "
+                f"{box.bounds}; give wider bounds or a smaller agent_radius"
             )
         islands = tuple(p for p, _ in kept)
         loose = np.array(

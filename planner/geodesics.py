@@ -1,0 +1,190 @@
+"""Exact any-angle shortest paths on a navmesh.
+
+The path is the shortest among the inflated obstacle polygons (to the 0.1 mm of `navmesh.TOLERANCE`), not among grid
+cells: a grid overestimates distances by several percent.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from planner.errors import NotNavigableError, UnreachableError
+from planner.navmesh import TOLERANCE, NavMesh
+from planner.visibility_graph import VisibilityGraph, direct_distances, join, point_vertices
+
+
+@dataclass(frozen=True, eq=False)
+class ShortestPath:
+    """A shortest path.
+
+    Attributes:
+        points: Corners from one end to the other, (k, 2) with k >= 2, m. Ends are snapped if need be.
+        geodesic_distance: Length, m.
+    """
+
+    points: NDArray[np.float64]
+    geodesic_distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Query:
+    """Points on the navmesh and the vertices they see."""
+
+    points: NDArray[np.float64]
+    island: NDArray[np.int64]
+    starts: NDArray[np.int32]
+    seen: NDArray[np.int32]
+    lengths: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Geodesics:
+    """Shortest paths and distances between points of a navmesh.
+
+    A point that is not navigable stands for the nearest point of the largest island (`NavMesh.snap`); the gap
+    to it does not count as distance. A navigable point on a smaller island stays there.
+
+    Attributes:
+        navmesh: Where one may walk.
+        max_snap: How far away that nearest point may lie, m.
+    """
+
+    navmesh: NavMesh
+    max_snap: float = 1.0
+    _graph: VisibilityGraph = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_graph", VisibilityGraph.build(self.navmesh))
+
+    def shortest_path(self, a: ArrayLike, b: ArrayLike) -> ShortestPath:
+        """The shortest path from a to b, each (2,), m.
+
+        Raises:
+            NotNavigableError: No navigable point lies within `max_snap` of an end.
+            UnreachableError: The ends lie on different islands.
+        """
+        query = self._query(np.stack([np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)]))
+        first, last = query.points
+        straight = float(direct_distances(query.points[:1], query.points[1:], self._graph.walls)[0, 0])
+        if np.isfinite(straight) and query.island[0] == query.island[1]:
+            return ShortestPath(query.points, straight)
+        from_a, before = dijkstra(
+            self._with_sources(query, 1), indices=[self._size], return_predecessors=True
+        )
+        total, corner = join(from_a[:, : self._size], query.starts[1:], query.seen, query.lengths)
+        if not np.isfinite(total[0, 0]):
+            raise _unreachable(first, last)
+        corners = [last]
+        vertex = int(corner[0, 0])
+        while vertex != self._size:
+            corners.append(self._graph.vertices[vertex, :2])
+            vertex = int(before[0, vertex])
+        return ShortestPath(_without_repeats(np.array([*corners, first])[::-1]), float(total[0, 0]))
+
+    def distances(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Geodesic distances between all pairs of points (m, 2), m; (m, m), symmetric, zero diagonal, m.
+
+        Raises:
+            NotNavigableError: No navigable point lies within `max_snap` of a point.
+            UnreachableError: Two points lie on different islands.
+        """
+        query = self._query(points)
+        result = self._between(query, query, len(query.points))
+        result = np.minimum(result, result.T)
+        np.fill_diagonal(result, 0.0)
+        return result
+
+    def distances_from(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
+        """Geodesic distances from one point (2,) to points (m, 2), m; (m,), m.
+
+        Raises:
+            NotNavigableError: No navigable point lies within `max_snap` of a point.
+            UnreachableError: Two points lie on different islands.
+        """
+        targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        query = self._query(np.vstack([np.asarray(point, dtype=np.float64).reshape(1, 2), targets]))
+        return self._between(query, query, 1)[0, 1:]
+
+    def reachable(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which of the points (m, 2), m, can be reached from a point (2,), m; (m,) bool."""
+        home = self._island(np.asarray(point, dtype=np.float64))
+        targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        return np.array([home is not None and self._island(p) == home for p in targets], dtype=np.bool_)
+
+    @property
+    def _size(self) -> int:
+        return len(self._graph.vertices)
+
+    def _island(self, point: NDArray[np.float64]) -> int | None:
+        island = self.navmesh.island_of(point)
+        if island is None:
+            try:
+                self.navmesh.snap(point, self.max_snap)
+            except NotNavigableError:
+                return None
+            return 0
+        return island
+
+    def _query(self, points: ArrayLike) -> _Query:
+        array = np.array(points, dtype=np.float64).reshape(-1, 2)
+        islands = np.zeros(len(array), dtype=np.int64)
+        for k, point in enumerate(array):
+            island = self.navmesh.island_of(point)
+            if island is None:
+                array[k] = self.navmesh.snap(point, self.max_snap)
+            else:
+                islands[k] = island
+        graph = self._graph
+        seen = point_vertices(array, islands, graph.vertices, graph.island, graph.walls, TOLERANCE)
+        return _Query(array, islands, *seen)
+
+    def _with_sources(self, query: _Query, count: int) -> csr_array:
+        """The vertex graph and the first `count` points of a query as further nodes, edges leading out."""
+        graph, size = self._graph, self._size
+        used = query.starts[count]
+        indptr = np.concatenate([graph.indptr, graph.indptr[-1] + query.starts[1 : count + 1]])
+        indices = np.concatenate([graph.indices, query.seen[:used]])
+        # A stored zero would mean no edge; a point on a vertex is at the smallest distance instead.
+        weights = np.concatenate([graph.weights, np.maximum(query.lengths[:used], 1e-300)])
+        return csr_array((weights, indices, indptr), shape=(size + count, size + count))
+
+    def _between(self, sources: _Query, targets: _Query, count: int) -> NDArray[np.float64]:
+        """Distances from the first `count` sources to all targets; typed errors instead of infinities."""
+        graph, size = self._graph, self._size
+        apart = sources.island[:count, None] != targets.island[None, :]
+        if apart.any():
+            i, j = np.argwhere(apart)[0]
+            raise _unreachable(sources.points[i], targets.points[j])
+        if count == 0:
+            return np.zeros((0, len(targets.points)))
+        over = dijkstra(self._with_sources(sources, count), indices=np.arange(size, size + count))
+        bent, _ = join(over[:, :size], targets.starts, targets.seen, targets.lengths)
+        result = np.minimum(bent, direct_distances(sources.points[:count], targets.points, graph.walls))
+        lost = np.argwhere(~np.isfinite(result))
+        if lost.size:
+            raise _unreachable(sources.points[lost[0][0]], targets.points[lost[0][1]])
+        return result
+
+
+def path_length(points: ArrayLike | Sequence[ArrayLike]) -> float:
+    """Length of a polyline (k, 2), m."""
+    steps = np.diff(np.asarray(points, dtype=np.float64), axis=0)
+    return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+
+
+def _unreachable(a: NDArray[np.float64], b: NDArray[np.float64]) -> UnreachableError:
+    return UnreachableError(
+        f"no way from ({a[0]:.3f}, {a[1]:.3f}) to ({b[0]:.3f}, {b[1]:.3f}): they lie on different islands "
+        "of the navmesh; move one, or build the navmesh with a smaller agent_radius"
+    )
+
+
+def _without_repeats(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Drop corners that repeat the one before; both ends stay."""
+    keep = np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-9]
+    keep[-1] = True
+    return points[keep]

@@ -1,0 +1,199 @@
+"""Visibility graph over the reflex vertices of free space, and the kernels that test visibility.
+
+A shortest path among polygons bends only at reflex vertices of free space and is tangent to the obstacle at
+each, so only tangent sight lines are edges (de Berg et al., Computational Geometry, chapter 15).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from shapely.geometry.polygon import orient
+
+from planner.kernels import kernel
+from planner.navmesh import TOLERANCE, NavMesh
+
+
+@dataclass(frozen=True, eq=False)
+class VisibilityGraph:
+    """Static part of the shortest-path search; built once per navmesh.
+
+    Attributes:
+        vertices: Reflex vertices, (v, 6): x, y, then the ring's previous and next vertex, m.
+        island: Island of each vertex, (v,) int64.
+        walls: Edges of the solid obstacles, (w, 4): x, y of one end and of the other, m.
+        indptr, indices, weights: Rows of the vertex-vertex graph, as in a `csr_array`; weights in m.
+    """
+
+    vertices: NDArray[np.float64]
+    island: NDArray[np.int64]
+    walls: NDArray[np.float64]
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    weights: NDArray[np.float64]
+
+    @classmethod
+    def build(cls, navmesh: NavMesh) -> "VisibilityGraph":
+        """Find the reflex vertices of a navmesh and which of them see each other."""
+        found = [_reflex_vertices(island) for island in navmesh.islands]
+        vertices = np.concatenate([np.empty((0, 6)), *found])
+        island = np.repeat(np.arange(len(found)), [len(f) for f in found])
+        walls = _edges(navmesh.solid)
+        rows, columns = vertex_pairs(vertices, island, walls, TOLERANCE)
+        weights = np.hypot(*(vertices[rows, :2] - vertices[columns, :2]).T)
+        count = len(vertices)
+        graph = csr_array(
+            (np.r_[weights, weights], (np.r_[rows, columns], np.r_[columns, rows])), shape=(count, count)
+        )
+        return cls(
+            vertices=vertices,
+            island=island.astype(np.int64),
+            walls=walls,
+            indptr=graph.indptr.astype(np.int32),
+            indices=graph.indices.astype(np.int32),
+            weights=graph.data,
+        )
+
+
+def _rings(geometry: shapely.Geometry) -> list[NDArray[np.float64]]:
+    """Rings of all polygons without the repeated last vertex; the polygon lies to the left of each."""
+    rings = []
+    for polygon in map(orient, shapely.get_parts(geometry)):
+        for ring in (polygon.exterior, *polygon.interiors):
+            rings.append(np.asarray(ring.coords, dtype=np.float64)[:-1])
+    return rings
+
+
+def _reflex_vertices(island: shapely.Geometry) -> NDArray[np.float64]:
+    found = [np.empty((0, 6))]
+    for ring in _rings(island):
+        before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
+        a, b = ring - before, after - ring
+        turn = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / (np.hypot(*a.T) * np.hypot(*b.T))
+        found.append(np.hstack([ring, before, after])[turn < -1e-9])
+    return np.concatenate(found)
+
+
+def _edges(geometry: shapely.Geometry) -> NDArray[np.float64]:
+    edges = [np.hstack([ring, np.roll(ring, -1, axis=0)]) for ring in _rings(geometry)]
+    return np.ascontiguousarray(np.concatenate([np.empty((0, 4)), *edges]))
+
+
+@kernel
+def is_visible(ax: float, ay: float, bx: float, by: float, walls: NDArray[np.float64]) -> bool:
+    """Whether the closed segment from a to b touches no wall."""
+    x0, x1 = min(ax, bx), max(ax, bx)
+    y0, y1 = min(ay, by), max(ay, by)
+    for k in range(walls.shape[0]):
+        cx, cy, dx, dy = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]
+        if max(cx, dx) < x0 or min(cx, dx) > x1 or max(cy, dy) < y0 or min(cy, dy) > y1:
+            continue
+        side_c = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        side_d = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+        if (side_c > 0.0 and side_d > 0.0) or (side_c < 0.0 and side_d < 0.0):
+            continue
+        side_a = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
+        side_b = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+        if (side_a > 0.0 and side_b > 0.0) or (side_a < 0.0 and side_b < 0.0):
+            continue
+        return False
+    return True
+
+
+@kernel
+def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) -> bool:
+    """Whether a line from (x, y) passes a vertex with both of the vertex's neighbours on one side."""
+    ux, uy = vertex[0] - x, vertex[1] - y
+    before = ux * (vertex[3] - vertex[1]) - uy * (vertex[2] - vertex[0])
+    after = ux * (vertex[5] - vertex[1]) - uy * (vertex[4] - vertex[0])
+    margin = slack * np.sqrt(ux * ux + uy * uy)
+    left = bool(before >= -margin and after >= -margin)
+    return left or bool(before <= margin and after <= margin)
+
+
+@kernel
+def vertex_pairs(
+    vertices: NDArray[np.float64], island: NDArray[np.int64], walls: NDArray[np.float64], slack: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs i < j of vertices that see each other along a line tangent at both."""
+    rows, columns = [0], [0]
+    for i in range(vertices.shape[0]):
+        for j in range(i + 1, vertices.shape[0]):
+            if island[i] != island[j]:
+                continue
+            p, q = vertices[i], vertices[j]
+            if not (is_tangent(p[0], p[1], q, slack) and is_tangent(q[0], q[1], p, slack)):
+                continue
+            if is_visible(p[0], p[1], q[0], q[1], walls):
+                rows.append(i)
+                columns.append(j)
+    return np.array(rows[1:]), np.array(columns[1:])
+
+
+@kernel
+def point_vertices(
+    points: NDArray[np.float64],
+    point_island: NDArray[np.int64],
+    vertices: NDArray[np.float64],
+    island: NDArray[np.int64],
+    walls: NDArray[np.float64],
+    slack: float,
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+    """For each point the vertices it sees along tangents: row starts, vertex indices, distances."""
+    starts = np.zeros(points.shape[0] + 1, np.int32)
+    found, lengths = [0], [0.0]
+    for i in range(points.shape[0]):
+        x, y = points[i, 0], points[i, 1]
+        for j in range(vertices.shape[0]):
+            q = vertices[j]
+            if island[j] != point_island[i] or not is_tangent(x, y, q, slack):
+                continue
+            if is_visible(x, y, q[0], q[1], walls):
+                found.append(j)
+                lengths.append(np.hypot(q[0] - x, q[1] - y))
+        starts[i + 1] = len(found) - 1
+    return starts, np.array(found[1:]).astype(np.int32), np.array(lengths[1:])
+
+
+@kernel
+def direct_distances(
+    a: NDArray[np.float64], b: NDArray[np.float64], walls: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Straight distance from each a to each b, infinite where a wall is between, (len(a), len(b)), m."""
+    result = np.full((a.shape[0], b.shape[0]), np.inf)
+    for i in range(a.shape[0]):
+        for j in range(b.shape[0]):
+            if is_visible(a[i, 0], a[i, 1], b[j, 0], b[j, 1], walls):
+                result[i, j] = np.hypot(b[j, 0] - a[i, 0], b[j, 1] - a[i, 1])
+    return result
+
+
+@kernel
+def join(
+    from_source: NDArray[np.float64],
+    starts: NDArray[np.int32],
+    seen: NDArray[np.int32],
+    lengths: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Distance from each source to each point over the best vertex that the point sees.
+
+    Args:
+        from_source: Distance from each source to each vertex, (s, v), m.
+        starts, seen, lengths: What `point_vertices` returned for the m points.
+
+    Returns:
+        Distances (s, m) in m, infinite without a path, and the last vertex of each path, -1 without.
+    """
+    sources, points = from_source.shape[0], starts.shape[0] - 1
+    distance = np.full((sources, points), np.inf)
+    last = np.full((sources, points), -1, np.int32)
+    for s in range(sources):
+        for p in range(points):
+            for k in range(starts[p], starts[p + 1]):
+                total = from_source[s, seen[k]] + lengths[k]
+                if total < distance[s, p]:
+                    distance[s, p] = total
+                    last[s, p] = seen[k]
+    return distance, last
