@@ -1,0 +1,76 @@
+"""The paper's metrics, from the event log and the trajectory alone (PAPER section 6)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.records import Event
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Objective measures of one trial.
+
+    Attributes:
+        delivered: Objects in their receptacle at the end.
+        normalized_deviations: Visits that differ from the suggested next visit, over the visits at which another
+            one was feasible; 0 when there was never a choice.
+        inverse_path_length: Geodesic distance between consecutive visits over the distance walked; 1 is perfect.
+        task_distance_m: Distance walked, m.
+        completion_time_s: Time until the last object was delivered, or until the end if some are left, s.
+        optimal_distance_m: Cost of the plan at the start, m.
+        replans: How often the plan was made anew after the first.
+        refusals: Infeasible attempts.
+        failures: Picks and places that were begun but did not succeed in the physics, and objects lost from a hand.
+    """
+
+    delivered: int
+    normalized_deviations: float
+    inverse_path_length: float
+    task_distance_m: float
+    completion_time_s: float
+    optimal_distance_m: float
+    replans: int
+    refusals: int
+    failures: int
+
+
+def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> Metrics:
+    """Measure a trial.
+
+    A visit's place is where the person stood, not where the object lay: things are reached over up to a metre, and
+    the geodesic between standing places is the shortest walk that could have joined them, which keeps the inverse
+    path length at most 1.
+
+    Args:
+        events: The event log in order.
+        positions: Floor position at every control step, m, shape (T, 2).
+    """
+    visits = [e for e in events if e["event"] == "visit"]
+    plans = [e for e in events if e["event"] == "plan"]
+    choices = [v for v in visits if v["alternatives"] > 0]
+    deviations = sum(v["deviated"] for v in choices)
+    walked = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()) if len(positions) > 1 else 0.0
+    shortest = float(sum(v["geodesic_m"] for v in visits))
+    delivered = [e for e in events if e["event"] == "placed"]
+    dislodged = sum(e["event"] == "dislodged" for e in events)
+    return Metrics(
+        delivered=len(delivered) - dislodged,
+        normalized_deviations=deviations / len(choices) if choices else 0.0,
+        inverse_path_length=shortest / walked if walked > 0 else 1.0,
+        task_distance_m=walked,
+        completion_time_s=_completion_time(events),
+        optimal_distance_m=float(plans[0]["cost_m"]) if plans else 0.0,
+        replans=max(len(plans) - 1, 0),
+        refusals=sum(e["event"] == "attempt" and not e["applied"] for e in events),
+        failures=sum(e["event"] in ("pick_failed", "place_failed", "grip_lost") for e in events),
+    )
+
+
+def _completion_time(events: Sequence[Event]) -> float:
+    end = events[-1]
+    if end["event"] == "end" and end["reason"] == "all delivered":
+        return float(max(e["t"] for e in events if e["event"] == "placed"))
+    return float(end["t"])

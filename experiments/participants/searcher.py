@@ -1,0 +1,120 @@
+"""Searches room by room with what it can see, and tidies what it finds (condition `none`)."""
+
+import numpy as np
+
+from experiments.known_house import KnownHouse, Point
+from experiments.participants.base import Participant, Percept
+from experiments.participants.errands import (
+    Errand,
+    ErrandRunner,
+    estimated_distance,
+    pick_errand,
+    place_errand,
+)
+from mjsim.actions import IDLE, Action, Move
+
+LOOK_INTERVAL = 0.2  # s between two looks while walking
+SEARCHED = 0.5  # m from a viewpoint before the look around begins
+LOOK_AROUND_RATE = 2.0  # rad/s
+FULL_TURN = 2 * np.pi
+GONE = 1.2  # m: a remembered object nearer than this and not in view is no longer there
+
+
+class Searcher:
+    """Picks what it has seen, brings what it carries when both hands are full or nothing else is known,
+    and searches the rest of the present room before it goes on to the nearest unsearched one."""
+
+    def __init__(self, house: KnownHouse, rng: np.random.Generator) -> None:
+        self._house = house
+        self._rng = rng
+        self._runner = ErrandRunner(house)
+        self._remembered: dict[str, Point] = {}
+        self._unsearched: list[tuple[str, Point]] = []
+        self._target: tuple[str, Point] | None = None
+        self._room: str | None = None
+        self._turned: float | None = None
+        self._last_heading = 0.0
+        self._next_look = 0.0
+        self._choice: tuple[str, str] | None = None
+
+    def act(self, percept: Percept) -> Action:
+        """Look, remember, decide, and do one control step of what was decided."""
+        if percept.busy:
+            return IDLE
+        self._look(percept)
+        errand = self._errand(percept)
+        if errand is not None:
+            self._turned = None
+            return self._runner.act(percept, errand)
+        return self._search(percept)
+
+    def _look(self, percept: Percept) -> None:
+        for name in percept.carried:
+            self._remembered.pop(name, None)
+        if percept.time < self._next_look:
+            return
+        self._next_look = percept.time + LOOK_INTERVAL
+        self._remembered.update(percept.look())
+
+    def _errand(self, percept: Percept) -> Errand | None:
+        """What can be done with what is known: fetch the nearest known object, or bring what is carried."""
+        bins = [place_errand(self._house, n, percept.targets[n]) for n in percept.carried]
+        known = [pick_errand(self._house, n, xy) for n, xy in sorted(self._remembered.items())]
+        feasible = bins if None not in percept.hands else known or bins
+        errands = {e.key: e for e in feasible}
+        if not errands:
+            return None
+        if self._choice not in errands:
+            here = percept.position
+            self._choice = min(errands, key=lambda k: (estimated_distance(self._house, here, errands[k].stand), k))
+        chosen = errands[self._choice]
+        if chosen.kind == "pick" and self._has_gone(percept, chosen):
+            del self._remembered[chosen.object]
+            return self._errand(percept)
+        return chosen
+
+    def _has_gone(self, percept: Percept, errand: Errand) -> bool:
+        refused = percept.answer is not None and not percept.answer.applied
+        near = float(np.linalg.norm(errand.goal - percept.position)) < GONE
+        return refused and near and errand.object not in percept.look()
+
+    def _search(self, percept: Percept) -> Action:
+        if self._turned is not None:
+            return self._look_around(percept)
+        if self._target is None:
+            self._target = self._next_viewpoint(percept.position)
+        room, viewpoint = self._target
+        if float(np.linalg.norm(viewpoint - percept.position)) > SEARCHED:
+            return self._runner.walk(percept, self._runner.way_to(percept.position, viewpoint))
+        self._room, self._turned, self._last_heading = room, 0.0, percept.heading
+        return Move(turn=LOOK_AROUND_RATE)
+
+    def _look_around(self, percept: Percept) -> Action:
+        step = (percept.heading - self._last_heading + np.pi) % FULL_TURN - np.pi
+        self._turned, self._last_heading = (self._turned or 0.0) + step, percept.heading
+        if self._turned < FULL_TURN:
+            return Move(turn=LOOK_AROUND_RATE)
+        self._turned = None
+        if self._target is not None:
+            self._unsearched = [v for v in self._unsearched if v is not self._target]
+            self._target = None
+        return IDLE
+
+    def _next_viewpoint(self, position: Point) -> tuple[str, Point]:
+        if not self._unsearched:
+            self._unsearched = self._all_viewpoints()
+        here = [v for v in self._unsearched if v[0] == self._room] or self._unsearched
+        return min(here, key=lambda v: estimated_distance(self._house, position, v[1]))
+
+    def _all_viewpoints(self) -> list[tuple[str, Point]]:
+        """Every viewpoint, a little elsewhere at each round so that what was hidden once is seen later."""
+        return [
+            (room, self._house.navmesh.snap(point + self._rng.normal(0.0, 0.15, size=2)))
+            for room, points in self._house.viewpoints.items()
+            for point in points
+        ]
+
+
+def build(house: KnownHouse, rng: np.random.Generator) -> Participant:
+    """Make a participant that knows the house but not where anything lies."""
+    return Searcher(house, rng)

@@ -1,0 +1,164 @@
+"""The record of one trial: an append-only event log, a trajectory, and the folder that holds them."""
+
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import RecordError
+from mjsim.actions import Action, Move, Pick
+from mjsim.files import replacing, write_text_atomically
+from mjsim.observation import Observation, ObjectStatus
+
+LOG_FORMAT = 1
+EPISODE, EVENTS, TRAJECTORY, METRICS, PLAN, TOPDOWN, VIDEO = (
+    "episode.json",
+    "events.jsonl",
+    "trajectory.npz",
+    "metrics.json",
+    "plan.json",
+    "topdown.png",
+    "video.mp4",
+)
+STATUS_CODE = {ObjectStatus.LOOSE: 0, ObjectStatus.CARRIED: 1, ObjectStatus.DELIVERED: 2}
+
+Event = Mapping[str, Any]
+
+
+class EventLog:
+    """Append-only JSON lines, flushed line by line so that a crash loses nothing that was logged."""
+
+    def __init__(self, path: Path) -> None:
+        self._file: TextIO = path.open("x", encoding="utf-8")
+        self.events: list[Event] = []
+
+    def append(self, time: float, event: str, **fields: Any) -> None:
+        """Log `event` at simulated `time` s, with JSON-ready fields."""
+        line = {"t": round(time, 6), "event": event, **fields}
+        self.events.append(line)
+        self._file.write(json.dumps(line) + "\n")
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class Trajectory:
+    """Poses and actions of every control step.
+
+    Arrays (T steps, n objects): `time` (T,) s; `position` (T, 2) m; `heading`, `pitch` (T,) rad; `hands` (T, 2)
+    object index or -1; `object_position` (T, n, 3) m; `object_quaternion` (T, n, 4) wxyz; `object_status` (T, n)
+    0 loose, 1 carried, 2 delivered; `action` (T, 6): kind (0 move, 1 pick, 2 place), object index or -1, then
+    forward, left (m/s), turn, look (rad/s). Row t is the state before action t.
+    """
+
+    def __init__(self, object_names: Sequence[str]) -> None:
+        self._index = {name: i for i, name in enumerate(object_names)}
+        self._rows: list[tuple[Any, ...]] = []
+
+    def append(self, observation: Observation, action: Action) -> None:
+        """Add one control step."""
+        o = observation
+        hands = [-1 if name is None else self._index[name] for name in o.hands]
+        status = [STATUS_CODE[s] for s in o.object_status]
+        self._rows.append(
+            (
+                o.time,
+                o.position,
+                o.heading,
+                o.pitch,
+                hands,
+                o.object_positions,
+                o.object_quaternions,
+                status,
+                self._encode(action),
+            )
+        )
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything so far, as arrays by name."""
+        names = (
+            "time",
+            "position",
+            "heading",
+            "pitch",
+            "hands",
+            "object_position",
+            "object_quaternion",
+            "object_status",
+            "action",
+        )
+        kinds: dict[str, type] = {"hands": np.int16, "object_status": np.int8}
+        columns = list(zip(*self._rows, strict=True)) if self._rows else [[] for _ in names]
+        return {n: np.asarray(c, dtype=kinds.get(n, np.float64)) for n, c in zip(names, columns, strict=True)}
+
+    def save(self, path: Path) -> None:
+        """Write a compressed NPZ, whole or not at all."""
+        with replacing(path) as temporary:
+            np.savez_compressed(temporary, allow_pickle=False, **self.arrays())
+
+    def _encode(self, action: Action) -> list[float]:
+        if isinstance(action, Move):
+            return [0.0, -1.0, action.forward, action.left, action.turn, action.look]
+        index = -1 if action.object is None else self._index.get(action.object, -1)
+        return [1.0 if isinstance(action, Pick) else 2.0, float(index), 0.0, 0.0, 0.0, 0.0]
+
+
+def is_run(directory: Path) -> bool:
+    """Whether `directory` holds the record of a trial."""
+    return (directory / EPISODE).is_file() and (directory / EVENTS).is_file()
+
+
+@contextmanager
+def run_directory(path: Path) -> Iterator[Path]:
+    """Yield a working folder that becomes `path` on success, in one rename.
+
+    An earlier run at `path` is replaced; anything else there is left alone.
+
+    Raises:
+        RecordError: `path` exists and is not a run, so replacing it could destroy something.
+    """
+    if path.exists() and not is_run(path) and (not path.is_dir() or any(path.iterdir())):
+        raise RecordError(f"{path} exists and is not a run; choose another --out or move it away")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    working = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
+    try:
+        yield working
+        working.chmod(0o755)
+        if path.exists():
+            shutil.rmtree(path)
+        working.replace(path)
+    finally:
+        if working.exists():
+            shutil.rmtree(working)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write indented JSON, whole or not at all."""
+    write_text_atomically(path, json.dumps(value, indent=2) + "\n")
+
+
+def read_events(path: Path) -> list[Event]:
+    """Read an event log.
+
+    Raises:
+        RecordError: The file is missing, or a line is not JSON; the message names file and line.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise RecordError(f"cannot read {path}: {error.strerror}") from error
+    events: list[Event] = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            events.append(json.loads(line))
+        except json.JSONDecodeError as error:
+            raise RecordError(f"{path}, line {number} is not JSON: {error}") from error
+    return events

@@ -1,0 +1,89 @@
+"""H.264 video that browsers play, encoded beside the simulation in a thread of its own."""
+
+import queue
+import threading
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import RecordError
+
+Frame = NDArray[np.uint8]
+QUEUE_LENGTH = 8  # frames; enough to even out the two sides, little enough to hold no memory
+
+
+class VideoWriter:
+    """Writes frames to an MP4 file. Use as a context manager; the file is complete on leaving it.
+
+    Args:
+        path: File to write; its folder must exist.
+        width: Frame width, px, even (4:2:0 chroma).
+        height: Frame height, px, even.
+        fps: Frames per second.
+
+    Raises:
+        RecordError: A size is odd, or the encoder failed.
+    """
+
+    def __init__(self, path: Path, *, width: int, height: int, fps: int = 25) -> None:
+        if width % 2 or height % 2:
+            raise RecordError(f"video size must be even in both directions, got {width}x{height}")
+        self._path = path
+        self._shape = (height, width, 3)
+        self._fps = fps
+        self._queue: queue.Queue[Frame | None] = queue.Queue(QUEUE_LENGTH)
+        self._failure: BaseException | None = None
+        self._thread = threading.Thread(target=self._encode, name="video", daemon=True)
+        self._thread.start()
+
+    def write(self, frame: Frame) -> None:
+        """Append a frame, uint8 RGB of shape (height, width, 3); the caller must not change it afterwards."""
+        if frame.shape != self._shape:
+            raise RecordError(f"frame of shape {frame.shape} does not fit a video of shape {self._shape}")
+        self._raise_failure()
+        self._queue.put(frame)
+
+    def close(self) -> None:
+        """Encode what is queued and finish the file."""
+        self._queue.put(None)
+        self._thread.join()
+        self._raise_failure()
+
+    def __enter__(self) -> "VideoWriter":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise RecordError(f"cannot encode {self._path}: {self._failure}") from self._failure
+
+    def _encode(self) -> None:
+        try:
+            self._encode_all()
+        except BaseException as failure:  # handed to the writing thread, which raises it
+            self._failure = failure
+            while self._queue.get() is not None:
+                pass
+
+    def _encode_all(self) -> None:
+        height, width, _ = self._shape
+        # faststart puts the index first, so that a browser plays before the whole file has arrived.
+        with av.open(str(self._path), "w", options={"movflags": "+faststart"}) as container:
+            # One encoder thread: x264's rate control then repeats bit for bit, and the renderer needs the cores.
+            stream = container.add_stream(
+                "libx264", rate=self._fps, options={"preset": "veryfast", "crf": "22", "threads": "1"}
+            )
+            stream.width, stream.height = width, height
+            stream.pix_fmt = "yuv420p"
+            stream.time_base = Fraction(1, self._fps)
+            while (frame := self._queue.get()) is not None:
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
+            container.mux(stream.encode())
