@@ -1,0 +1,66 @@
+"""Where the receptacles are: the volume that counts as delivered, and the spot to use each from."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjsim.errors import AssetError
+
+
+@dataclass(frozen=True, eq=False)
+class ReceptacleGeometry:
+    """One receptacle in the house frame.
+
+    Attributes:
+        key: Receptacle key.
+        center: Centre of the delivery volume, m, shape (3,).
+        half_size: Half extents of the volume along its own axes, m, shape (3,).
+        rotation: The volume's axes as columns, shape (3, 3).
+        approach: Floor point (x, y) where a person stands to use it, m, shape (2,).
+    """
+
+    key: str
+    center: NDArray[np.float64]
+    half_size: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    approach: NDArray[np.float64]
+
+    def contains(self, point: ArrayLike, margin: float = 0.005) -> bool:
+        """Whether a point (3,), m, lies in the volume grown by `margin` metres on every side."""
+        local = self.rotation.T @ (np.asarray(point, dtype=np.float64) - self.center)
+        return bool(np.all(np.abs(local) <= self.half_size + margin))
+
+
+def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:
+    """Read the sites `<key>/volume` and `<key>/approach` of a compiled model.
+
+    Receptacles do not move, so this holds for the whole episode.
+
+    Raises:
+        AssetError: A site is missing, or the volume is not a box.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = {}
+    for key in keys:
+        volume, approach = _site(model, key, "volume"), _site(model, key, "approach")
+        if model.site_type[volume] != mujoco.mjtGeom.mjGEOM_BOX:
+            raise AssetError(f"site 'volume' of receptacle {key!r} must be of type box")
+        found[key] = ReceptacleGeometry(
+            key=key,
+            center=data.site_xpos[volume].copy(),
+            half_size=model.site_size[volume].copy(),
+            rotation=data.site_xmat[volume].reshape(3, 3).copy(),
+            approach=data.site_xpos[approach, :2].copy(),
+        )
+    return found
+
+
+def _site(model: mujoco.MjModel, key: str, name: str) -> int:
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"{key}/{name}")
+    if site < 0:
+        raise AssetError(f"receptacle {key!r} has no site {name!r}; add it to its model")
+    return int(site)

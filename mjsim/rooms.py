@@ -1,0 +1,109 @@
+"""Which room a point on the floor lies in: the semantic locations of the checklist (PAPER section 5)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjsim.errors import AssetError
+
+PREFIX = "room:"
+
+
+@dataclass(frozen=True, eq=False)
+class RoomMap:
+    """Rectangles on the floor, each a room or a part of one.
+
+    Attributes:
+        labels: Room key -> label shown to people ("Kitchen"), in the catalogue's order.
+        keys: Room key per rectangle, length k.
+        centers: Centres, m, shape (k, 2).
+        half_sizes: Half extents along the rectangle's own axes, m, shape (k, 2).
+        axes: Rectangle axes as columns, shape (k, 2, 2).
+    """
+
+    labels: Mapping[str, str]
+    keys: tuple[str, ...]
+    centers: NDArray[np.float64]
+    half_sizes: NDArray[np.float64]
+    axes: NDArray[np.float64]
+
+    @classmethod
+    def from_model(cls, model: mujoco.MjModel, labels: Mapping[str, str]) -> "RoomMap":
+        """Read the box sites `room:<key>` and `room:<key>:<n>` of a compiled house.
+
+        Args:
+            model: Any model that contains the house.
+            labels: Room key -> label, from the catalogue.
+
+        Raises:
+            AssetError: A room without a site, a site without a room, or a site that is not an upright box.
+        """
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        keys: list[str] = []
+        sites: list[int] = []
+        for site in range(model.nsite):
+            name = model.site(site).name
+            if name.startswith(PREFIX):
+                keys.append(_room_of(name, labels))
+                sites.append(site)
+                _check_box(model, data, site, name)
+        missing = sorted(set(labels) - set(keys))
+        if missing:
+            raise AssetError(f"rooms {missing} of the catalogue have no site '{PREFIX}<key>' in the house")
+        rotations = data.site_xmat[sites].reshape(-1, 3, 3)
+        return cls(
+            labels=dict(labels),
+            keys=tuple(keys),
+            centers=data.site_xpos[sites, :2].copy(),
+            half_sizes=model.site_size[sites, :2].copy(),
+            axes=rotations[:, :2, :2].copy(),
+        )
+
+    def distances(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Distance from a point to each rectangle, m, shape (k,); 0 inside."""
+        offsets = np.asarray(xy, dtype=np.float64)[:2] - self.centers
+        local = np.einsum("kji,kj->ki", self.axes, offsets)
+        outside = np.maximum(np.abs(local) - self.half_sizes, 0.0)
+        return np.asarray(np.hypot(outside[:, 0], outside[:, 1]))
+
+    def room_at(self, xy: ArrayLike) -> str:
+        """Key of the room that contains the point (x, y), m, or else of the nearest one."""
+        return self.keys[int(np.argmin(self.distances(xy)))]
+
+    def contains(self, xy: ArrayLike, margin: float = 0.0) -> bool:
+        """Whether the point (x, y), m, lies in some room, or within `margin` metres of one."""
+        return bool(self.distances(xy).min() <= margin)
+
+    def label(self, key: str) -> str:
+        """Label of a room.
+
+        Raises:
+            AssetError: No such room.
+        """
+        if key not in self.labels:
+            raise AssetError(f"no room {key!r}; the house has {sorted(self.labels)}")
+        return self.labels[key]
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Axis-aligned extent of all rooms: (xmin, ymin, xmax, ymax), m."""
+        reach = np.einsum("kij,kj->ki", np.abs(self.axes), self.half_sizes)
+        low, high = (self.centers - reach).min(axis=0), (self.centers + reach).max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _room_of(name: str, labels: Mapping[str, str]) -> str:
+    key = name.removeprefix(PREFIX).split(":")[0]
+    if key not in labels:
+        raise AssetError(f"site {name!r} names room {key!r}, which the catalogue lacks: {sorted(labels)}")
+    return key
+
+
+def _check_box(model: mujoco.MjModel, data: mujoco.MjData, site: int, name: str) -> None:
+    upright = abs(data.site_xmat[site, 8]) > 1 - 1e-6
+    if model.site_type[site] != mujoco.mjtGeom.mjGEOM_BOX or not upright:
+        raise AssetError(f"site {name!r} must be of type box and turned about the vertical only")
