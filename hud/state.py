@@ -88,6 +88,17 @@ class InventorySlot:
 
 
 @dataclass(frozen=True)
+class Pointer:
+    """An arrow at the edge of the view towards a goal that is out of view.
+
+    Attributes:
+        angle: Direction on the screen, rad, 0 to the right, counter-clockwise (pi/2 is up).
+    """
+
+    angle: float
+
+
+@dataclass(frozen=True)
 class HudState:
     """Everything that is shown.
 
@@ -101,6 +112,7 @@ class HudState:
         delivered: How many objects are in their receptacle.
         total: How many there are.
         clock: Elapsed task time to show, s, or None.
+        pointer: Arrow towards a goal out of view, or None.
     """
 
     checklist_title: str
@@ -112,3 +124,4 @@ class HudState:
     delivered: int = 0
     total: int = 0
     clock: float | None = None
+    pointer: Pointer | None = None

@@ -1,0 +1,14 @@
+"""No assistance: nothing in the world; objects in random order with picture and bin (PAPER section 5)."""
+
+from hud.lists import assemble, random_order_rows
+from hud.state import HudState
+from hud.task import TaskObject, TaskView
+
+
+def hud_state(view: TaskView) -> HudState:
+    """The list of objects and the list of bins, and nothing else."""
+
+    def detail(thing: TaskObject) -> str:
+        return f"→ {view.receptacle(thing.receptacle).label}"
+
+    return assemble(view, "Objects to put away", random_order_rows(view, detail))

@@ -1,0 +1,40 @@
+"""Optimal: breadcrumbs to the next visit, and the plan as numbered steps (PAPER section 5)."""
+
+from hud.lists import assemble, in_sentence
+from hud.markers import breadcrumbs, goal_pin
+from hud.projection import pointer_to
+from hud.state import ChecklistItem, HudState
+from hud.task import TaskView
+
+
+def hud_state(view: TaskView) -> HudState:
+    """Steps done and steps planned, the next one highlighted, and the way there."""
+    done = len(view.steps_done)
+    steps = (*view.steps_done, *view.plan)
+    checklist = tuple(_row(view, i, kind, name, done) for i, (kind, name) in enumerate(steps))
+    markers = breadcrumbs(view.path) if view.path is not None else ()
+    pointer = None
+    if view.goal is not None:
+        markers += goal_pin(view.goal)
+        pointer = pointer_to(view.camera, view.goal) if view.camera is not None else None
+    return assemble(view, "Your plan", checklist, markers, pointer)
+
+
+def _row(view: TaskView, index: int, kind: str, name: str, done: int) -> ChecklistItem:
+    thing = view.object(name)
+    target = view.receptacle(thing.receptacle)
+    pick = kind == "pick"
+    if pick:
+        # Where a picked object lay is not known any more; its room now is where the person carries it.
+        text, detail = f"Pick up {in_sentence(thing.label)}", thing.room if index >= done else ""
+    else:
+        text, detail = f"Put away {in_sentence(thing.label)}", f"{target.label}, {target.room}"
+    return ChecklistItem(
+        text=text,
+        detail=detail,
+        picture=thing.picture,
+        target_picture=None if pick else target.picture,
+        number=index + 1,
+        done=index < done,
+        current=index == done,
+    )

@@ -1,0 +1,290 @@
+"""Where each panel goes. Lengths are px of a 640 x 480 frame, scaled by `unit`; nothing overlaps.
+
+progress        message bar         clock
+task list                            bins
+  ...             (free view)         ...
+  ...              inventory
+"""
+
+import math
+from dataclasses import dataclass
+
+from hud import theme
+from hud.canvas import Rect
+from hud.errors import FrameError
+from hud.state import HudState, Message
+from hud.text import Typeface
+from hud.theme import Face
+
+MARGIN = 8
+GAP = 6
+CHIP_HEIGHT = 28
+CHIP_WIDTH = 76
+LIST_SHARE = 0.295  # of the frame's width
+LIST_WIDTH_LIMIT = 230
+BINS_WIDTH = 162
+BINS_WIDTH_WIDE = 196  # on frames that are wider than 4 : 3
+LIST_BOTTOM = 68  # kept free below the lists, so that the person sees what lies at the feet
+ROW = 30
+HEADER = 24
+FOOTER = 17
+PADDING = 6
+TILE = 24
+NUMBER = 17
+LINE = 14
+SLOT_WIDTH = 118
+SLOT_HEIGHT = 40
+MESSAGE_LINES = 3
+MESSAGE_ICON = 26
+POINTER = 36
+SMALLEST = (320, 240)
+
+
+@dataclass(frozen=True)
+class BinRow:
+    """A row of the list of bins: its height, px, and its wrapped place."""
+
+    height: int
+    place: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Rectangles of the panels in a frame, and what fits into them.
+
+    Attributes:
+        unit: Frame px per theme px.
+        checklist: Task list, or None when it is empty.
+        first: Index of the first row shown.
+        stop: One past the last row shown.
+        message_lines: The message, broken into lines.
+        bin_rows: One per bin that is shown.
+        free: The part of the view between the panels.
+    """
+
+    width: int
+    height: int
+    unit: float
+    progress: Rect | None
+    clock: Rect | None
+    message: Rect | None
+    checklist: Rect | None
+    bins: Rect | None
+    inventory: Rect
+    pointer: Rect | None
+    free: Rect
+    first: int
+    stop: int
+    message_lines: tuple[str, ...]
+    bin_rows: tuple[BinRow, ...]
+
+    def panels(self) -> dict[str, Rect]:
+        """Rectangles of the panels that are shown, by name."""
+        names = ("progress", "clock", "message", "checklist", "bins", "inventory", "pointer")
+        return {name: rect for name in names if (rect := getattr(self, name)) is not None}
+
+
+def unit_of(width: int, height: int) -> float:
+    """Frame px per theme px: the frame always has room for 640 x 480 theme px.
+
+    Raises:
+        FrameError: The frame is too small to be read.
+    """
+    if width < SMALLEST[0] or height < SMALLEST[1]:
+        raise FrameError(
+            f"frame of {width} x {height} px is too small for the HUD; use {SMALLEST[0]} x {SMALLEST[1]}"
+        )
+    return min(width / 640.0, height / 480.0)
+
+
+def window(count: int, current: int, room: int) -> tuple[int, int]:
+    """Which rows of a list to show: `room` of them, with the current one in the upper third.
+
+    Args:
+        count: Rows in all.
+        current: Index of the current row.
+        room: How many fit, at least 1.
+
+    Returns:
+        First row, and one past the last.
+    """
+    if count <= room:
+        return 0, count
+    first = min(max(current - room // 3, 0), count - room)
+    return first, first + room
+
+
+def focus(state: HudState) -> int:
+    """Index of the row that must be visible: the current one, or the first, or the last when all are done."""
+    for i, row in enumerate(state.checklist):
+        if row.current:
+            return i
+    return len(state.checklist) - 1 if state.checklist and state.checklist[-1].number is not None else 0
+
+
+def arrange(state: HudState, width: int, height: int, face: Typeface) -> Layout:
+    """Lay out the panels of `state` in a frame of `width` x `height` px.
+
+    Raises:
+        FrameError: The frame is too small to be read.
+    """
+    unit = unit_of(width, height)
+    bounds = _Bounds(width, height, unit, face)
+    checklist, first, stop = bounds.checklist(state)
+    bins, bin_rows = bounds.bins(state)
+    progress = Rect(bounds.margin, bounds.margin, bounds.px(CHIP_WIDTH), bounds.px(CHIP_HEIGHT))
+    clock = Rect(
+        width - bounds.margin - bounds.px(CHIP_WIDTH), bounds.margin, progress.width, progress.height
+    )
+    inventory = bounds.inventory()
+    message, lines = bounds.message(state.message)
+    free = bounds.free(inventory)
+    return Layout(
+        width=width,
+        height=height,
+        unit=unit,
+        progress=progress if state.total > 0 else None,
+        clock=clock if state.clock is not None else None,
+        message=message,
+        checklist=checklist,
+        bins=bins,
+        inventory=inventory,
+        pointer=None if state.pointer is None else bounds.pointer(state.pointer.angle, free),
+        free=free,
+        first=first,
+        stop=stop,
+        message_lines=lines,
+        bin_rows=bin_rows,
+    )
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """A frame and its scale."""
+
+    width: int
+    height: int
+    unit: float
+    face: Typeface
+
+    def px(self, size: float) -> int:
+        return round(size * self.unit)
+
+    @property
+    def margin(self) -> int:
+        return self.px(MARGIN)
+
+    @property
+    def top(self) -> int:
+        """Where the columns begin."""
+        return self.margin + self.px(CHIP_HEIGHT) + self.px(GAP)
+
+    @property
+    def list_width(self) -> int:
+        return min(math.floor(LIST_SHARE * self.width), self.px(LIST_WIDTH_LIMIT))
+
+    @property
+    def bins_width(self) -> int:
+        return self.px(BINS_WIDTH_WIDE if self.width / self.unit >= 760 else BINS_WIDTH)
+
+    @property
+    def column_height(self) -> int:
+        return self.height - self.px(LIST_BOTTOM) - self.top
+
+    @property
+    def middle(self) -> tuple[int, int]:
+        """First column and width of the part between the two lists."""
+        left = self.margin + self.list_width + self.px(GAP)
+        return left, self.width - self.margin - self.bins_width - self.px(GAP) - left
+
+    def checklist(self, state: HudState) -> tuple[Rect | None, int, int]:
+        """Rectangle of the task list and the rows it shows; never more rows than fit."""
+        count = len(state.checklist)
+        if count == 0:
+            return None, 0, 0
+        fixed = self.px(HEADER) + self.px(PADDING)
+        room = (self.column_height - fixed) // self.px(ROW)
+        footer = 0
+        if room < count:
+            footer = self.px(FOOTER)
+            room = max(1, (self.column_height - fixed - footer) // self.px(ROW))
+        first, stop = window(count, focus(state), room)
+        height = fixed + footer + (stop - first) * self.px(ROW)
+        return Rect(self.margin, self.top, self.list_width, height), first, stop
+
+    def bins(self, state: HudState) -> tuple[Rect | None, tuple[BinRow, ...]]:
+        """Rectangle of the list of bins and its rows; places get fewer lines when many bins must fit."""
+        if not state.bins:
+            return None, ()
+        text = self.bins_width - self.px(2 * PADDING + TILE + GAP)
+        size = max(1, self.px(theme.DETAIL.size))
+        fixed = self.px(HEADER) + self.px(PADDING)
+        rows: tuple[BinRow, ...] = ()
+        for lines in (3, 2, 1, 0):
+            wrapped = [
+                self.face.wrap(b.place, size, theme.DETAIL.weight, text, lines) if lines else ()
+                for b in state.bins
+            ]
+            rows = tuple(BinRow(self.px(max(TILE, LINE * (1 + len(w))) + GAP), w) for w in wrapped)
+            if fixed + sum(r.height for r in rows) <= self.column_height:
+                break
+        while len(rows) > 1 and fixed + sum(r.height for r in rows) > self.column_height:
+            rows = rows[:-1]
+        rect = Rect(
+            self.width - self.margin - self.bins_width,
+            self.top,
+            self.bins_width,
+            fixed + sum(r.height for r in rows),
+        )
+        return rect, rows
+
+    def inventory(self) -> Rect:
+        """Two slots at the bottom, centred in the frame."""
+        slots = 2 * self.px(SLOT_WIDTH) + self.px(GAP)
+        left, width = self.middle
+        x = min(max((self.width - slots) // 2, left), left + width - slots)
+        return Rect(x, self.height - self.margin - self.px(SLOT_HEIGHT), slots, self.px(SLOT_HEIGHT))
+
+    def message(self, message: Message | None) -> tuple[Rect | None, tuple[str, ...]]:
+        """One line between the chips when the text fits there, else up to three lines between the lists."""
+        if message is None or message.opacity <= 0.0 or not message.text.strip():
+            return None, ()
+        face: Face = theme.BAR
+        size = max(1, self.px(face.size))
+        extra = self.px(MESSAGE_ICON + 2 * PADDING)
+        wide = self.width - 2 * (self.margin + self.px(CHIP_WIDTH) + self.px(GAP))
+        line = self.face.fit(message.text, size, face.weight, wide - extra)
+        if line == " ".join(message.text.split()):
+            lines: tuple[str, ...] = (line,)
+            left, span = self.margin + self.px(CHIP_WIDTH) + self.px(GAP), wide
+        else:
+            left, span = self.middle
+            lines = self.face.wrap(message.text, size, face.weight, span - extra, MESSAGE_LINES)
+        width = min(span, extra + max(self.face.width(text, size, face.weight) for text in lines))
+        height = self.px(CHIP_HEIGHT) + (len(lines) - 1) * self.px(LINE + 3)
+        x = min(max((self.width - width) // 2, left), left + span - width)
+        return Rect(x, self.margin, width, height), lines
+
+    def free(self, inventory: Rect) -> Rect:
+        """The view between the lists, below the tallest message and above the inventory."""
+        left, width = self.middle
+        top = self.margin + self.px(CHIP_HEIGHT) + (MESSAGE_LINES - 1) * self.px(LINE + 3) + self.px(GAP)
+        return Rect(left, top, width, inventory.y - self.px(GAP) - top)
+
+    def pointer(self, angle: float, free: Rect) -> Rect:
+        """A square at the edge of the free view in direction `angle`."""
+        side = self.px(POINTER)
+        half_width, half_height = (free.width - side) / 2.0, (free.height - side) / 2.0
+        dx, dy = math.cos(angle), -math.sin(angle)
+        reach = min(
+            half_width / abs(dx) if abs(dx) > 1e-9 else math.inf,
+            half_height / abs(dy) if abs(dy) > 1e-9 else math.inf,
+        )
+        x = free.x + half_width + reach * dx
+        y = free.y + half_height + reach * dy
+        return Rect(
+            min(max(round(x), free.x), free.right - side),
+            min(max(round(y), free.y), free.bottom - side),
+            side,
+            side,
+        )

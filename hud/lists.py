@@ -1,0 +1,73 @@
+"""What the conditions have in common: the list of bins, the two hands, rows of objects in random order."""
+
+from collections.abc import Callable
+
+from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Marker, Pointer
+from hud.task import TaskObject, TaskView
+
+
+def in_sentence(label: str) -> str:
+    """A label inside a sentence: "Blue mug" to "blue mug"; "LEGO car" and "T-shirt" stay."""
+    first, _, rest = label.partition(" ")
+    plain = first[:1].isupper() and first[1:].islower() and first.isalpha()
+    return f"{first.lower()} {rest}".rstrip() if plain else label
+
+
+def bins(view: TaskView) -> tuple[BinEntry, ...]:
+    """Every receptacle with picture and semantic location: all conditions show these (PAPER section 5)."""
+    return tuple(
+        BinEntry(r.label, ", ".join(p for p in (r.room, r.place) if p), r.picture) for r in view.receptacles
+    )
+
+
+def inventory(view: TaskView) -> tuple[InventorySlot, InventorySlot]:
+    """What the left and the right hand hold."""
+    left, right = (
+        InventorySlot() if name is None else InventorySlot(view.object(name).label, view.object(name).picture)
+        for name in view.hands
+    )
+    return left, right
+
+
+def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tuple[ChecklistItem, ...]:
+    """Objects in the participant's order; picked ones crossed out at the bottom, in the order of picking.
+
+    An object that was dropped on the way counts as not picked again.
+    """
+    picks = [name for kind, name in view.steps_done if kind == "pick"]
+    last_pick = {name: i for i, name in enumerate(picks)}
+    objects = [view.object(name) for name in view.order]
+    waiting = [o for o in objects if o.status == "loose"]
+    picked = sorted((o for o in objects if o.status != "loose"), key=lambda o: last_pick.get(o.name, -1))
+    return tuple(
+        ChecklistItem(
+            text=o.label,
+            detail=detail(o),
+            picture=o.picture,
+            target_picture=view.receptacle(o.receptacle).picture,
+            done=o.status != "loose",
+        )
+        for o in (*waiting, *picked)
+    )
+
+
+def assemble(
+    view: TaskView,
+    title: str,
+    checklist: tuple[ChecklistItem, ...],
+    markers: tuple[Marker, ...] = (),
+    pointer: Pointer | None = None,
+) -> HudState:
+    """The HUD state of a condition: its own list and markers, and what every condition shows."""
+    return HudState(
+        checklist_title=title,
+        checklist=checklist,
+        bins=bins(view),
+        inventory=inventory(view),
+        message=view.message,
+        markers=markers,
+        delivered=sum(o.status == "delivered" for o in view.objects),
+        total=len(view.objects),
+        clock=view.clock,
+        pointer=pointer,
+    )

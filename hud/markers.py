@@ -1,0 +1,66 @@
+"""World-locked digital objects of the conditions: flagpoles, breadcrumbs, the goal (PAPER section 5)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hud.state import Marker, Rgba, Vec3
+
+CHEST_HEIGHT = 1.2  # m, of the breadcrumb line at the person's end
+BREADCRUMB_RADIUS = 0.04  # m; 7 px across at 5 m in a 480 px frame
+BREADCRUMB_SPACING = 0.28  # m along the floor path
+BREADCRUMB_CLEARANCE = 0.5  # m of path in front of the person left empty, so that nothing fills the view
+
+RED: Rgba = (0.90, 0.10, 0.06, 1.0)
+ORANGE: Rgba = (0.90, 0.62, 0.0, 1.0)
+WHITE: Rgba = (0.95, 0.95, 0.95, 1.0)
+SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
+
+
+def breadcrumbs(path: NDArray[np.float64]) -> tuple[Marker, ...]:
+    """Spheres along a floor path, from chest height at its start down to the floor at its end.
+
+    Counted back from the goal, so that they keep their places on the floor while the person walks.
+
+    Args:
+        path: Floor polyline from the person to the goal, m, shape (k, 2).
+
+    Returns:
+        Markers in order from the person to the goal; none when the goal is nearer than the clearance.
+    """
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    length = float(along[-1])
+    if length < BREADCRUMB_CLEARANCE:
+        return ()
+    count = int((length - BREADCRUMB_CLEARANCE) / BREADCRUMB_SPACING + 1e-9) + 1
+    at = length - BREADCRUMB_SPACING * np.arange(count - 1, -1, -1)
+    heights = CHEST_HEIGHT + (BREADCRUMB_RADIUS - CHEST_HEIGHT) * at / length
+    xs, ys = (np.interp(at, along, path[:, axis]) for axis in (0, 1))
+    return tuple(
+        Marker("sphere", (float(x), float(y), float(z)), (BREADCRUMB_RADIUS, 0.0, 0.0), RED, "breadcrumb")
+        for x, y, z in zip(xs, ys, heights, strict=True)
+    )
+
+
+def flagpole(position: Vec3, *, x_ray: bool = False) -> tuple[Marker, ...]:
+    """A pole with a flag over an object: 1.2 m tall, standing clear above the object."""
+    x, y, z = position
+    foot, top = z + 0.25, z + 1.45
+    return (
+        Marker(
+            "cylinder", (x, y, (foot + top) / 2), (0.012, (top - foot) / 2, 0.0), WHITE, "flagpole", x_ray
+        ),
+        Marker("box", (x, y + 0.11, top - 0.08), (0.006, 0.11, 0.08), ORANGE, "flagpole", x_ray),
+        Marker("box", (x + 0.11, y, top - 0.08), (0.11, 0.006, 0.08), ORANGE, "flagpole", x_ray),
+        Marker("sphere", (x, y, foot), (0.03, 0.0, 0.0), ORANGE, "flagpole", x_ray),
+    )
+
+
+def goal_pin(position: Vec3, *, x_ray: bool = False) -> tuple[Marker, ...]:
+    """A pin that stands over the goal of the next visit, and a ring-like disc around its foot."""
+    x, y, z = position
+    return (
+        Marker("cylinder", (x, y, z + 0.005), (0.16, 0.004, 0.0), (*SKY[:3], 0.45), "goal", x_ray),
+        Marker("cylinder", (x, y, z + 0.36), (0.010, 0.12, 0.0), SKY, "goal", x_ray),
+        Marker("sphere", (x, y, z + 0.52), (0.05, 0.0, 0.0), SKY, "goal", x_ray),
+    )

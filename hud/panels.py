@@ -1,0 +1,228 @@
+"""Drawing of each panel: values in, a patch out."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hud import theme
+from hud.canvas import Canvas, Patch, Rect
+from hud.layout import GAP, HEADER, LINE, NUMBER, PADDING, ROW, TILE, BinRow
+from hud.state import BinEntry, ChecklistItem, InventorySlot, Message, MessageKind
+from hud.text import Typeface
+
+Pictures = Mapping[str, NDArray[np.uint8]]
+
+
+@dataclass(frozen=True, eq=False)
+class Pen:
+    """What every panel is drawn with."""
+
+    face: Typeface
+    unit: float
+    pictures: Pictures
+
+    def panel(self, rect: Rect, radius: float = 8.0) -> Canvas:
+        """A canvas of the size of `rect` with the dark rounded background."""
+        canvas = Canvas(rect.width, rect.height, self.face, self.unit)
+        whole = Rect(0, 0, rect.width, rect.height)
+        canvas.rounded(whole, radius * self.unit, theme.PANEL, theme.PANEL_OPACITY)
+        canvas.rounded(whole, radius * self.unit, theme.EDGE, theme.EDGE_OPACITY, line=max(1.0, self.unit))
+        return canvas
+
+    def tile(self, canvas: Canvas, key: str | None, x: int, y: int, size: int, opacity: float = 1.0) -> None:
+        """A picture on a light rounded tile; an unknown key leaves the tile empty."""
+        canvas.rounded(Rect(x, y, size, size), 4.0 * self.unit, theme.TILE, 0.94 * opacity)
+        picture = self.pictures.get(key) if key is not None else None
+        if picture is not None:
+            inset = canvas.px(1)
+            canvas.picture(picture, x + inset, y + inset, size - 2 * inset, opacity)
+
+
+def draw_checklist(
+    pen: Pen, rect: Rect, title: str, rows: tuple[ChecklistItem, ...], before: int, after: int, finished: str
+) -> Patch:
+    """The task list; `before` and `after` count the rows that did not fit."""
+    canvas = pen.panel(rect)
+    x, width = canvas.px(PADDING + 2), rect.width - 2 * canvas.px(PADDING + 2)
+    taken = canvas.text_width(finished, theme.DETAIL) + canvas.px(GAP)
+    canvas.text(x, canvas.px(17), canvas.fit(title, theme.TITLE, width - taken), theme.TITLE, theme.TEXT)
+    canvas.text(rect.width - x - taken + canvas.px(GAP), canvas.px(17), finished, theme.DETAIL, theme.QUIET)
+    for i, row in enumerate(rows):
+        _checklist_row(pen, canvas, row, canvas.px(HEADER) + i * canvas.px(ROW))
+    hidden = " · ".join(
+        t for t in (f"{before} above" if before else "", f"+{after} more" if after else "") if t
+    )
+    if hidden:
+        y = rect.height - canvas.px(PADDING)
+        canvas.text(x, y, canvas.fit(hidden, theme.DETAIL, width), theme.DETAIL, theme.QUIET)
+    return canvas.patch()
+
+
+def _checklist_row(pen: Pen, canvas: Canvas, row: ChecklistItem, top: int) -> None:
+    px = canvas.px
+    height, side = px(ROW), px(TILE)
+    if row.current:
+        area = Rect(px(3), top, canvas.width - 2 * px(3), height)
+        canvas.rounded(area, 5.0 * pen.unit, theme.ACCENT, 0.16)
+        canvas.rounded(Rect(px(3), top + px(4), px(3), height - 2 * px(4)), 1.5 * pen.unit, theme.ACCENT, 1.0)
+    x = px(PADDING + 2)
+    if row.number is not None:
+        label = str(row.number)
+        right = x + px(NUMBER) - px(3)
+        face = theme.LABEL if row.current else theme.DETAIL
+        canvas.text(right - canvas.text_width(label, face), top + px(19), label, face, theme.QUIET)
+        x += px(NUMBER)
+    pen.tile(canvas, row.picture, x, top + (height - side) // 2, side, 0.5 if row.done else 1.0)
+    x += side + px(GAP)
+    right = canvas.width - px(PADDING)
+    if row.target_picture is not None:
+        small = px(20)
+        right -= small
+        pen.tile(
+            canvas, row.target_picture, right, top + (height - small) // 2, small, 0.4 if row.done else 1.0
+        )
+        right -= px(3)
+    _row_text(canvas, row, x, top, right - x)
+
+
+def _row_text(canvas: Canvas, row: ChecklistItem, x: int, top: int, width: int) -> None:
+    px = canvas.px
+    face = theme.ITEM_CURRENT if row.current else theme.ITEM
+    if canvas.text_width(row.text, face) > width:
+        face = theme.Face(theme.DETAIL.size, face.weight)
+    line = canvas.fit(row.text, face, width)
+    colour = theme.DONE if row.done else theme.TEXT
+    baseline = top + (px(13) if row.detail else px(19))
+    drawn = canvas.text(x, baseline, line, face, colour)
+    if row.done:
+        y = baseline - px(4.5)
+        canvas.shape([(x - px(1), y), (x + drawn + px(1), y)], theme.TEXT, line=max(1.0, 1.2 * px(1)))
+    detail = canvas.fit(row.detail, theme.DETAIL, width)
+    canvas.text(x, top + px(26), detail, theme.DETAIL, theme.DONE if row.done else theme.QUIET)
+
+
+def draw_bins(
+    pen: Pen, rect: Rect, bins: tuple[BinEntry, ...], rows: tuple[BinRow, ...], hidden: int
+) -> Patch:
+    """The list of bins: picture, name and place."""
+    canvas = pen.panel(rect)
+    px = canvas.px
+    x = px(PADDING + 2)
+    canvas.text(x, px(17), f"Bins (+{hidden})" if hidden else "Bins", theme.TITLE, theme.TEXT)
+    top = px(HEADER)
+    text_x = x + px(TILE + GAP)
+    for entry, row in zip(bins, rows, strict=False):
+        pen.tile(canvas, entry.picture, x, top + px(1), px(TILE))
+        width = rect.width - text_x - px(PADDING)
+        lift = 0 if row.place else px(5)
+        canvas.text(
+            text_x, top + px(11) + lift, canvas.fit(entry.label, theme.LABEL, width), theme.LABEL, theme.TEXT
+        )
+        for i, line in enumerate(row.place):
+            canvas.text(text_x, top + px(11 + LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
+        top += row.height
+    return canvas.patch()
+
+
+def draw_inventory(pen: Pen, rect: Rect, slots: tuple[InventorySlot, InventorySlot]) -> Patch:
+    """Two hands side by side: a picture and a name each, or an empty outline."""
+    canvas = Canvas(rect.width, rect.height, pen.face, pen.unit)
+    px = canvas.px
+    width = (rect.width - px(GAP)) // 2
+    for i, (slot, hand) in enumerate(zip(slots, ("Left hand", "Right hand"), strict=True)):
+        left = 0 if i == 0 else rect.width - width
+        area = Rect(left, 0, width, rect.height)
+        canvas.rounded(area, 8.0 * pen.unit, theme.PANEL, theme.PANEL_OPACITY)
+        held = slot.label is not None
+        edge, opacity = (theme.ACCENT, 0.9) if held else (theme.EDGE, theme.EDGE_OPACITY)
+        canvas.rounded(area, 8.0 * pen.unit, edge, opacity, line=max(1.0, pen.unit * (1.5 if held else 1.0)))
+        side = rect.height - 2 * px(5)
+        if held:
+            pen.tile(canvas, slot.picture, left + px(5), px(5), side)
+        else:
+            canvas.rounded(
+                Rect(left + px(5), px(5), side, side), 4.0 * pen.unit, theme.EDGE, 0.3, max(1.0, pen.unit)
+            )
+        x = left + px(5) + side + px(GAP)
+        room = left + width - px(PADDING) - x
+        canvas.text(x, px(17), canvas.fit(hand, theme.DETAIL, room), theme.DETAIL, theme.QUIET)
+        name, face = (slot.label, theme.LABEL) if slot.label is not None else ("empty", theme.DETAIL)
+        canvas.text(x, px(32), canvas.fit(name, face, room), face, theme.TEXT if held else theme.QUIET)
+    return canvas.patch()
+
+
+def draw_message(pen: Pen, rect: Rect, message: Message, lines: tuple[str, ...]) -> Patch:
+    """The message bar at full opacity: a symbol in the colour of its tone, and the text."""
+    canvas = pen.panel(rect)
+    px = canvas.px
+    tone = theme.TONES[message.kind]
+    cx, cy, r = px(PADDING) + px(10), rect.height / 2.0, 9.0 * pen.unit
+    canvas.circle(cx, cy, r, tone)
+    stroke = max(1.0, 1.8 * pen.unit)
+    u = pen.unit
+    if message.kind is MessageKind.SUCCESS:
+        canvas.shape(
+            [(cx - 4 * u, cy), (cx - u, cy + 3.5 * u), (cx + 4.5 * u, cy - 3.5 * u)], theme.TEXT, stroke
+        )
+    elif message.kind is MessageKind.REFUSAL:
+        canvas.shape([(cx, cy - 5 * u), (cx, cy + 1 * u)], theme.TEXT, stroke * 1.2)
+        canvas.circle(cx, cy + 4.5 * u, 1.4 * u, theme.TEXT)
+    else:
+        canvas.shape([(cx, cy - 1 * u), (cx, cy + 5 * u)], theme.PANEL, stroke * 1.2)
+        canvas.circle(cx, cy - 4.5 * u, 1.4 * u, theme.PANEL)
+    for i, line in enumerate(lines):
+        canvas.text(px(PADDING + 26), px(19) + i * px(LINE + 3), line, theme.BAR, theme.TEXT)
+    return canvas.patch()
+
+
+def draw_progress(pen: Pen, rect: Rect, delivered: int, total: int) -> Patch:
+    """How many objects are where they belong, as a number and as a bar."""
+    canvas = pen.panel(rect)
+    px = canvas.px
+    text = canvas.fit(f"{delivered} / {total}", theme.CHIP, rect.width - px(8))
+    canvas.text((rect.width - canvas.text_width(text, theme.CHIP)) // 2, px(17), text, theme.CHIP, theme.TEXT)
+    track = Rect(px(10), rect.height - px(7), rect.width - 2 * px(10), max(2, px(3)))
+    canvas.rounded(track, track.height / 2, theme.EDGE, 0.25)
+    done = round(track.width * min(delivered, total) / max(total, 1))
+    if done > 0:
+        bar = Rect(track.x, track.y, max(done, track.height), track.height)
+        canvas.rounded(bar, track.height / 2, theme.TONES[MessageKind.INFO], 1.0)
+    return canvas.patch()
+
+
+def clock_text(seconds: float) -> str:
+    """Elapsed time as m:ss, or h:mm:ss from one hour on."""
+    whole = max(0, math.floor(seconds))
+    hours, minutes = divmod(whole // 60, 60)
+    return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
+
+
+def draw_clock(pen: Pen, rect: Rect, text: str) -> Patch:
+    """Elapsed time beside a small dial."""
+    canvas = pen.panel(rect)
+    px, u = canvas.px, pen.unit
+    width = canvas.text_width(text, theme.CHIP)
+    x = (rect.width - width - px(18)) // 2
+    cx, cy = x + 6.5 * u, rect.height / 2.0
+    canvas.circle(cx, cy, 6.5 * u, theme.QUIET)
+    canvas.circle(cx, cy, 5.2 * u, theme.PANEL)
+    canvas.shape([(cx, cy - 3.6 * u), (cx, cy), (cx + 2.8 * u, cy)], theme.QUIET, max(1.0, 1.2 * u))
+    canvas.text(x + px(18), px(19), text, theme.CHIP, theme.TEXT)
+    return canvas.patch()
+
+
+def draw_pointer(pen: Pen, rect: Rect, angle: float) -> Patch:
+    """A disc with an arrow in direction `angle`, rad, counter-clockwise from the right."""
+    canvas = Canvas(rect.width, rect.height, pen.face, pen.unit)
+    centre, u = rect.width / 2.0, pen.unit
+    canvas.circle(centre, centre, 16.5 * u, theme.TEXT, 0.9)
+    canvas.circle(centre, centre, 15.0 * u, theme.PANEL, 0.9)
+    c, s = math.cos(angle), -math.sin(angle)
+    outline = ((11.0, 0.0), (-5.0, -8.0), (-2.0, 0.0), (-5.0, 8.0))
+    canvas.shape(
+        [(centre + u * (a * c - b * s), centre + u * (a * s + b * c)) for a, b in outline], theme.ACCENT
+    )
+    return canvas.patch()

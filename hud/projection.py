@@ -1,0 +1,105 @@
+"""Pinhole projection of the eye camera, and where to point when something is out of view."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hud.errors import FrameError
+from hud.state import Pointer, Vec3
+
+NEAR = 1e-6  # m; nearer than this along the view direction counts as behind the eye
+
+
+@dataclass(frozen=True, eq=False)
+class CameraView:
+    """A pinhole camera with square pixels and its principal point at the centre of the image.
+
+    Attributes:
+        position: Eye, m, shape (3,).
+        rotation: Columns right, up and backward (the camera looks along minus the third), shape (3, 3).
+        fovy: Vertical field of view, rad.
+        width: Image width, px.
+        height: Image height, px.
+
+    Raises:
+        FrameError: A shape or a number is unusable.
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    fovy: float
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        if np.shape(self.position) != (3,) or np.shape(self.rotation) != (3, 3):
+            raise FrameError(
+                f"camera needs position (3,) and rotation (3, 3), got {np.shape(self.position)} and "
+                f"{np.shape(self.rotation)}"
+            )
+        if not np.allclose(np.transpose(self.rotation) @ self.rotation, np.eye(3), atol=1e-6):
+            raise FrameError(f"camera rotation must be orthonormal, got {np.asarray(self.rotation).tolist()}")
+        if not 0.0 < self.fovy < math.pi or self.width < 1 or self.height < 1:
+            raise FrameError(
+                f"camera needs 0 < fovy < pi and a positive image size, got fovy {self.fovy}, "
+                f"{self.width} x {self.height}"
+            )
+
+    @property
+    def focal(self) -> float:
+        """Focal length, px."""
+        return self.height / 2.0 / math.tan(self.fovy / 2.0)
+
+    def to_eye(self, points: ArrayLike) -> NDArray[np.float64]:
+        """House frame to eye frame (right, up, forward), m; shape (..., 3) to (..., 3)."""
+        local = (np.asarray(points, dtype=np.float64) - self.position) @ self.rotation
+        return np.asarray(local * np.array([1.0, 1.0, -1.0]), dtype=np.float64)
+
+
+def project(camera: CameraView, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Pixels at which points appear.
+
+    Args:
+        camera: The camera.
+        points: House frame, m, shape (n, 3).
+
+    Returns:
+        Pixels (x right, y down; the image spans 0..width and 0..height), shape (n, 2), NaN behind the eye,
+        and depths along the view direction, m, shape (n,).
+    """
+    local = camera.to_eye(np.reshape(np.asarray(points, dtype=np.float64), (-1, 3)))
+    depth = local[:, 2]
+    ahead = depth > NEAR
+    scale = camera.focal / np.where(ahead, depth, 1.0)
+    pixels = np.stack(
+        [camera.width / 2.0 + local[:, 0] * scale, camera.height / 2.0 - local[:, 1] * scale], axis=1
+    )
+    pixels[~ahead] = np.nan
+    return pixels, depth
+
+
+def in_view(camera: CameraView, point: Vec3, margin: float = 0.0) -> bool:
+    """Whether a point appears inside the image, at least `margin` of the image's height from its edge."""
+    pixels, _ = project(camera, [point])
+    x, y = pixels[0]
+    inset = margin * camera.height
+    return bool(
+        inset <= x <= camera.width - inset and inset <= y <= camera.height - inset
+    )  # NaN compares false
+
+
+def pointer_to(camera: CameraView, target: Vec3, margin: float = 0.02) -> Pointer | None:
+    """Where on the edge of the view to point so that turning that way brings `target` into view.
+
+    Returns:
+        None when the target is in view already.
+    """
+    if in_view(camera, target, margin):
+        return None
+    right, up, forward = (float(v) for v in camera.to_eye(target))
+    if forward <= 0.0:
+        # Behind: people turn about the vertical, so say left or right and nothing of up or down.
+        return Pointer(angle=0.0 if right >= 0.0 else math.pi)
+    return Pointer(angle=math.atan2(up, right))

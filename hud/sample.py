@@ -1,0 +1,158 @@
+"""A made-up tidying task with drawn pictures, to look at the HUD without a simulator."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hud.projection import CameraView
+from hud.state import Message
+from hud.task import PlannedStep, Status, TaskObject, TaskReceptacle, TaskView
+
+EYE = (0.0, 0.0, 1.6)
+ROOMS = ("Kitchen", "Living room", "Bedroom", "Office", "Hallway")
+
+_BINS = (
+    ("dish_bin", "Dish bin", "on the counter, beside the sink", "Kitchen", (86, 180, 233)),
+    ("toy_box", "Toy box", "beside the sofa", "Living room", (230, 159, 0)),
+    ("bookshelf", "Bookshelf", "opposite the window", "Living room", (150, 90, 50)),
+    ("hamper", "Laundry hamper", "at the foot of the bed", "Bedroom", (204, 121, 167)),
+    ("office_box", "Office-supply box", "on the desk", "Office", (0, 114, 178)),
+    ("recycling_bin", "Recycling bin", "beside the front door", "Hallway", (0, 158, 115)),
+)
+_LABELS = (
+    ("Blue mug", "Soup bowl", "Dinner plate", "Drinking glass"),
+    ("Toy car", "Teddy bear", "Building blocks", "Rubber duck"),
+    ("Novel", "Travel magazine", "Dictionary", "Comic book"),
+    ("T-shirt", "Bath towel", "Pair of socks", "Jeans"),
+    ("Stapler", "Tape dispenser", "Calculator", "Pencil case"),
+    ("Cardboard box", "Plastic bottle", "Drink can", "Newspaper"),
+)
+
+
+def receptacles() -> tuple[TaskReceptacle, ...]:
+    """Six bins, one per category."""
+    return tuple(
+        TaskReceptacle(key, label, place, room, f"receptacle:{key}", (1.5 * i - 3.0, 6.0, 0.4))
+        for i, (key, label, place, room, _) in enumerate(_BINS)
+    )
+
+
+def objects(count: int) -> tuple[TaskObject, ...]:
+    """The first `count` of 24 objects, all lying about, in equal numbers per category.
+
+    Args:
+        count: 0 to 24.
+    """
+    labels = [(kind, _LABELS[kind][i]) for i in range(4) for kind in range(6)]
+    return tuple(
+        TaskObject(
+            name=f"object_{i:02d}",
+            label=label,
+            picture=f"object:{label}",
+            category=_BINS[kind][0],
+            room=ROOMS[(3 * i + 1) % len(ROOMS)],
+            position=(float((i * 5) % 7) - 3.0, 2.0 + float((i * 3) % 5), 0.02),
+            status="loose",
+            receptacle=_BINS[kind][0],
+        )
+        for i, (kind, label) in enumerate(labels[:count])
+    )
+
+
+def task(
+    count: int, *, steps: int = 0, message: Message | None = None, clock: float | None = 83.0
+) -> TaskView:
+    """A task of `count` objects, `steps` visits into a plan that fetches two objects at a time.
+
+    Args:
+        count: Objects, 0 to 24.
+        steps: Visits made already, 0 to 2 x count.
+        message: For the message bar.
+        clock: Elapsed time, s.
+    """
+    things = objects(count)
+    plan: list[PlannedStep] = []
+    for i in range(0, count, 2):
+        pair = [o.name for o in things[i : i + 2]]
+        plan += [PlannedStep("pick", n) for n in pair] + [PlannedStep("place", n) for n in pair]
+    done, left = plan[:steps], tuple(plan[steps:])
+    things = tuple(_with_status(o, done) for o in things)
+    carried = [o.name for o in things if o.status == "carried"]
+    goal = None
+    if left:
+        ahead = next(o for o in things if o.name == left[0].object)
+        bins = {r.key: r for r in receptacles()}
+        goal = ahead.position if left[0].kind == "pick" else bins[ahead.receptacle].position
+    return TaskView(
+        objects=things,
+        receptacles=receptacles(),
+        order=tuple(o.name for o in sorted(things, key=lambda o: (int(o.name[-2:]) * 7) % 25)),
+        hands=(carried[0] if carried else None, carried[1] if len(carried) > 1 else None),
+        steps_done=tuple(done),
+        plan=left,
+        path=None if goal is None else np.array([[0.0, 0.0], [0.3, 1.4], [goal[0], goal[1]]]),
+        goal=goal,
+        eye=EYE,
+        message=message,
+        clock=clock,
+    )
+
+
+def camera(width: int, height: int, *, yaw: float = 0.0, pitch: float = -0.35) -> CameraView:
+    """An eye at the origin that looks along +y, turned by `yaw` to the left and `pitch` upwards, rad."""
+    cy, sy, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
+    right = np.array([cy, sy, 0.0])
+    forward = np.array([-sy * cp, cy * cp, sp])
+    rotation = np.stack([right, np.cross(right, forward), -forward], axis=1)
+    return CameraView(np.array(EYE), rotation, 1.2, width, height)
+
+
+def pictures(size: int = 96) -> dict[str, NDArray[np.uint8]]:
+    """A simple picture per object and per bin: RGBA, uint8, shape (size, size, 4)."""
+    drawn: dict[str, NDArray[np.uint8]] = {}
+    for kind, (key, _, _, _, colour) in enumerate(_BINS):
+        drawn[f"receptacle:{key}"] = _box(colour, size)
+        for i, label in enumerate(_LABELS[kind]):
+            drawn[f"object:{label}"] = _token(colour, 3 + i, size)
+    return drawn
+
+
+def backdrop(width: int, height: int) -> NDArray[np.uint8]:
+    """A plain room: wall, floor and a dark doorway, uint8, shape (height, width, 3)."""
+    rows = np.linspace(0.0, 1.0, height)[:, None, None]
+    wall = np.array([226.0, 219.0, 206.0]) - 40.0 * rows
+    floor = np.array([188.0, 148.0, 108.0]) - 60.0 * (rows - 0.45)
+    image = np.where(rows < 0.45, wall, floor) * np.ones((1, width, 1))
+    door = np.s_[int(0.1 * height) : int(0.5 * height), int(0.46 * width) : int(0.6 * width)]
+    image[door] *= 0.35
+    return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
+
+
+def _with_status(thing: TaskObject, done: list[PlannedStep]) -> TaskObject:
+    status: Status = "loose"
+    if PlannedStep("place", thing.name) in done:
+        status = "delivered"
+    elif PlannedStep("pick", thing.name) in done:
+        status = "carried"
+    return TaskObject(**{**vars(thing), "status": status})
+
+
+def _box(colour: tuple[int, int, int], size: int) -> NDArray[np.uint8]:
+    """An open crate."""
+    image = np.zeros((size, size, 4), dtype=np.uint8)
+    points = np.array([[0.12, 0.35], [0.88, 0.35], [0.78, 0.88], [0.22, 0.88]]) * size
+    dark = (int(0.6 * colour[0]), int(0.6 * colour[1]), int(0.6 * colour[2]), 255)
+    cv2.fillPoly(image, [np.rint(points).astype(np.int32)], (*colour, 255), cv2.LINE_AA)
+    cv2.ellipse(
+        image, (size // 2, int(0.35 * size)), (int(0.38 * size), int(0.1 * size)), 0, 0, 360, dark, -1
+    )
+    return image
+
+
+def _token(colour: tuple[int, int, int], corners: int, size: int) -> NDArray[np.uint8]:
+    """A regular polygon."""
+    image = np.zeros((size, size, 4), dtype=np.uint8)
+    angles = np.arange(corners) * 2.0 * np.pi / corners - np.pi / 2.0
+    points = size * (0.5 + 0.4 * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    cv2.fillPoly(image, [np.rint(points).astype(np.int32)], (*colour, 255), cv2.LINE_AA)
+    return image
