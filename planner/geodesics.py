@@ -1,7 +1,7 @@
 """Exact any-angle shortest paths on a navmesh.
 
-The path is the shortest among the inflated obstacle polygons (to the 0.1 mm of `navmesh.TOLERANCE`), not among grid
-cells: a grid overestimates distances by several percent.
+The path is the shortest among the inflated obstacle polygons, to the 0.1 mm of `navmesh.TOLERANCE`, not among
+grid cells: a grid overestimates distances by several percent.
 """
 
 from collections.abc import Sequence
@@ -106,8 +106,20 @@ class Geodesics:
             UnreachableError: Two points lie on different islands.
         """
         targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-        query = self._query(np.vstack([np.asarray(point, dtype=np.float64).reshape(1, 2), targets]))
-        return self._between(query, query, 1)[0, 1:]
+        row: NDArray[np.float64] = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)[
+            0
+        ]
+        return row
+
+    def distances_between(self, sources: ArrayLike, targets: ArrayLike) -> NDArray[np.float64]:
+        """Geodesic distances from points (s, 2) to points (t, 2), m; (s, t), m.
+
+        Raises:
+            NotNavigableError: No navigable point lies within `max_snap` of a point.
+            UnreachableError: Two points lie on different islands.
+        """
+        source = self._query(sources)
+        return self._between(source, self._query(targets), len(source.points))
 
     def reachable(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of the points (m, 2), m, can be reached from a point (2,), m; (m,) bool."""

@@ -1,0 +1,39 @@
+"""The nearest possible visit first: a baseline, and the answer when there is no time to think."""
+
+import time
+from dataclasses import dataclass
+
+from planner.plan import Plan, Visit
+from planner.problem import RoutingProblem
+from planner.solver import SolveLimit
+from planner.tour import integer_metric, make_plan, possible_next, spanning_bound
+
+
+@dataclass(frozen=True)
+class GreedySolver:
+    """Walks to the nearest feasible pickup or drop-off, the first of equals."""
+
+    name: str = "greedy"
+
+    def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
+        """Plan by nearest visit first; seed and limit do not matter.
+
+        Args:
+            problem: What is left to do.
+            seed: Unused: nothing is random.
+            limit: Unused: it takes milliseconds.
+        """
+        del seed, limit
+        started = time.perf_counter()
+        bound = spanning_bound(problem, integer_metric(problem.distances))
+        return make_plan(problem, nearest_first(problem), bound, False, started)
+
+
+def nearest_first(problem: RoutingProblem) -> list[Visit]:
+    """A feasible tour that always goes to the nearest possible visit."""
+    visits: list[Visit] = []
+    here = problem.start
+    while options := list(possible_next(problem, visits)):
+        visits.append(min(options, key=lambda visit: problem.distances[here, visit.location]))
+        here = visits[-1].location
+    return visits

@@ -1,0 +1,138 @@
+"""The paper's planner: OR-Tools routing for equation 1 (PAPER section 2)."""
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from ortools.constraint_solver import pywrapcp, routing_enums_pb2
+
+from planner.greedy_solver import nearest_first
+from planner.plan import Plan, Visit
+from planner.problem import RoutingProblem
+from planner.solver import SolveLimit
+from planner.tour import (
+    integer_metric,
+    make_plan,
+    pick,
+    place,
+    place_onboard,
+    possible_next,
+    spanning_bound,
+    tour_length,
+)
+
+DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
+LONGEST_SECONDS = 60.0  # ends a search that is limited by work but finds no more solutions
+
+
+@dataclass(frozen=True)
+class OrToolsSolver:
+    """Parallel cheapest insertion, then guided local search.
+
+    A limit on work counts solutions that the local search accepts.
+    """
+
+    name: str = "ortools"
+
+    def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
+        """Plan the rest of a task.
+
+        Args:
+            problem: What is left to do.
+            seed: Unused: the search is deterministic.
+            limit: Solutions or seconds, whichever comes first; by default 200 solutions.
+
+        Returns:
+            FEASIBLE with a spanning-tree bound, or OPTIMAL where every tour was tried (up to two objects).
+        """
+        del seed
+        started = time.perf_counter()
+        metric = integer_metric(problem.distances)
+        if len(problem.shipments) + len(problem.onboard) <= 2:
+            visits = best_of_all(problem, metric)
+            bound = _length(metric, problem.start, visits)
+            return make_plan(problem, visits, bound, True, started)
+        bound = spanning_bound(problem, metric)
+        visits = _search(problem, metric, limit or SolveLimit(work=DEFAULT_SOLUTIONS))
+        return make_plan(problem, visits, bound, False, started)
+
+
+def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> list[Visit]:
+    """The best of all tours, by trying them; for very few objects."""
+    best: list[Visit] = []
+    best_length = math.inf
+
+    def extend(visits: list[Visit]) -> None:
+        nonlocal best, best_length
+        options = list(possible_next(problem, visits))
+        if not options:
+            length = _length(metric, problem.start, visits)
+            if length < best_length:
+                best, best_length = visits, length
+        for option in options:
+            extend([*visits, option])
+
+    extend([])
+    return best
+
+
+def _length(metric: NDArray[np.int64], start: int, visits: list[Visit]) -> int:
+    return round(tour_length(metric.astype(np.float64), start, visits))
+
+
+def _search(problem: RoutingProblem, metric: NDArray[np.int64], limit: SolveLimit) -> list[Visit]:
+    visit_of = _nodes(problem)
+    count = len(visit_of) + 1  # node 0 is both start and end: leading back costs nothing, so the tour is open
+    manager = pywrapcp.RoutingIndexManager(count, 1, 0)
+    routing = pywrapcp.RoutingModel(manager)
+    location = [problem.start, *(v.location for v in visit_of)]
+    # 1 on every leg changes no comparison, and lets guided local search penalise legs of length 0.
+    costs = metric[np.ix_(location, location)] + 1
+    costs[:, 0] = 0
+    routing.SetArcCostEvaluatorOfAllVehicles(routing.RegisterTransitMatrix(costs.tolist()))
+    _constrain(problem, manager, routing)
+    solution = routing.SolveWithParameters(_parameters(limit))
+    if solution is None:  # out of time before the first solution
+        return nearest_first(problem)
+    visits = []
+    index = solution.Value(routing.NextVar(routing.Start(0)))
+    while not routing.IsEnd(index):
+        visits.append(visit_of[manager.IndexToNode(index) - 1])
+        index = solution.Value(routing.NextVar(index))
+    return visits
+
+
+def _nodes(problem: RoutingProblem) -> list[Visit]:
+    """Visits of nodes 1, 2, ...: pickup and drop-off of each shipment in turn, then onboard objects."""
+    nodes = [v for k in range(len(problem.shipments)) for v in (pick(problem, k), place(problem, k))]
+    return nodes + [place_onboard(problem, k) for k in range(len(problem.onboard))]
+
+
+def _constrain(
+    problem: RoutingProblem, manager: pywrapcp.RoutingIndexManager, routing: pywrapcp.RoutingModel
+) -> None:
+    shipments, carried = len(problem.shipments), len(problem.onboard)
+    loads = [0, *(1, -1) * shipments, *(-1,) * carried]
+    load = routing.RegisterUnaryTransitVector(loads)
+    routing.AddDimension(load, 0, problem.capacity, False, "load")
+    routing.GetDimensionOrDie("load").CumulVar(routing.Start(0)).SetValue(carried)
+    step = routing.RegisterUnaryTransitVector([1] * len(loads))
+    routing.AddDimension(step, 0, len(loads), True, "step")
+    steps = routing.GetDimensionOrDie("step")
+    for k in range(shipments):
+        pickup, delivery = manager.NodeToIndex(1 + 2 * k), manager.NodeToIndex(2 + 2 * k)
+        routing.AddPickupAndDelivery(pickup, delivery)
+        routing.solver().Add(steps.CumulVar(pickup) <= steps.CumulVar(delivery))
+
+
+def _parameters(limit: SolveLimit) -> object:
+    parameters = pywrapcp.DefaultRoutingSearchParameters()
+    parameters.first_solution_strategy = routing_enums_pb2.FirstSolutionStrategy.PARALLEL_CHEAPEST_INSERTION
+    parameters.local_search_metaheuristic = routing_enums_pb2.LocalSearchMetaheuristic.GUIDED_LOCAL_SEARCH
+    if limit.work is not None:
+        parameters.solution_limit = limit.work
+    seconds = limit.seconds if limit.seconds is not None else LONGEST_SECONDS
+    parameters.time_limit.FromMilliseconds(max(1, round(seconds * 1000)))
+    return parameters

@@ -1,0 +1,56 @@
+"""What every planner of the tour looks like from outside, and finding one by name."""
+
+import importlib
+from dataclasses import dataclass
+from typing import Protocol, cast
+
+from planner.errors import PlannerError
+from planner.plan import Plan
+from planner.problem import RoutingProblem
+
+# Name -> module and class. A new planner is its own module and a line here.
+SOLVERS = {
+    "ortools": ("planner.ortools_solver", "OrToolsSolver"),
+    "greedy": ("planner.greedy_solver", "GreedySolver"),
+}
+
+
+@dataclass(frozen=True)
+class SolveLimit:
+    """When to stop looking for something better.
+
+    Attributes:
+        work: Amount of work in the solver's own unit: results repeat bit for bit on every machine.
+        seconds: Wall time, for live use; results then depend on the machine.
+    """
+
+    work: int | None = None
+    seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("work", self.work), ("seconds", self.seconds)):
+            if value is not None and not value > 0:
+                raise PlannerError(f"SolveLimit.{name} must be positive or None, got {value}")
+
+
+class Solver(Protocol):
+    """Finds a tour for a routing problem."""
+
+    @property
+    def name(self) -> str:
+        """Name in run records."""
+
+    def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
+        """Find a plan; the same arguments with a limit on work (or none) give the same visits."""
+
+
+def solver(name: str) -> Solver:
+    """The planner of this name.
+
+    Raises:
+        PlannerError: No planner has this name.
+    """
+    if name not in SOLVERS:
+        raise PlannerError(f"unknown solver {name!r}; choose one of {sorted(SOLVERS)}")
+    module, attribute = SOLVERS[name]
+    return cast(Solver, getattr(importlib.import_module(module), attribute)())

@@ -1,0 +1,101 @@
+"""What solvers share: integer metrics, visits that are possible next, plans made of an order of visits."""
+
+import time
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import minimum_spanning_tree
+
+from planner.plan import Plan, Status, Visit, VisitKind
+from planner.problem import RoutingProblem
+
+UNIT = 1e-4  # m per integer unit of distance: 0.1 mm
+
+
+def integer_metric(distances: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Distances in units of 0.1 mm, closed to a metric, (k, k).
+
+    Rounding can break the triangle inequality by a unit, and solvers rely on it: closing restores it.
+    """
+    rounded = np.rint(distances / UNIT)
+    rounded = np.minimum(rounded, rounded.T)
+    for k in range(len(rounded)):  # Floyd-Warshall; scipy's reads a distance of 0 as "no edge"
+        np.minimum(rounded, rounded[:, k, None] + rounded[None, k, :], out=rounded)
+    return rounded.astype(np.int64)
+
+
+def pick(problem: RoutingProblem, shipment: int) -> Visit:
+    """The visit that picks a shipment."""
+    return Visit(problem.shipments[shipment].pickup, VisitKind.PICK, shipment=shipment)
+
+
+def place(problem: RoutingProblem, shipment: int) -> Visit:
+    """The visit that places a shipment."""
+    return Visit(problem.shipments[shipment].delivery, VisitKind.PLACE, shipment=shipment)
+
+
+def place_onboard(problem: RoutingProblem, onboard: int) -> Visit:
+    """The visit that places an object carried from the beginning."""
+    return Visit(problem.onboard[onboard], VisitKind.PLACE, onboard=onboard)
+
+
+def possible_next(problem: RoutingProblem, visits: Sequence[Visit]) -> Iterator[Visit]:
+    """Visits that capacity and precedence allow after the given ones."""
+    done = set(visits)
+    load = len(problem.onboard)
+    for visit in visits:
+        load += 1 if visit.kind is VisitKind.PICK else -1
+    for k in range(len(problem.onboard)):
+        if place_onboard(problem, k) not in done:
+            yield place_onboard(problem, k)
+    for k in range(len(problem.shipments)):
+        if pick(problem, k) not in done:
+            if load < problem.capacity:
+                yield pick(problem, k)
+        elif place(problem, k) not in done:
+            yield place(problem, k)
+
+
+def tour_length(distances: NDArray[np.float64], start: int, visits: Sequence[Visit]) -> float:
+    """Length of an open tour, m."""
+    order = [start, *(v.location for v in visits)]
+    return float(distances[order[:-1], order[1:]].sum())
+
+
+def spanning_bound(problem: RoutingProblem, metric: NDArray[np.int64]) -> int:
+    """A tour connects all its locations, so it is no shorter than their minimum spanning tree; in units."""
+    used = sorted(
+        {problem.start, *problem.onboard}
+        | {s.pickup for s in problem.shipments}
+        | {s.delivery for s in problem.shipments}
+    )
+    if len(used) == 1:
+        return 0
+    # A stored 0 would mean "no edge". Every tree has one edge less than nodes: undo the 1 added to each.
+    tree = minimum_spanning_tree(metric[np.ix_(used, used)] + 1)
+    return int(tree.sum()) - (len(used) - 1)
+
+
+def make_plan(
+    problem: RoutingProblem, visits: Sequence[Visit], bound: int, proven: bool, started: float
+) -> Plan:
+    """A plan with an honest lower bound.
+
+    Args:
+        problem: What was solved.
+        visits: The tour.
+        bound: Lower bound in the integer metric, units of 0.1 mm.
+        proven: Whether the tour is optimal in the integer metric.
+        started: `time.perf_counter()` when solving began.
+
+    Returns:
+        OPTIMAL if proven, and if the tour is as long in the given distances as in the integer metric (to
+        rounding: 0.1 mm a leg). That fails only for distances that were no metric.
+    """
+    cost = tour_length(problem.distances, problem.start, visits)
+    rounding = 2 * UNIT * len(visits)
+    optimal = proven and cost <= bound * UNIT + rounding
+    lower = cost if optimal else max(0.0, min(cost, bound * UNIT - rounding))
+    status = Status.OPTIMAL if optimal else Status.FEASIBLE
+    return Plan(tuple(visits), cost, lower, status, time.perf_counter() - started)
