@@ -31,26 +31,29 @@ class RoomMap:
     axes: NDArray[np.float64]
 
     @classmethod
-    def from_model(cls, model: mujoco.MjModel, labels: Mapping[str, str]) -> "RoomMap":
+    def from_model(cls, model: mujoco.MjModel, labels: Mapping[str, str] | None = None) -> "RoomMap":
         """Read the box sites `room:<key>` and `room:<key>:<n>` of a compiled house.
 
         Args:
             model: Any model that contains the house.
-            labels: Room key -> label, from the catalogue.
+            labels: Room key -> label, from the catalogue; None takes the keys for labels.
 
         Raises:
             AssetError: A room without a site, a site without a room, or a site that is not an upright box.
         """
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        keys: list[str] = []
-        sites: list[int] = []
-        for site in range(model.nsite):
-            name = model.site(site).name
-            if name.startswith(PREFIX):
-                keys.append(_room_of(name, labels))
-                sites.append(site)
-                _check_box(model, data, site, name)
+        names = {site: model.site(site).name for site in range(model.nsite)}
+        sites = [site for site, name in names.items() if name.startswith(PREFIX)]
+        keys = [names[site].removeprefix(PREFIX).split(":")[0] for site in sites]
+        if not sites:
+            raise AssetError(f"the house has no site '{PREFIX}<key>'; mark its rooms with box sites")
+        if labels is None:
+            labels = {key: key for key in keys}
+        for site, key in zip(sites, keys, strict=True):
+            if key not in labels:
+                raise AssetError(f"site {names[site]!r} names a room that is not in {sorted(labels)}")
+            _check_box(model, data, site, names[site])
         missing = sorted(set(labels) - set(keys))
         if missing:
             raise AssetError(f"rooms {missing} of the catalogue have no site '{PREFIX}<key>' in the house")
@@ -94,13 +97,6 @@ class RoomMap:
         reach = np.einsum("kij,kj->ki", np.abs(self.axes), self.half_sizes)
         low, high = (self.centers - reach).min(axis=0), (self.centers + reach).max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
-
-
-def _room_of(name: str, labels: Mapping[str, str]) -> str:
-    key = name.removeprefix(PREFIX).split(":")[0]
-    if key not in labels:
-        raise AssetError(f"site {name!r} names room {key!r}, which the catalogue lacks: {sorted(labels)}")
-    return key
 
 
 def _check_box(model: mujoco.MjModel, data: mujoco.MjData, site: int, name: str) -> None:

@@ -125,6 +125,15 @@ def compose_house(catalogue: Catalogue) -> mujoco.MjSpec:
     return spec
 
 
+def compile_house(catalogue: Catalogue) -> mujoco.MjModel:
+    """Compile the tidy, empty house: receptacles, but neither objects nor a person.
+
+    Raises:
+        AssetError: A model is malformed, a mount is missing, or it does not compile.
+    """
+    return compile_spec(compose_house(catalogue), f"house {catalogue.name!r}")
+
+
 def compose(episode: Episode, catalogue: Catalogue, *, avatar: bool = True) -> Scene:
     """Compose and compile an episode: house, receptacles, objects in their poses, person at the start.
 
