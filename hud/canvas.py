@@ -126,6 +126,10 @@ class Canvas:
         """`text`, cut to one line of `width` px."""
         return self._face.fit(text, max(1, self.px(face.size)), face.weight, width)
 
+    def wrap(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
+        """`text`, broken into at most `lines` lines of `width` px."""
+        return self._face.wrap(text, max(1, self.px(face.size)), face.weight, width, lines)
+
     def picture(self, picture: NDArray[np.uint8], x: int, y: int, size: int, opacity: float = 1.0) -> None:
         """An RGBA picture (s, s, 4), scaled to `size` px."""
         straight = picture.astype(np.float32) / np.float32(255.0)

@@ -105,14 +105,14 @@ def compose(frame: NDArray[np.uint8], state: HudState, pictures: Pictures) -> ND
 def _part(name: str, rect: Rect, state: HudState, layout: Layout) -> tuple[object, Callable[[Pen], Patch]]:
     """What the panel `name` depends on, and how to draw it."""
     if name == "checklist":
-        rows = state.checklist[layout.first : layout.stop]
-        after = len(state.checklist) - layout.stop
+        items = state.checklist[layout.first : layout.stop]
+        hidden = (layout.first, len(state.checklist) - layout.stop)
         done = f"{sum(r.done for r in state.checklist)} / {len(state.checklist)}"
-        args = (state.checklist_title, rows, layout.first, after, done)
+        args = (state.checklist_title, items, layout.rows, hidden, done)
         return args, lambda pen: panels.draw_checklist(pen, rect, *args)
     if name == "bins":
-        shown, hidden = state.bins[: len(layout.bin_rows)], len(state.bins) - len(layout.bin_rows)
-        return (shown, hidden), lambda pen: panels.draw_bins(pen, rect, shown, layout.bin_rows, hidden)
+        shown, more = state.bins[: len(layout.bin_rows)], len(state.bins) - len(layout.bin_rows)
+        return (shown, more), lambda pen: panels.draw_bins(pen, rect, shown, layout.bin_rows, more)
     if name == "inventory":
         return state.inventory, lambda pen: panels.draw_inventory(pen, rect, state.inventory)
     if name == "message" and (message := state.message) is not None:

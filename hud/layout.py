@@ -7,12 +7,13 @@ task list                            bins
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hud import theme
 from hud.canvas import Rect
 from hud.errors import FrameError
-from hud.state import HudState, Message
+from hud.state import ChecklistItem, HudState, Message
 from hud.text import Typeface
 from hud.theme import Face
 
@@ -20,16 +21,18 @@ MARGIN = 8
 GAP = 6
 CHIP_HEIGHT = 28
 CHIP_WIDTH = 76
-LIST_SHARE = 0.295  # of the frame's width
+LIST_SHARE = 0.3  # of the frame's width
 LIST_WIDTH_LIMIT = 230
 BINS_WIDTH = 162
 BINS_WIDTH_WIDE = 196  # on frames that are wider than 4 : 3
-LIST_BOTTOM = 68  # kept free below the lists, so that the person sees what lies at the feet
-ROW = 30
+LIST_BOTTOM = 40  # kept free below the lists
+ROW = 32
 HEADER = 24
 FOOTER = 17
 PADDING = 6
 TILE = 24
+TARGET = 20
+CONTEXT = 2  # rows above the current one that stay in sight
 NUMBER = 17
 LINE = 14
 SLOT_WIDTH = 118
@@ -38,6 +41,15 @@ MESSAGE_LINES = 3
 MESSAGE_ICON = 26
 POINTER = 36
 SMALLEST = (320, 240)
+
+
+@dataclass(frozen=True)
+class ListRow:
+    """A row of the task list: its height, px, the px that its text may take, and its wrapped detail."""
+
+    height: int
+    text_width: int
+    detail: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -57,6 +69,7 @@ class Layout:
         checklist: Task list, or None when it is empty.
         first: Index of the first row shown.
         stop: One past the last row shown.
+        rows: Those rows.
         message_lines: The message, broken into lines.
         bin_rows: One per bin that is shown.
         free: The part of the view between the panels.
@@ -75,6 +88,7 @@ class Layout:
     free: Rect
     first: int
     stop: int
+    rows: tuple[ListRow, ...]
     message_lines: tuple[str, ...]
     bin_rows: tuple[BinRow, ...]
 
@@ -97,21 +111,28 @@ def unit_of(width: int, height: int) -> float:
     return min(width / 640.0, height / 480.0)
 
 
-def window(count: int, current: int, room: int) -> tuple[int, int]:
-    """Which rows of a list to show: `room` of them, with the current one in the upper third.
+def window(heights: Sequence[int], current: int, room: int) -> tuple[int, int]:
+    """Which rows of a list to show: the current one, up to two before it, and as many after it as fit.
 
     Args:
-        count: Rows in all.
-        current: Index of the current row.
-        room: How many fit, at least 1.
+        heights: Height of each row, px.
+        current: Index of the current row; it is shown even when it is higher than `room`.
+        room: Height that there is, px.
 
     Returns:
-        First row, and one past the last.
+        First row, and one past the last; neither neighbour would still fit.
     """
-    if count <= room:
-        return 0, count
-    first = min(max(current - room // 3, 0), count - room)
-    return first, first + room
+    first, stop, used = current, current + 1, heights[current]
+    while first > max(0, current - CONTEXT) and used + heights[first - 1] <= room // 2:
+        first -= 1
+        used += heights[first]
+    while stop < len(heights) and used + heights[stop] <= room:
+        used += heights[stop]
+        stop += 1
+    while first > 0 and used + heights[first - 1] <= room:
+        first -= 1
+        used += heights[first]
+    return first, stop
 
 
 def focus(state: HudState) -> int:
@@ -130,7 +151,7 @@ def arrange(state: HudState, width: int, height: int, face: Typeface) -> Layout:
     """
     unit = unit_of(width, height)
     bounds = _Bounds(width, height, unit, face)
-    checklist, first, stop = bounds.checklist(state)
+    checklist, first, rows = bounds.checklist(state)
     bins, bin_rows = bounds.bins(state)
     progress = Rect(bounds.margin, bounds.margin, bounds.px(CHIP_WIDTH), bounds.px(CHIP_HEIGHT))
     clock = Rect(
@@ -152,7 +173,8 @@ def arrange(state: HudState, width: int, height: int, face: Typeface) -> Layout:
         pointer=None if state.pointer is None else bounds.pointer(state.pointer.angle, free),
         free=free,
         first=first,
-        stop=stop,
+        stop=first + len(rows),
+        rows=rows,
         message_lines=lines,
         bin_rows=bin_rows,
     )
@@ -197,20 +219,28 @@ class _Bounds:
         left = self.margin + self.list_width + self.px(GAP)
         return left, self.width - self.margin - self.bins_width - self.px(GAP) - left
 
-    def checklist(self, state: HudState) -> tuple[Rect | None, int, int]:
-        """Rectangle of the task list and the rows it shows; never more rows than fit."""
-        count = len(state.checklist)
-        if count == 0:
-            return None, 0, 0
+    def checklist(self, state: HudState) -> tuple[Rect | None, int, tuple[ListRow, ...]]:
+        """Rectangle of the task list, its first row and the rows it shows; never more than fit."""
+        if not state.checklist:
+            return None, 0, ()
+        rows = tuple(self.list_row(item) for item in state.checklist)
+        heights = [row.height for row in rows]
         fixed = self.px(HEADER) + self.px(PADDING)
-        room = (self.column_height - fixed) // self.px(ROW)
-        footer = 0
-        if room < count:
-            footer = self.px(FOOTER)
-            room = max(1, (self.column_height - fixed - footer) // self.px(ROW))
-        first, stop = window(count, focus(state), room)
-        height = fixed + footer + (stop - first) * self.px(ROW)
-        return Rect(self.margin, self.top, self.list_width, height), first, stop
+        if fixed + sum(heights) > self.column_height:
+            fixed += self.px(FOOTER)
+        first, stop = window(heights, focus(state), self.column_height - fixed)
+        height = fixed + sum(heights[first:stop])
+        return Rect(self.margin, self.top, self.list_width, height), first, rows[first:stop]
+
+    def list_row(self, item: ChecklistItem) -> ListRow:
+        """Measure a row: more lines of detail where one is too short for what is still to be done."""
+        taken = 2 * PADDING + 2 + TILE + GAP + (0 if item.number is None else NUMBER)
+        if item.target_picture is not None:
+            taken += TARGET + 3
+        width = self.list_width - self.px(taken)
+        size = max(1, self.px(theme.DETAIL.size))
+        detail = self.face.paragraph(item.detail, size, theme.DETAIL.weight, width, 1 if item.done else 3)
+        return ListRow(self.px(ROW + LINE * max(0, len(detail) - 1)), width, detail)
 
     def bins(self, state: HudState) -> tuple[Rect | None, tuple[BinRow, ...]]:
         """Rectangle of the list of bins and its rows; places get fewer lines when many bins must fit."""

@@ -9,7 +9,8 @@ from hud.task import TaskObject, TaskView
 def in_sentence(label: str) -> str:
     """A label inside a sentence: "Blue mug" to "blue mug"; "LEGO car" and "T-shirt" stay."""
     first, _, rest = label.partition(" ")
-    plain = first[:1].isupper() and first[1:].islower() and first.isalpha()
+    stem = first.partition("-")[0]
+    plain = len(stem) > 1 and stem.isalpha() and first[:1].isupper() and first[1:].islower()
     return f"{first.lower()} {rest}".rstrip() if plain else label
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hud import theme
 from hud.canvas import Canvas, Patch, Rect
-from hud.layout import GAP, HEADER, LINE, NUMBER, PADDING, ROW, TILE, BinRow
+from hud.layout import GAP, HEADER, LINE, NUMBER, PADDING, TARGET, TILE, BinRow, ListRow
 from hud.state import BinEntry, ChecklistItem, InventorySlot, Message, MessageKind
 from hud.text import Typeface
 
@@ -42,66 +42,69 @@ class Pen:
 
 
 def draw_checklist(
-    pen: Pen, rect: Rect, title: str, rows: tuple[ChecklistItem, ...], before: int, after: int, finished: str
+    pen: Pen,
+    rect: Rect,
+    title: str,
+    items: tuple[ChecklistItem, ...],
+    rows: tuple[ListRow, ...],
+    hidden: tuple[int, int],
+    finished: str,
 ) -> Patch:
-    """The task list; `before` and `after` count the rows that did not fit."""
+    """The task list: the items that fit, and how many are hidden before and after them."""
     canvas = pen.panel(rect)
     x, width = canvas.px(PADDING + 2), rect.width - 2 * canvas.px(PADDING + 2)
     taken = canvas.text_width(finished, theme.DETAIL) + canvas.px(GAP)
     canvas.text(x, canvas.px(17), canvas.fit(title, theme.TITLE, width - taken), theme.TITLE, theme.TEXT)
     canvas.text(rect.width - x - taken + canvas.px(GAP), canvas.px(17), finished, theme.DETAIL, theme.QUIET)
-    for i, row in enumerate(rows):
-        _checklist_row(pen, canvas, row, canvas.px(HEADER) + i * canvas.px(ROW))
-    hidden = " · ".join(
-        t for t in (f"{before} above" if before else "", f"+{after} more" if after else "") if t
-    )
-    if hidden:
-        y = rect.height - canvas.px(PADDING)
-        canvas.text(x, y, canvas.fit(hidden, theme.DETAIL, width), theme.DETAIL, theme.QUIET)
+    top = canvas.px(HEADER)
+    for item, row in zip(items, rows, strict=True):
+        _checklist_row(pen, canvas, item, row, top)
+        top += row.height
+    notes = (f"{hidden[0]} above" if hidden[0] else "", f"+{hidden[1]} more" if hidden[1] else "")
+    footer = canvas.fit(" · ".join(note for note in notes if note), theme.DETAIL, width)
+    canvas.text(x, rect.height - canvas.px(PADDING), footer, theme.DETAIL, theme.QUIET)
     return canvas.patch()
 
 
-def _checklist_row(pen: Pen, canvas: Canvas, row: ChecklistItem, top: int) -> None:
+def _checklist_row(pen: Pen, canvas: Canvas, item: ChecklistItem, row: ListRow, top: int) -> None:
     px = canvas.px
-    height, side = px(ROW), px(TILE)
-    if row.current:
-        area = Rect(px(3), top, canvas.width - 2 * px(3), height)
+    side = px(TILE)
+    if item.current:
+        area = Rect(px(3), top, canvas.width - 2 * px(3), row.height)
         canvas.rounded(area, 5.0 * pen.unit, theme.ACCENT, 0.16)
-        canvas.rounded(Rect(px(3), top + px(4), px(3), height - 2 * px(4)), 1.5 * pen.unit, theme.ACCENT, 1.0)
+        canvas.rounded(
+            Rect(px(3), top + px(4), px(3), row.height - 2 * px(4)), 1.5 * pen.unit, theme.ACCENT, 1.0
+        )
     x = px(PADDING + 2)
-    if row.number is not None:
-        label = str(row.number)
+    if item.number is not None:
+        label = str(item.number)
         right = x + px(NUMBER) - px(3)
-        face = theme.LABEL if row.current else theme.DETAIL
+        face = theme.LABEL if item.current else theme.DETAIL
         canvas.text(right - canvas.text_width(label, face), top + px(19), label, face, theme.QUIET)
         x += px(NUMBER)
-    pen.tile(canvas, row.picture, x, top + (height - side) // 2, side, 0.5 if row.done else 1.0)
-    x += side + px(GAP)
-    right = canvas.width - px(PADDING)
-    if row.target_picture is not None:
-        small = px(20)
-        right -= small
-        pen.tile(
-            canvas, row.target_picture, right, top + (height - small) // 2, small, 0.4 if row.done else 1.0
-        )
-        right -= px(3)
-    _row_text(canvas, row, x, top, right - x)
+    pen.tile(canvas, item.picture, x, top + px(3), side, 0.5 if item.done else 1.0)
+    if item.target_picture is not None:
+        small = px(TARGET)
+        left = canvas.width - px(PADDING) - small
+        pen.tile(canvas, item.target_picture, left, top + px(5), small, 0.4 if item.done else 1.0)
+    _row_text(canvas, item, row, x + side + px(GAP), top)
 
 
-def _row_text(canvas: Canvas, row: ChecklistItem, x: int, top: int, width: int) -> None:
+def _row_text(canvas: Canvas, item: ChecklistItem, row: ListRow, x: int, top: int) -> None:
     px = canvas.px
-    face = theme.ITEM_CURRENT if row.current else theme.ITEM
-    if canvas.text_width(row.text, face) > width:
+    face = theme.ITEM_CURRENT if item.current else theme.ITEM
+    if canvas.text_width(item.text, face) > row.text_width:
         face = theme.Face(theme.DETAIL.size, face.weight)
-    line = canvas.fit(row.text, face, width)
-    colour = theme.DONE if row.done else theme.TEXT
+    line = canvas.fit(item.text, face, row.text_width)
     baseline = top + (px(13) if row.detail else px(19))
-    drawn = canvas.text(x, baseline, line, face, colour)
-    if row.done:
+    drawn = canvas.text(x, baseline, line, face, theme.DONE if item.done else theme.TEXT)
+    if item.done:
         y = baseline - px(4.5)
         canvas.shape([(x - px(1), y), (x + drawn + px(1), y)], theme.TEXT, line=max(1.0, 1.2 * px(1)))
-    detail = canvas.fit(row.detail, theme.DETAIL, width)
-    canvas.text(x, top + px(26), detail, theme.DETAIL, theme.DONE if row.done else theme.QUIET)
+    for i, detail in enumerate(row.detail):
+        canvas.text(
+            x, top + px(26 + LINE * i), detail, theme.DETAIL, theme.DONE if item.done else theme.QUIET
+        )
 
 
 def draw_bins(
@@ -148,9 +151,14 @@ def draw_inventory(pen: Pen, rect: Rect, slots: tuple[InventorySlot, InventorySl
             )
         x = left + px(5) + side + px(GAP)
         room = left + width - px(PADDING) - x
-        canvas.text(x, px(17), canvas.fit(hand, theme.DETAIL, room), theme.DETAIL, theme.QUIET)
-        name, face = (slot.label, theme.LABEL) if slot.label is not None else ("empty", theme.DETAIL)
-        canvas.text(x, px(32), canvas.fit(name, face, room), face, theme.TEXT if held else theme.QUIET)
+        if slot.label is not None:
+            lines, face, colour = canvas.wrap(slot.label, theme.LABEL, room, 2), theme.LABEL, theme.TEXT
+        else:
+            lines, face, colour = (hand, "empty"), theme.DETAIL, theme.QUIET
+        first = rect.height // 2 + px(4.5) - px(LINE) * (len(lines) - 1) // 2
+        for line_number, line in enumerate(lines):
+            line_top = first + line_number * px(LINE)
+            canvas.text(x, line_top, canvas.fit(line, face, room), face, colour)
     return canvas.patch()
 
 

@@ -102,7 +102,8 @@ def _parse(kind: Any, raw: Any, where: str) -> Any:
 def _parse_choice(kind: Any, raw: Any, where: str) -> Any:
     choices: dict[Any, Any] = {v: v for v in get_args(kind)}
     if isinstance(kind, enum.EnumMeta):
-        choices = {m.value: m for m in kind.__members__.values()}
+        members: list[Any] = list(kind)
+        choices = {m.value: m for m in members}
     if raw not in choices:
         raise SchemaError(f"{where} must be one of {list(choices)}, got {raw!r}")
     return choices[raw]

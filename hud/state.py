@@ -52,8 +52,9 @@ class ChecklistItem:
     """A row of the task list.
 
     Attributes:
-        text: What to do or what to find ("Pick up the blue mug", "Blue mug").
-        detail: Second line: the place or the bin ("Kitchen", "Dish bin, kitchen").
+        text: The object ("Blue mug").
+        detail: Below it: where it is, where it goes, what to do; a line break says where to break it when it
+            does not fit in one line ("Kitchen\\n→ Dish bin", "Pick up ·\\nKitchen").
         picture: Key of the object's picture, or None.
         target_picture: Key of the receptacle's picture, or None.
         number: Step number, or None where order means nothing.

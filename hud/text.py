@@ -49,6 +49,19 @@ class Typeface:
             done.append(self.fit(" ".join(words), size, weight, width))
         return tuple(done)
 
+    def paragraph(self, text: str, size: int, weight: int, width: int, lines: int) -> tuple[str, ...]:
+        """`text` in one line when it fits, else broken first at its line breaks and then between words."""
+        whole = " ".join(text.split())
+        if lines <= 1 or self.width(whole, size, weight) <= width:
+            fitted = self.fit(whole, size, weight, width)
+            return (fitted,) if fitted else ()
+        parts = [part.strip(" ·") for part in text.split("\n")]
+        broken: list[str] = []
+        for i, part in enumerate(parts):
+            still_to_come = len(parts) - 1 - i
+            broken += self.wrap(part, size, weight, width, min(2, lines - len(broken) - still_to_come))
+        return tuple(broken)
+
     def stamp(self, text: str, size: int, weight: int) -> tuple[NDArray[np.uint8], int]:
         """Coverage of a line of text, and its baseline's row in it.
 

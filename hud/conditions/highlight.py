@@ -11,7 +11,7 @@ def hud_state(view: TaskView) -> HudState:
 
     def detail(thing: TaskObject) -> str:
         target = f"→ {view.receptacle(thing.receptacle).label}"
-        return f"{thing.room} {target}" if thing.status == "loose" else target
+        return f"{thing.room}\n{target}" if thing.status == "loose" else target
 
     markers = tuple(m for o in view.objects if o.status == "loose" for m in flagpole(o.position))
     return assemble(view, "Objects to put away", random_order_rows(view, detail), markers)

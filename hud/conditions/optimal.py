@@ -1,6 +1,6 @@
 """Optimal: breadcrumbs to the next visit, and the plan as numbered steps (PAPER section 5)."""
 
-from hud.lists import assemble, in_sentence
+from hud.lists import assemble
 from hud.markers import breadcrumbs, goal_pin
 from hud.projection import pointer_to
 from hud.state import ChecklistItem, HudState
@@ -23,17 +23,11 @@ def hud_state(view: TaskView) -> HudState:
 def _row(view: TaskView, index: int, kind: str, name: str, done: int) -> ChecklistItem:
     thing = view.object(name)
     target = view.receptacle(thing.receptacle)
-    pick = kind == "pick"
-    if pick:
-        # Where a picked object lay is not known any more; its room now is where the person carries it.
-        text, detail = f"Pick up {in_sentence(thing.label)}", thing.room if index >= done else ""
-    else:
-        text, detail = f"Put away {in_sentence(thing.label)}", f"{target.label}, {target.room}"
+    action, room = ("Pick up", thing.room) if kind == "pick" else (f"Put in {target.label}", target.room)
     return ChecklistItem(
-        text=text,
-        detail=detail,
+        text=thing.label,
+        detail=action if index < done else f"{action} ·\n{room}",
         picture=thing.picture,
-        target_picture=None if pick else target.picture,
         number=index + 1,
         done=index < done,
         current=index == done,
