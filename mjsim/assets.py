@@ -18,6 +18,5 @@ def models_root() -> Path:
     for candidate in candidates:
         if (candidate / "houses").is_dir():
             return candidate
-    raise AssetError(
-        f"no models folder at {' or '.join(str(c) for c in candidates)}; reinstall mjsim, or run it from a full checkout"
-    )
+    looked = " or ".join(str(c) for c in candidates)
+    raise AssetError(f"no models folder at {looked}; reinstall mjsim, or run it from a full checkout")

@@ -95,8 +95,8 @@ class Catalogue:
             house: Name of a folder under `models/houses`, or the path of a `catalogue.toml`.
 
         Raises:
-            AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused or
-                used twice; the message names the culprit.
+            AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused
+                or used twice; the message names the culprit.
         """
         path = _catalogue_path(house)
         reader = _Reader(path, _parse(path))

@@ -1,0 +1,219 @@
+"""Building blocks of the authored meshes: lathe, tube, extrusion, cushion, slab, and a compact OBJ writer."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.polygon import orient
+
+from mjsim.files import write_text_atomically
+
+Floats = NDArray[np.float64]
+CREASE = math.radians(40.0)  # faces that meet at a sharper angle get separate normals
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A triangle mesh, in m.
+
+    Attributes:
+        vertices: Shape (n, 3).
+        faces: Vertex indices, counter-clockwise seen from outside, shape (m, 3).
+        uv: Texture coordinates per vertex, shape (n, 2), or None.
+    """
+
+    vertices: Floats
+    faces: NDArray[np.int64]
+    uv: Floats | None = None
+
+    def moved(self, offset: ArrayLike) -> "Surface":
+        """The same surface, shifted by `offset` (m, shape (3,))."""
+        return Surface(self.vertices + np.asarray(offset, dtype=float), self.faces, self.uv)
+
+    def turned(self, angle: float) -> "Surface":
+        """The same surface, turned about z by `angle` rad."""
+        c, s = math.cos(angle), math.sin(angle)
+        return Surface(
+            self.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), self.faces, self.uv
+        )
+
+    def lengthwise(self) -> "Surface":
+        """Axes x, y, z become y, z, x: an extruded drawing then stands up, its thickness across."""
+        return Surface(self.vertices[:, [2, 0, 1]], self.faces, self.uv)
+
+    def bent(self, rule: Callable[[Floats], Floats]) -> "Surface":
+        """The same surface with its vertices (n, 3) mapped by `rule`."""
+        return Surface(rule(self.vertices), self.faces, self.uv)
+
+
+def join(surfaces: Sequence[Surface]) -> Surface:
+    """One surface out of several, without UV unless all have it."""
+    offsets = np.cumsum([0, *(len(s.vertices) for s in surfaces[:-1])])
+    uvs = [s.uv for s in surfaces if s.uv is not None]
+    return Surface(
+        np.vstack([s.vertices for s in surfaces]),
+        np.vstack([s.faces + o for s, o in zip(surfaces, offsets, strict=True)]),
+        np.vstack(uvs) if len(uvs) == len(surfaces) else None,
+    )
+
+
+def sheet(points: Floats) -> Surface:
+    """Surface over a grid of points, shape (rows, columns, 3); the outside is rows x columns (right-handed)."""
+    rows, columns = points.shape[:2]
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()
+    c, d = index[1:, 1:].ravel(), index[:-1, 1:].ravel()
+    faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    vertices = points.reshape(-1, 3)
+    u, v = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
+    return Surface(vertices, _without_slivers(vertices, faces), np.column_stack([u.ravel(), v.ravel()]))
+
+
+def lathe(profile: ArrayLike, sections: int = 24, start: float = 0.0, stop: float = 2 * math.pi) -> Surface:
+    """Turn a profile of (radius, height) points about z; the outside is to the right of its direction."""
+    line = np.asarray(profile, dtype=float)
+    angles = np.linspace(start, stop, sections + 1)
+    points = np.empty((sections + 1, len(line), 3))
+    points[..., 0] = np.cos(angles)[:, None] * line[:, 0]
+    points[..., 1] = np.sin(angles)[:, None] * line[:, 0]
+    points[..., 2] = line[:, 1]
+    return sheet(points)
+
+
+def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> Surface:
+    """A round bar along a path, shape (k, 3), with closed ends; `radius` may change along it."""
+    line = np.asarray(path, dtype=float)
+    radii = np.broadcast_to(np.asarray(radius, dtype=float), (len(line),))
+    tangents = np.gradient(line, axis=0)
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    normal = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
+    angles = np.linspace(0.0, -2 * math.pi, sides + 1)  # clockwise, so that the outside faces out
+    rings = []
+    for point, tangent, r in zip(line, tangents, radii, strict=True):
+        normal = normal - tangent * (normal @ tangent)  # carried along without twist
+        normal /= np.linalg.norm(normal)
+        side = np.cross(tangent, normal)
+        rings.append(point + r * (np.cos(angles)[:, None] * normal + np.sin(angles)[:, None] * side))
+    first, last = np.repeat(line[:1], sides + 1, axis=0), np.repeat(line[-1:], sides + 1, axis=0)
+    return sheet(np.stack([first, *rings, last]))
+
+
+def arc(radius: float, start: float, stop: float, points: int, squash: float = 1.0) -> Floats:
+    """Points (points, 2) on a circle around the origin from angle `start` to `stop`, y scaled by `squash`."""
+    t = np.linspace(start, stop, points)
+    return np.column_stack([radius * np.cos(t), squash * radius * np.sin(t)])
+
+
+def extrude(polygon: Polygon | MultiPolygon, height: float) -> Surface:
+    """A prism over one or more polygons in the x-y plane, from z = 0 to `height`."""
+    if isinstance(polygon, MultiPolygon):
+        return join([extrude(part, height) for part in polygon.geoms])
+    mesh = trimesh.creation.extrude_polygon(orient(polygon), height, engine="manifold")
+    return Surface(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
+
+
+def cushion(polygon: Polygon, height: float, edge: float) -> Surface:
+    """A flat pillow over a polygon: a prism with its upper and lower edges rounded by `edge`, UV from above."""
+    solid = orient(polygon)
+    levels = [
+        (edge, 0.0),
+        (0.0, edge),
+        (0.0, height - edge),
+        (0.3 * edge, height - 0.3 * edge),
+        (edge, height),
+    ]
+    outline = np.asarray(solid.exterior.coords, dtype=float)[:-1]
+    inward = _inward(outline)
+    rings = [np.column_stack([outline + inset * inward, np.full(len(outline), z)]) for inset, z in levels]
+    wall = sheet(np.stack([np.vstack([r, r[:1]]) for r in rings], axis=1))
+    lids = []
+    for ring, flip in ((rings[-1], False), (rings[0], True)):
+        flat, faces = trimesh.creation.triangulate_polygon(Polygon(ring[:, :2]), engine="manifold")
+        vertices = np.column_stack([flat, np.full(len(flat), ring[0, 2])])
+        spans = flat[faces][:, 1:] - flat[faces][:, :1]
+        downwards = (spans[:, 0, 0] * spans[:, 1, 1] - spans[:, 0, 1] * spans[:, 1, 0]).sum() < 0
+        lids.append(
+            Surface(vertices, np.asarray(faces[:, ::-1] if flip != downwards else faces, dtype=np.int64))
+        )
+    return from_above(join([wall, *lids]))
+
+
+def from_above(surface: Surface) -> Surface:
+    """Texture coordinates by looking straight down: u along x, v along y, over the bounding box."""
+    low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
+    return Surface(surface.vertices, surface.faces, (surface.vertices[:, :2] - low) / (high - low))
+
+
+def slab(width: float, depth: float, height: float) -> Surface:
+    """A box with its base at z = 0 whose top carries the texture; its sides take the texture's corner colour."""
+    x, y = width / 2, depth / 2
+    corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
+    top = Surface(np.column_stack([corners, np.full(4, height)]), np.array([[0, 1, 2], [0, 2, 3]]))
+    box = trimesh.creation.box((width, depth, height))
+    rest = Surface(
+        np.asarray(box.vertices) + [0, 0, height / 2], np.asarray(box.faces[box.face_normals[:, 2] < 0.5])
+    )
+    edge = np.full((len(rest.vertices), 2), 0.01)
+    return join([from_above(top), Surface(rest.vertices, rest.faces, edge)])
+
+
+def rounded_box(width: float, depth: float, height: float, radius: float) -> Surface:
+    """A box with its base at z = 0 and edges rounded by `radius`."""
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=radius).vertices
+    reach = np.array([width, depth, height]) / 2 - radius
+    signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    hull = trimesh.convex.convex_hull((ball[None] + (signs * reach)[:, None]).reshape(-1, 3))
+    return Surface(np.asarray(hull.vertices) + [0, 0, height / 2], np.asarray(hull.faces, dtype=np.int64))
+
+
+def write_obj(path: Path, surface: Surface) -> None:
+    """Write a surface with creased normals as OBJ text, rounded to 0.01 mm."""
+    normals, normal_of = np.unique(np.round(_corner_normals(surface), 3) + 0.0, axis=0, return_inverse=True)
+    corner = normal_of.reshape(-1, 3)
+    lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in np.round(surface.vertices, 5) + 0.0]
+    if surface.uv is not None:
+        lines += [f"vt {u:.4f} {v:.4f}" for u, v in surface.uv]
+    lines += [f"vn {x:.3f} {y:.3f} {z:.3f}" for x, y, z in normals]
+    middle = "/{0}/" if surface.uv is not None else "//"
+    for face, ns in zip(surface.faces + 1, corner + 1, strict=True):
+        lines.append("f " + " ".join(f"{v}{middle.format(v)}{n}" for v, n in zip(face, ns, strict=True)))
+    write_text_atomically(path, "\n".join(lines) + "\n")
+
+
+def _corner_normals(surface: Surface) -> Floats:
+    """Normal at every corner of every face, shape (3 m, 3): mean of the faces there that bend less than CREASE."""
+    _, place = np.unique(np.round(surface.vertices, 6), axis=0, return_inverse=True)
+    triangles = surface.vertices[surface.faces]
+    weighted = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    units = weighted / np.linalg.norm(weighted, axis=1, keepdims=True)
+    around: dict[int, list[int]] = {}
+    corners = place.reshape(-1)[surface.faces]
+    for face, spots in enumerate(corners):
+        for spot in spots:
+            around.setdefault(int(spot), []).append(face)
+    normals = np.empty((len(surface.faces), 3, 3))
+    for face, spots in enumerate(corners):
+        for k, spot in enumerate(spots):
+            near = np.array(around[int(spot)])
+            total = weighted[near[units[near] @ units[face] > math.cos(CREASE)]].sum(axis=0)
+            normals[face, k] = total / np.linalg.norm(total)
+    return normals.reshape(-1, 3)
+
+
+def _without_slivers(vertices: Floats, faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-10]
+
+
+def _inward(outline: Floats) -> Floats:
+    """Unit normals at the vertices of a counter-clockwise outline, pointing inside, shape (n, 2)."""
+    ahead = np.roll(outline, -1, axis=0) - outline
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    along = ahead + np.roll(ahead, 1, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return np.column_stack([-along[:, 1], along[:, 0]])
