@@ -12,7 +12,7 @@ from mjsim.errors import PhysicsError
 from mjsim.scene import Scene, compose
 
 REST_SPEED = 0.01  # m/s
-MIN_TIME, MAX_TIME = 0.5, 6.0  # s; a body in the air is slow only at first
+MAX_TIME = 6.0  # s
 MAX_DRIFT = 0.3  # m, from where it was dropped
 MAX_SINK = 0.02  # m below the floor
 
@@ -31,10 +31,10 @@ class Settled:
 
 
 def settle(episode: Episode, catalogue: Catalogue) -> Settled:
-    """Run the physics of an empty house until every object sleeps or is slower than 1 cm/s.
+    """Run the physics of an empty house until every object sleeps, 6 s at most.
 
-    An object is at fault when it is still moving after 6 s, when it came to lie more than 0.3 m from its
-    point, or when it left the house.
+    An object is at fault when it is then awake and faster than 1 cm/s, when it came to lie more than 0.3 m
+    from its point, or when it left the house.
 
     Raises:
         AssetError: The scene does not compile.
@@ -44,10 +44,9 @@ def settle(episode: Episode, catalogue: Catalogue) -> Settled:
     scene = compose(episode, catalogue, avatar=False)
     data = mujoco.MjData(scene.model)
     steps = round(0.1 / scene.model.opt.timestep)
-    moving = np.ones(len(episode.objects), dtype=bool)
-    while data.time < MAX_TIME and (moving.any() or data.time < MIN_TIME):
+    while data.time < MAX_TIME and _awake(scene, data).any():
         mujoco.mj_step(scene.model, data, nstep=steps)
-        moving = _moving(scene, data)
+    moving = _awake(scene, data) & (_speeds(scene, data) >= REST_SPEED)
     _check_warnings(data, episode)
     positions, quaternions = scene.index.poses(data.qpos)
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
@@ -63,10 +62,12 @@ def settle(episode: Episode, catalogue: Catalogue) -> Settled:
     return Settled(tuple(objects), faults)
 
 
-def _moving(scene: Scene, data: mujoco.MjData) -> NDArray[np.bool_]:
-    speed = np.linalg.norm(data.qvel[scene.index.dofs[:, None] + np.arange(3)], axis=1)
-    awake = data.tree_asleep[scene.index.trees] < 0
-    return np.asarray(awake & (speed >= REST_SPEED))
+def _awake(scene: Scene, data: mujoco.MjData) -> NDArray[np.bool_]:
+    return np.asarray(data.tree_asleep[scene.index.trees] < 0)
+
+
+def _speeds(scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(data.qvel[scene.index.dofs[:, None] + np.arange(3)], axis=1))
 
 
 def _fault(scene: Scene, placed: PlacedObject, position: NDArray[np.float64], moving: bool) -> str | None:
