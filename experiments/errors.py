@@ -1,9 +1,9 @@
 """Typed errors of the experiments.
 
-    ExperimentError
-    ├── ConfigError     an option of a run or batch is unusable
-    ├── SessionError    a session cannot go on
-    └── RecordError     a run directory is missing, incomplete or in the way
+ExperimentError
+├── ConfigError     an option of a run or batch is unusable
+├── SessionError    a session cannot go on
+└── RecordError     a run directory is missing, incomplete or in the way
 """
 
 

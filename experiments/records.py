@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import TracebackType
 from typing import Any, TextIO
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.actions import Action, Move, Pick
 from mjsim.files import replacing, write_text_atomically
-from mjsim.observation import Observation, ObjectStatus
+from mjsim.observation import ObjectStatus, Observation
 
 LOG_FORMAT = 1
 EPISODE, EVENTS, TRAJECTORY, METRICS, PLAN, TOPDOWN, VIDEO = (
@@ -32,22 +33,32 @@ Event = Mapping[str, Any]
 
 
 class EventLog:
-    """Append-only JSON lines, flushed line by line so that a crash loses nothing that was logged."""
+    """Append-only JSON lines, flushed line by line so that a crash loses nothing that was logged.
 
-    def __init__(self, path: Path) -> None:
-        self._file: TextIO = path.open("x", encoding="utf-8")
-        self.events: list[Event] = []
+    Args:
+        path: File to create, or None to keep the events in memory only.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self._file: TextIO | None = path.open("x", encoding="utf-8") if path else None
+        self.events: list[dict[str, Any]] = []
 
     def append(self, time: float, event: str, **fields: Any) -> None:
         """Log `event` at simulated `time` s, with JSON-ready fields."""
         line = {"t": round(time, 6), "event": event, **fields}
         self.events.append(line)
-        self._file.write(json.dumps(line) + "\n")
-        self._file.flush()
+        if self._file:
+            self._file.write(json.dumps(line) + "\n")
+            self._file.flush()
 
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+    def __enter__(self) -> "EventLog":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file:
+            self._file.close()
 
 
 class Trajectory:
@@ -96,7 +107,7 @@ class Trajectory:
             "action",
         )
         kinds: dict[str, type] = {"hands": np.int16, "object_status": np.int8}
-        columns = list(zip(*self._rows, strict=True)) if self._rows else [[] for _ in names]
+        columns: list[Sequence[Any]] = list(zip(*self._rows, strict=True)) or [()] * len(names)
         return {n: np.asarray(c, dtype=kinds.get(n, np.float64)) for n, c in zip(names, columns, strict=True)}
 
     def save(self, path: Path) -> None:
@@ -143,6 +154,20 @@ def run_directory(path: Path) -> Iterator[Path]:
 def write_json(path: Path, value: Any) -> None:
     """Write indented JSON, whole or not at all."""
     write_text_atomically(path, json.dumps(value, indent=2) + "\n")
+
+
+def read_json(path: Path) -> Any:
+    """Read a JSON file.
+
+    Raises:
+        RecordError: The file is missing or not JSON; the message names it.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RecordError(f"cannot read {path}: {error.strerror}") from error
+    except json.JSONDecodeError as error:
+        raise RecordError(f"{path} is not JSON: {error}") from error
 
 
 def read_events(path: Path) -> list[Event]:

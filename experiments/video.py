@@ -1,5 +1,6 @@
 """H.264 video that browsers play, encoded beside the simulation in a thread of its own."""
 
+import hashlib
 import queue
 import threading
 from fractions import Fraction
@@ -36,9 +37,15 @@ class VideoWriter:
         self._shape = (height, width, 3)
         self._fps = fps
         self._queue: queue.Queue[Frame | None] = queue.Queue(QUEUE_LENGTH)
+        self._hash = hashlib.sha256()
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._encode, name="video", daemon=True)
         self._thread.start()
+
+    @property
+    def frames_sha256(self) -> str:
+        """Hash of the frames that the encoder has taken, pixel for pixel; of all of them once closed."""
+        return self._hash.hexdigest()
 
     def write(self, frame: Frame) -> None:
         """Append a frame, uint8 RGB of shape (height, width, 3); the caller must not change it afterwards."""
@@ -85,5 +92,6 @@ class VideoWriter:
             stream.pix_fmt = "yuv420p"
             stream.time_base = Fraction(1, self._fps)
             while (frame := self._queue.get()) is not None:
+                self._hash.update(np.ascontiguousarray(frame).data)
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
             container.mux(stream.encode())

@@ -41,9 +41,9 @@ class Percept:
         heading: Own heading, rad.
         hands: Object in the left and in the right hand.
         busy: Whether a reach is under way.
-        hud: What the glasses show.
-        guidance: The step shown by the HUD, in conditions that show one.
-        flagpoles: Object instance name -> floor position of the flagpole over it, m.
+        hud: What the glasses show; composed only when asked.
+        guidance: The step shown by the HUD, in conditions that show the way; None when all is done.
+        flagpoles: Object instance name -> floor position of the flagpole over it, m; empty in conditions without.
         targets: Object instance name -> receptacle key, from the lists in the HUD.
         answer: The world's answer to the previous action, if that was a pick or place.
         look: Objects in view at this moment -> their floor position, m; computed only when asked.
@@ -54,7 +54,7 @@ class Percept:
     heading: float
     hands: tuple[str | None, str | None]
     busy: bool
-    hud: HudState
+    hud: Callable[[], HudState]
     guidance: Guidance | None
     flagpoles: Mapping[str, Point]
     targets: Mapping[str, str]
@@ -68,7 +68,14 @@ class Percept:
 
 
 class Participant(Protocol):
-    """A user of the assistance: sees a percept, answers with an action, once per control step."""
+    """A user of the assistance: sees a percept, answers with an action, once per control step.
+
+    Attributes:
+        needs: Roles of the world-locked markers it cannot do without (`goal`, `flagpole`); a session in a condition
+            that shows none of them is refused at the start.
+    """
+
+    needs: frozenset[str]
 
     def act(self, percept: Percept) -> Action:
         """Choose what to do during the next control step."""

@@ -11,6 +11,8 @@ from mjsim.actions import IDLE, Action
 class Follower:
     """Complies fully with the guidance shown."""
 
+    needs = frozenset({"goal"})
+
     def __init__(self, house: KnownHouse) -> None:
         self._runner = ErrandRunner(house)
 

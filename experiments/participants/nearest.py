@@ -17,6 +17,8 @@ from mjsim.actions import IDLE, Action
 class Nearest:
     """Greedy: goes to the nearest place where something can be done, and keeps to a decision once made."""
 
+    needs = frozenset({"flagpole"})
+
     def __init__(self, house: KnownHouse) -> None:
         self._house = house
         self._runner = ErrandRunner(house)
@@ -29,7 +31,9 @@ class Nearest:
             return IDLE
         if self._choice not in errands:
             here = percept.position
-            self._choice = min(errands, key=lambda k: (estimated_distance(self._house, here, errands[k].stand), k))
+            self._choice = min(
+                errands, key=lambda k: (estimated_distance(self._house, here, errands[k].stand), k)
+            )
         return self._runner.act(percept, errands[self._choice])
 
     def _feasible(self, percept: Percept) -> list[Errand]:

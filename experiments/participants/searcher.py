@@ -24,6 +24,8 @@ class Searcher:
     """Picks what it has seen, brings what it carries when both hands are full or nothing else is known,
     and searches the rest of the present room before it goes on to the nearest unsearched one."""
 
+    needs: frozenset[str] = frozenset()
+
     def __init__(self, house: KnownHouse, rng: np.random.Generator) -> None:
         self._house = house
         self._rng = rng
@@ -66,7 +68,9 @@ class Searcher:
             return None
         if self._choice not in errands:
             here = percept.position
-            self._choice = min(errands, key=lambda k: (estimated_distance(self._house, here, errands[k].stand), k))
+            self._choice = min(
+                errands, key=lambda k: (estimated_distance(self._house, here, errands[k].stand), k)
+            )
         chosen = errands[self._choice]
         if chosen.kind == "pick" and self._has_gone(percept, chosen):
             del self._remembered[chosen.object]

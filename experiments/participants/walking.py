@@ -42,7 +42,9 @@ def path_length(path: NDArray[np.float64]) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def turn_towards(heading: float, position: NDArray[np.float64], target: NDArray[np.float64]) -> tuple[float, float]:
+def turn_towards(
+    heading: float, position: NDArray[np.float64], target: NDArray[np.float64]
+) -> tuple[float, float]:
     """Yaw rate (rad/s) that turns `heading` towards `target`, and the angle still to turn (rad)."""
     offset = target - position
     error = wrap_angle(float(np.arctan2(offset[1], offset[0])) - heading)

@@ -1,0 +1,117 @@
+"""The floor plan of a trial from above: rooms, objects, bins, the planned and the walked path."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from experiments.house import House
+from experiments.records import Event
+from mjsim.files import replacing
+from mjsim.render import render_floorplan
+from mjsim.scene import Scene
+
+# Okabe-Ito colours, told apart in all common kinds of colour vision.
+CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
+PLANNED, WALKED = "#D55E00", "#1B1B1B"
+PIXELS_PER_METRE = 80
+
+
+def draw_topdown(
+    path: Path, house: House, scene: Scene, plan: Event, arrays: Mapping[str, NDArray[Any]]
+) -> None:
+    """Write a PNG of the house with the plan at the start and the path walked.
+
+    Args:
+        path: PNG file to write.
+        house: The house.
+        scene: The disorganized house, for what lies where.
+        plan: The first `plan` event.
+        arrays: The trajectory.
+    """
+    x_min, y_min, x_max, y_max = house.bounds
+    figure = Figure(
+        figsize=((x_max - x_min) * 0.95, (y_max - y_min) * 0.95 + 0.9), dpi=100, layout="constrained"
+    )
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    floor = render_floorplan(
+        scene.model, scene.initial_data(), house.bounds, pixels_per_metre=PIXELS_PER_METRE
+    )
+    axes.imshow(floor.rgb, extent=(x_min, x_max, y_min, y_max), interpolation="bilinear")
+    _draw_rooms(axes, house)
+    planned = planned_path(house, scene, plan)
+    _draw_line(axes, planned, PLANNED, "--", f"planned at the start, {_length(planned):.1f} m")
+    walked = arrays["position"]
+    _draw_line(axes, walked, WALKED, "-", f"walked, {_length(walked):.1f} m")
+    axes.plot(
+        *walked[0], marker="*", markersize=17, color="white", markeredgecolor="black", ls="", label="start"
+    )
+    _draw_things(axes, house, scene)
+    axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal", xticks=[], yticks=[])
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=5, frameon=False, fontsize=10)
+    with replacing(path) as temporary:
+        # Fixed metadata: the same trial gives the same bytes.
+        figure.savefig(temporary, metadata={"Software": "mjsim"})
+
+
+def planned_path(house: House, scene: Scene, plan: Event) -> NDArray[np.float64]:
+    """Floor points of the whole tour that a `plan` event describes, m, shape (k, 2)."""
+    episode = scene.episode
+    places = {o.name: np.array(o.position[:2]) for o in episode.objects}
+    here = house.navmesh.snap(np.array([episode.start.x, episode.start.y]))
+    points = [here[None]]
+    for kind, name in plan["visits"]:
+        target = places[name] if kind == "pick" else house.receptacles[episode.targets[name]].approach
+        there = house.navmesh.snap(target)
+        points.append(house.geodesics.shortest_path(here, there).points)
+        here = there
+    return np.vstack(points)
+
+
+def _draw_rooms(axes: Axes, house: House) -> None:
+    for key, label in house.rooms.labels.items():
+        centre = house.rooms.centers[house.rooms.keys.index(key)]
+        axes.annotate(
+            label,
+            centre,
+            ha="center",
+            va="center",
+            fontsize=12,
+            color="#333333",
+            weight="bold",
+            path_effects=[withStroke(linewidth=3, foreground="white")],
+        )
+
+
+def _draw_line(axes: Axes, points: NDArray[np.float64], colour: str, style: str, label: str) -> None:
+    halo = [withStroke(linewidth=4.5, foreground="white")]
+    axes.plot(points[:, 0], points[:, 1], color=colour, ls=style, lw=2.2, label=label, path_effects=halo)
+
+
+def _draw_things(axes: Axes, house: House, scene: Scene) -> None:
+    episode = scene.episode
+    for colour, category in zip(CATEGORY_COLOURS, house.catalogue.categories.values(), strict=False):
+        places = np.array([o.position[:2] for o in episode.objects if o.category == category.key])
+        bin_place = house.receptacles[category.receptacle].center[:2]
+        if len(places):
+            axes.plot(
+                *places.T,
+                marker="o",
+                markersize=11,
+                color=colour,
+                markeredgecolor="black",
+                ls="",
+                label=category.label,
+            )
+        axes.plot(*bin_place, marker="s", markersize=13, color=colour, markeredgecolor="black", ls="")
+
+
+def _length(points: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -1,0 +1,203 @@
+"""The assistant: sees the whole house, plans, judges each visit against its plan, and fills the glasses."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.conditions import TaskBoard
+from experiments.house import House
+from experiments.participants.base import Guidance
+from experiments.participants.walking import path_length, point_along, project
+from experiments.records import EventLog
+from hud.conditions import condition
+from hud.projection import CameraView
+from hud.state import HudState
+from hud.task import StepKind
+from mjsim.actions import EventKind, WorldEvent
+from mjsim.episode import CAPACITY, Episode
+from mjsim.observation import ObjectStatus, Observation
+from planner.plan import VisitKind
+from planner.replanner import Replanner
+from planner.route import XY, Route, RouteVisit, TaskState
+
+OFF_THE_PATH = 0.6  # m from the shown path before a new one is shown
+MOVED = 0.25  # m an object may be pushed before the way to it is shown anew
+
+STEP: Mapping[VisitKind, StepKind] = {VisitKind.PICK: "pick", VisitKind.PLACE: "place"}
+VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLACE}
+
+
+class Assistant:
+    """Keeps a route for the state of the task, and says what the glasses show.
+
+    It plans in every condition, because deviations are counted against its plan in all of them (PAPER section 6);
+    whether the plan is shown is up to the condition.
+
+    Args:
+        house: The house.
+        episode: The disorganized house.
+        assistance: Name of the assistance condition.
+        replanner: Plans routes.
+        order: Object names in this participant's random order.
+        log: Where plans and visits are logged.
+    """
+
+    def __init__(
+        self,
+        house: House,
+        episode: Episode,
+        *,
+        assistance: str,
+        replanner: Replanner,
+        order: Sequence[str],
+        log: EventLog,
+    ) -> None:
+        self._house = house
+        self._episode = episode
+        self._show = condition(assistance)
+        self._replanner = replanner
+        self._log = log
+        self._board = TaskBoard(house, episode, order)
+        self._deliveries = {
+            name: _xy(house.receptacles[key].approach) for name, key in episode.targets.items()
+        }
+        self._route: Route | None = None
+        self._path: NDArray[np.float64] | None = None
+        self._path_goal = np.zeros(2)
+        self._stood = np.zeros(2)
+
+    def begin(self, observation: Observation) -> None:
+        """Plan for the start of the task."""
+        self._stood = observation.position.copy()
+        self._plan(observation)
+        self.say("started", observation.time)
+
+    def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
+        """Take note of what happened in the last control step; replan where the person left the plan."""
+        for event in events:
+            if event.kind in VISIT_KIND:
+                self._visited(observation, event)
+        if events:
+            self._plan(observation)
+        elif self._path_is_stale(observation):
+            self._show_way(observation)
+
+    def say(self, key: str, time: float, object_name: str | None = None) -> None:
+        """Put a message about an event or a refusal into the message bar."""
+        self._board.say(key, time, object_name)
+
+    def hud_state(self, observation: Observation, camera: CameraView | None = None) -> HudState:
+        """What the glasses show now."""
+        visits = self._route.visits if self._route else ()
+        plan = [(STEP[v.kind], v.object) for v in visits]
+        return self._show(
+            self._board.view(observation, plan=plan, path=self._ahead(observation), camera=camera)
+        )
+
+    def guidance(self, observation: Observation) -> Guidance | None:
+        """The next step and the way to it; None when all is done."""
+        path = self._ahead(observation)
+        visit = self._route.next if self._route else None
+        if path is None or visit is None:
+            return None
+        return Guidance(visit.kind.value, visit.object, path, self._goal(observation, visit))
+
+    def _visited(self, observation: Observation, event: WorldEvent) -> None:
+        kind = VISIT_KIND[event.kind]
+        suggested = self._route.next if self._route else None
+        here = observation.position.copy()
+        self._log.append(
+            event.time,
+            "visit",
+            kind=kind.value,
+            object=event.object,
+            suggested=_as_json(suggested) if suggested else None,
+            deviated=self._route is not None and not self._route.follows(kind, event.object),
+            alternatives=self._alternatives(observation, event),
+            position=[round(float(v), 6) for v in here],
+            geodesic_m=round(self._house.geodesics.shortest_path(self._stood, here).geodesic_distance, 6),
+        )
+        self._stood = here
+        self._board.did(STEP[kind], event.object)
+
+    def _alternatives(self, observation: Observation, event: WorldEvent) -> int:
+        """How many other visits were feasible when this one was made."""
+        loose = set(observation.names_with(ObjectStatus.LOOSE))
+        carried = set(observation.carried)
+        if event.kind is EventKind.PICKED:
+            loose, carried = loose | {event.object}, carried - {event.object}
+        else:
+            carried = carried | {event.object}
+        return len(carried) + (len(loose) if len(carried) < CAPACITY else 0) - 1
+
+    def _plan(self, observation: Observation) -> None:
+        """Follow the plan on, or make a new one where the task is no longer as planned."""
+        before = self._replanner.replans
+        first = self._route is None
+        self._route = self._replanner.update(self._task_state(observation))
+        self._show_way(observation)
+        if not first and self._replanner.replans == before:
+            return
+        if not first:
+            self.say("replanned", observation.time)
+        self._log.append(
+            observation.time,
+            "plan",
+            cost_m=round(self._route.cost, 6),
+            lower_bound_m=round(self._route.plan.lower_bound, 6),
+            status=self._route.plan.status.value,
+            visits=[_as_json(v) for v in self._route.visits],
+        )
+
+    def _task_state(self, observation: Observation) -> TaskState:
+        loose = observation.names_with(ObjectStatus.LOOSE)
+        return TaskState(
+            position=_xy(observation.position),
+            loose={name: _xy(self._position_of(observation, name)) for name in loose},
+            carried=observation.carried,
+            deliveries=self._deliveries,
+        )
+
+    def _position_of(self, observation: Observation, name: str) -> NDArray[np.float64]:
+        return observation.object_positions[observation.object_names.index(name), :2]
+
+    def _goal(self, observation: Observation, visit: RouteVisit) -> NDArray[np.float64]:
+        """Where a visit happens: the object itself, or the middle of the receptacle, m, (2,)."""
+        if visit.kind is VisitKind.PICK:
+            return self._position_of(observation, visit.object)
+        return self._house.receptacles[self._episode.targets[visit.object]].center[:2]
+
+    def _show_way(self, observation: Observation) -> None:
+        visit = self._route.next if self._route else None
+        self._path = None
+        if visit is not None:
+            self._path_goal = self._goal(observation, visit).copy()
+            target = self._path_goal if visit.kind is VisitKind.PICK else self._deliveries[visit.object]
+            self._path = self._house.geodesics.shortest_path(observation.position, target).points
+
+    def _path_is_stale(self, observation: Observation) -> bool:
+        visit = self._route.next if self._route else None
+        if self._path is None or visit is None:
+            return False
+        strayed = project(self._path, observation.position)[1] > OFF_THE_PATH
+        return strayed or float(np.linalg.norm(self._goal(observation, visit) - self._path_goal)) > MOVED
+
+    def _ahead(self, observation: Observation) -> NDArray[np.float64] | None:
+        """What is left of the shown way, from the point of it nearest to the person, m, (k, 2)."""
+        if self._path is None:
+            return None
+        arc, _ = project(self._path, observation.position)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self._path, axis=0), axis=1))])
+        rest = self._path[along > arc + 1e-9]
+        if path_length(self._path) - arc < 1e-9:
+            return self._path[-1:]
+        return np.vstack([point_along(self._path, arc), rest])
+
+
+def _xy(point: NDArray[np.float64]) -> XY:
+    return float(point[0]), float(point[1])
+
+
+def _as_json(visit: RouteVisit) -> list[str]:
+    return [visit.kind.value, visit.object]

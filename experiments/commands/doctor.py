@@ -1,0 +1,37 @@
+"""`mjsim doctor`: is everything there that a run needs?"""
+
+import argparse
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from mjsim.environment_report import environment_report
+
+DESCRIPTION = """\
+Show versions, the EGL vendor and the GL renderer, whether rendering happens in software, and what to install when
+something is missing. Exits with 1 when frames cannot be rendered."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "doctor",
+        help="show versions and whether rendering works",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:  # noqa: ARG001 - every subcommand takes them
+    """Print the report."""
+    report = environment_report()
+    console = Console(highlight=False, soft_wrap=True)
+    table = Table(show_header=False, box=None)
+    for label, value in report.rows():
+        table.add_row(label, value)
+    console.print(table)
+    for line in report.advice:
+        console.print(line)
+    return 0 if report.can_render else 1

@@ -1,0 +1,71 @@
+"""Option types and options that several subcommands share."""
+
+import argparse
+import re
+
+from experiments.participants import participant_names
+from hud.conditions import condition_names
+
+
+def int_list(text: str) -> list[int]:
+    """Parse `6,12` or `0:10` (the end not included) or a mix of both.
+
+    Raises:
+        argparse.ArgumentTypeError: It is neither.
+    """
+    values: list[int] = []
+    for part in text.split(","):
+        if match := re.fullmatch(r"(\d+):(\d+)", part):
+            values.extend(range(int(match[1]), int(match[2])))
+        elif re.fullmatch(r"\d+", part):
+            values.append(int(part))
+        else:
+            raise argparse.ArgumentTypeError(f"{part!r} is neither a number nor a range such as 0:10")
+    if not values:
+        raise argparse.ArgumentTypeError(f"{text!r} names no number; a range's end is not included")
+    return values
+
+
+def text_list(text: str) -> list[str]:
+    """Parse `none,highlight`."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def frame_size(text: str) -> tuple[int, int]:
+    """Parse `640x480`.
+
+    Raises:
+        argparse.ArgumentTypeError: It is not of that form, or odd: H.264 needs even sizes.
+    """
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, such as 640x480")
+    width, height = int(match[1]), int(match[2])
+    if width % 2 or height % 2 or width < 160 or height < 120:
+        raise argparse.ArgumentTypeError(f"{text} must be even in both directions and at least 160x120")
+    return width, height
+
+
+def add_house(parser: argparse.ArgumentParser) -> None:
+    """Add `--house`."""
+    parser.add_argument(
+        "--house",
+        default="apartment",
+        metavar="NAME",
+        help="house by name, or path of its catalogue.toml (apartment)",
+    )
+
+
+def add_user(parser: argparse.ArgumentParser) -> None:
+    """Add `--user`."""
+    parser.add_argument(
+        "--user",
+        metavar="NAME",
+        help=f"simulated participant: {', '.join(participant_names())}, or package.module:attribute "
+        "(default: the one that makes the most of the assistance)",
+    )
+
+
+def assistance_help() -> str:
+    """What `--assistance` can be."""
+    return f"assistance condition: {', '.join(condition_names())}, or package.module:attribute"

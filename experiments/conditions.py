@@ -1,0 +1,122 @@
+"""From the state of the world to what an assistance condition sees: labels, pictures, rooms, messages."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.house import House
+from hud.messages import fade, message
+from hud.projection import CameraView
+from hud.state import Message
+from hud.task import PlannedStep, StepKind, TaskObject, TaskReceptacle, TaskView
+from mjsim.episode import Episode
+from mjsim.observation import Observation
+
+
+class TaskBoard:
+    """Remembers what was done and said in a session, and words the state of the task for the conditions.
+
+    Args:
+        house: The house.
+        episode: The disorganized house.
+        order: Object names in this participant's random order (PAPER section 5).
+    """
+
+    def __init__(self, house: House, episode: Episode, order: Sequence[str]) -> None:
+        self._house = house
+        self._episode = episode
+        self._order = tuple(order)
+        self._done: list[tuple[StepKind, str]] = []
+        self._said: tuple[str, float, str | None] | None = None
+        self._receptacles = tuple(self._task_receptacle(key) for key in episode.receptacles)
+
+    def did(self, kind: StepKind, object_name: str) -> None:
+        """Note a feasible visit."""
+        self._done.append((kind, object_name))
+
+    def say(self, key: str, time: float, object_name: str | None = None) -> None:
+        """Note a message about an event or refusal at `time` s; it replaces the one before."""
+        self._said = (key, time, object_name)
+
+    def view(
+        self,
+        observation: Observation,
+        *,
+        plan: Sequence[tuple[StepKind, str]] = (),
+        path: NDArray[np.float64] | None = None,
+        camera: CameraView | None = None,
+    ) -> TaskView:
+        """The task as a condition sees it now.
+
+        Args:
+            observation: State of the world.
+            plan: Remaining visits in planned order.
+            path: Floor points of the way to the next visit, m, shape (k, 2).
+            camera: The eye camera.
+        """
+        return TaskView(
+            objects=tuple(self._task_object(observation, i) for i in range(len(observation.object_names))),
+            receptacles=self._receptacles,
+            order=self._order,
+            hands=observation.hands,
+            steps_done=tuple(self._done),
+            plan=tuple(PlannedStep(kind, name) for kind, name in plan),
+            path=path,
+            goal=self._goal(observation, *plan[0]) if plan else None,
+            position=(float(observation.position[0]), float(observation.position[1])),
+            eye=_vec3(observation.eye),
+            message=self._message(observation.time),
+            clock=observation.time,
+            camera=camera,
+        )
+
+    def _message(self, time: float) -> Message | None:
+        if self._said is None:
+            return None
+        key, since, name = self._said
+        opacity = fade(time - since)
+        if opacity <= 0:
+            return None
+        if name is None:
+            return message(key, opacity=opacity)
+        receptacle = self._house.catalogue.receptacles[self._episode.targets[name]]
+        return message(key, object=self._label(name), receptacle=receptacle.label, opacity=opacity)
+
+    def _label(self, name: str) -> str:
+        model = next(o.model for o in self._episode.objects if o.name == name)
+        return self._house.catalogue.objects[model].label
+
+    def _goal(self, observation: Observation, kind: StepKind, name: str) -> tuple[float, float, float]:
+        if kind == "pick":
+            return _vec3(observation.object_positions[observation.object_names.index(name)])
+        return _vec3(self._house.receptacles[self._episode.targets[name]].center)
+
+    def _task_object(self, observation: Observation, i: int) -> TaskObject:
+        placed = self._episode.objects[i]
+        position = observation.object_positions[i]
+        return TaskObject(
+            name=placed.name,
+            label=self._house.catalogue.objects[placed.model].label,
+            picture=f"object:{placed.model}",
+            category=placed.category,
+            room=self._house.rooms.label(self._house.rooms.room_at(position[:2])),
+            position=_vec3(position),
+            status=observation.object_status[i].value,
+            receptacle=self._episode.targets[placed.name],
+        )
+
+    def _task_receptacle(self, key: str) -> TaskReceptacle:
+        receptacle = self._house.catalogue.receptacles[key]
+        return TaskReceptacle(
+            key=key,
+            label=receptacle.label,
+            place=receptacle.place,
+            room=self._house.rooms.label(receptacle.room),
+            picture=f"receptacle:{key}",
+            position=_vec3(self._house.receptacles[key].center),
+        )
+
+
+def _vec3(values: NDArray[np.float64]) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])
