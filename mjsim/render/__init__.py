@@ -1,0 +1,21 @@
+"""Off-screen rendering, the only part of the project that touches OpenGL."""
+
+from mjsim.render.cameras import CameraPose
+from mjsim.render.context import GlInfo, gl_info
+from mjsim.render.markers import MarkerLike
+from mjsim.render.profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
+from mjsim.render.renderer import Frame, Renderer
+
+__all__ = [
+    "DRAFT",
+    "FAST",
+    "PROFILES",
+    "QUALITY",
+    "CameraPose",
+    "Frame",
+    "GlInfo",
+    "MarkerLike",
+    "RenderProfile",
+    "Renderer",
+    "gl_info",
+]

@@ -1,0 +1,131 @@
+"""Camera poses, and the projection that the rasteriser takes."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjsim.errors import RenderError
+
+# Nearer than any surface gets to an eye inside a body of radius 0.2 m; farther than any view indoors.
+NEAR = 0.04
+FAR = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPose:
+    """A pinhole camera.
+
+    Attributes:
+        position: Eye point in the house frame, m, shape (3,).
+        rotation: Camera axes in the house frame as columns: x right, y up, z backward, shape (3, 3).
+        fovy: Vertical field of view, rad.
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    fovy: float
+
+    def __post_init__(self) -> None:
+        position = np.asarray(self.position, dtype=np.float64)
+        rotation = np.asarray(self.rotation, dtype=np.float64)
+        if position.shape != (3,) or not np.isfinite(position).all():
+            raise RenderError(f"camera position must be three finite numbers, got {self.position!r}")
+        if rotation.shape != (3, 3) or not np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-6):
+            raise RenderError(f"camera rotation must be an orthonormal 3x3 matrix, got {self.rotation!r}")
+        if not 0.0 < self.fovy < np.pi:
+            raise RenderError(f"camera fovy must lie between 0 and pi rad, got {self.fovy}")
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "rotation", rotation)
+
+    @classmethod
+    def looking_at(cls, position: ArrayLike, target: ArrayLike, fovy: float) -> "CameraPose":
+        """Upright camera at `position` (3,) that looks at `target` (3,), m, with `fovy` rad.
+
+        Raises:
+            RenderError: The points coincide, or an argument is unusable.
+        """
+        eye = np.asarray(position, dtype=np.float64)
+        return cls(eye, look_rotation(np.asarray(target, dtype=np.float64) - eye), fovy)
+
+
+def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Camera axes (3, 3) that look along `direction`, up as near to +z as possible (+y when vertical).
+
+    Raises:
+        RenderError: `direction` has no length.
+    """
+    length = np.linalg.norm(direction)
+    if not length > 0.0:
+        raise RenderError(f"a camera cannot look along {direction!r}; give a target away from its position")
+    backward = -direction / length
+    vertical = abs(backward[2]) > 1.0 - 1e-9
+    right = np.cross([0.0, 1.0, 0.0] if vertical else [0.0, 0.0, 1.0], backward)
+    right /= np.linalg.norm(right)
+    return np.column_stack((right, np.cross(backward, right), backward))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What one draw call sees.
+
+    Attributes:
+        position: Eye point, m, shape (3,).
+        rotation: Camera axes as columns: right, up, backward, shape (3, 3).
+        half_height: Half the height of the image at distance 1 m; in m when orthographic.
+        near: Distance of the near plane, m.
+        far: Distance of the far plane, m.
+        orthographic: Parallel projection.
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    half_height: float
+    near: float = NEAR
+    far: float = FAR
+    orthographic: bool = False
+
+    @classmethod
+    def of(cls, pose: CameraPose) -> "View":
+        """Perspective view of a camera pose."""
+        return cls(pose.position, pose.rotation, float(np.tan(pose.fovy / 2)))
+
+    def metres(self, raw: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Distance along the optical axis from reversed depth (1 near, 0 far); inf where nothing is."""
+        depth = np.divide(self.near * self.far, self.near + raw.astype(np.float64) * (self.far - self.near))
+        if self.orthographic:
+            depth = self.far - raw.astype(np.float64) * (self.far - self.near)
+        depth[raw <= 0.0] = np.inf
+        return depth.astype(np.float32)
+
+    def aim(self, scene: Any) -> None:
+        """Write this view into a scene's cameras and its headlight."""
+        top = self.half_height if self.orthographic else self.half_height * self.near
+        forward = -self.rotation[:, 2]
+        for camera in scene.camera:  # the stereo pair; a mono image is drawn from their mean
+            camera.pos, camera.forward, camera.up = self.position, forward, self.rotation[:, 1]
+            camera.frustum_center, camera.frustum_width = 0.0, 0.0
+            camera.frustum_bottom, camera.frustum_top = -top, top
+            camera.frustum_near, camera.frustum_far = self.near, self.far
+            camera.orthographic = int(self.orthographic)
+        for light in scene.lights[: scene.nlight]:
+            if light.headlight:
+                light.pos, light.dir = self.position, forward
+
+
+def camera_pose(model: Any, data: Any, camera: str | CameraPose) -> CameraPose:
+    """Pose of the camera called `camera`, or the pose itself.
+
+    Raises:
+        RenderError: The model has no camera of that name.
+    """
+    if isinstance(camera, CameraPose):
+        return camera
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, camera)
+    if index < 0:
+        names = [model.camera(i).name for i in range(model.ncam)]
+        raise RenderError(f"the model has no camera {camera!r}; it has {names}")
+    rotation = data.cam_xmat[index].reshape(3, 3).copy()
+    return CameraPose(data.cam_xpos[index].copy(), rotation, float(np.deg2rad(model.cam_fovy[index])))

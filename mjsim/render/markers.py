@@ -1,0 +1,94 @@
+"""World-locked digital objects: decorative geoms that are added to a scene for one frame."""
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.errors import RenderError
+
+MAX_MARKERS = 1024
+# Three quarters of a marker's colour is its own light and a little is lit, so that it reads as a solid but
+# shines alike in every room.
+_GLOW = 0.75
+_LIT = 0.3
+_SHAPES = {
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+}
+_SIZES = {"sphere": 1, "cylinder": 2, "box": 3}
+
+
+class MarkerLike(Protocol):
+    """What a marker must offer.
+
+    Attributes:
+        shape: `sphere`, `cylinder` (upright) or `box`.
+        position: Centre in the house frame, m.
+        size: Radius; radius and half-length; half-sizes, m.
+        rgba: Colour and opacity, components 0 to 1.
+        x_ray: Whether it also shows faintly through walls.
+    """
+
+    @property
+    def shape(self) -> str: ...  # noqa: D102
+    @property
+    def position(self) -> Sequence[float] | NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def size(self) -> Sequence[float] | NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def rgba(self) -> Sequence[float] | NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def x_ray(self) -> bool: ...  # noqa: D102
+
+
+def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False) -> None:
+    """Append markers to a scene's geoms; `flat` gives their exact colour, opaque, without any light.
+
+    Raises:
+        RenderError: There are too many markers, or one has an unknown shape or unusable numbers.
+    """
+    if scene.ngeom + len(markers) > scene.maxgeom:
+        raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
+    for marker in markers:
+        geom = scene.geoms[scene.ngeom]
+        rgba = np.array(_numbers(marker, "rgba", 4), dtype=np.float32)
+        rgba[:3] *= 1.0 if flat else _LIT
+        if flat:
+            rgba[3] = 1.0
+        size = geom_size(marker)
+        position = np.array(_numbers(marker, "position", 3))
+        mujoco.mjv_initGeom(geom, _SHAPES[marker.shape], size, position, np.eye(3).ravel(), rgba)
+        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+        geom.emission = 1.0 if flat else _GLOW / _LIT
+        geom.specular = geom.shininess = geom.reflectance = 0.0
+        geom.segid = -1
+        scene.ngeom += 1
+
+
+def geom_size(marker: MarkerLike) -> NDArray[np.float64]:
+    """Sizes (3,) in MuJoCo's convention for the marker's shape, m.
+
+    Raises:
+        RenderError: The shape is unknown, or a size is missing or not positive.
+    """
+    if marker.shape not in _SHAPES:
+        raise RenderError(f"marker shape {marker.shape!r} is unknown; use one of {sorted(_SHAPES)}")
+    size = _numbers(marker, "size", _SIZES[marker.shape])
+    if min(size) <= 0.0:
+        raise RenderError(f"marker sizes must be positive, got {marker.size!r} for a {marker.shape}")
+    if marker.shape == "sphere":
+        return np.full(3, size[0])
+    if marker.shape == "cylinder":
+        return np.array([size[0], size[0], size[1]])
+    return np.array(size)
+
+
+def _numbers(marker: MarkerLike, field: str, count: int) -> list[float]:
+    values = [float(value) for value in getattr(marker, field)]
+    if len(values) < count or not np.isfinite(values).all():
+        raise RenderError(f"marker {field} needs {count} finite numbers, got {getattr(marker, field)!r}")
+    return values[:count]

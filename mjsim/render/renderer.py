@@ -1,0 +1,173 @@
+"""First-person frames of a model: colour, depth and segmentation."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.render import context
+from mjsim.render.cameras import CameraPose, View, camera_pose
+from mjsim.render.markers import MarkerLike
+from mjsim.render.profiles import RenderProfile, resolve_profile
+from mjsim.render.stage import FIRST_PERSON_GROUPS, Stage
+
+EYE = "avatar/eye"
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Images of one moment from one camera, rows from the top; None where not asked for.
+
+    Attributes:
+        camera: Where it was seen from.
+        rgb: Colour, uint8, shape (height, width, 3).
+        depth: Distance along the optical axis, m, inf where nothing is, float32, shape (height, width).
+        segmentation: Geom ids, -1 where nothing is, int32, shape (height, width).
+    """
+
+    camera: CameraPose
+    rgb: NDArray[np.uint8] | None
+    depth: NDArray[np.float32] | None
+    segmentation: NDArray[np.int32] | None
+
+
+class Renderer:
+    """Draws a model off screen.
+
+    Any thread may call it; calls take turns. Frames are bit-identical over calls and processes on one OpenGL
+    driver (see `gl_info`). Poses are those of the last `mj_forward` or `mj_step` of the data. Close it, or use
+    it as a context manager.
+
+    Args:
+        model: Compiled model.
+        width: Of the frames, pixels.
+        height: Of the frames, pixels.
+        profile: `draft`, `fast`, `quality` or a profile of your own.
+        groups: Geom groups that are shown (docs/models.md).
+
+    Raises:
+        RenderError: No OpenGL context can be made, or the size or profile is unusable.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        *,
+        width: int = 640,
+        height: int = 480,
+        profile: str | RenderProfile = "fast",
+        groups: Collection[int] = FIRST_PERSON_GROUPS,
+    ) -> None:
+        self._model = model
+        self._profile = resolve_profile(profile)
+        self._stage = Stage(model, width, height, self._profile, groups)
+
+    @property
+    def width(self) -> int:
+        """Of the frames, pixels."""
+        return self._stage.size[0]
+
+    @property
+    def height(self) -> int:
+        """Of the frames, pixels."""
+        return self._stage.size[1]
+
+    @property
+    def profile(self) -> RenderProfile:
+        """Settings in use."""
+        return self._profile
+
+    def rgb(
+        self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
+    ) -> NDArray[np.uint8]:
+        """Colour image (height, width, 3), contiguous, rows from the top.
+
+        Args:
+            data: State of the renderer's model.
+            camera: A camera of the model, or a pose.
+            markers: World-locked objects to draw; the scene hides them as it would hide real ones.
+
+        Raises:
+            RenderError: Unknown camera, unusable marker, foreign data, or the renderer is closed.
+        """
+        with context.current_context():
+            view = self._look(data, camera)
+            return self._stage.colour(view, markers)
+
+    def depth(
+        self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
+    ) -> NDArray[np.float32]:
+        """Distance along the optical axis in m, (height, width), inf where nothing is.
+
+        Glass and markers (only those given here) count as solid.
+
+        Raises:
+            RenderError: As for `rgb`.
+        """
+        with context.current_context():
+            view = self._look(data, camera)
+            return view.metres(self._stage.geometry(view, markers)[1])
+
+    def segmentation(self, data: Any, camera: str | CameraPose = EYE) -> NDArray[np.int32]:
+        """Geom id per pixel, (height, width), -1 where nothing is; glass counts as solid.
+
+        Raises:
+            RenderError: As for `rgb`.
+        """
+        with context.current_context():
+            return self._stage.geometry(self._look(data, camera))[0]
+
+    def frame(
+        self,
+        data: Any,
+        camera: str | CameraPose = EYE,
+        markers: Sequence[MarkerLike] = (),
+        *,
+        rgb: bool = True,
+        depth: bool = False,
+        segmentation: bool = False,
+    ) -> Frame:
+        """Several images of the same moment: one scene update, one pass for depth and segmentation together.
+
+        Markers are drawn into the colour image only.
+
+        Raises:
+            RenderError: As for `rgb`.
+        """
+        pose = camera_pose(self._model, data, camera)
+        with context.current_context():
+            view = self._look(data, pose)
+            colour = self._stage.colour(view, markers) if rgb else None
+            ids, raw = self._stage.geometry(view) if depth or segmentation else (None, None)
+        metres = view.metres(raw) if depth and raw is not None else None
+        return Frame(pose, colour, metres, ids if segmentation else None)
+
+    def camera_view(self, data: Any, camera: str | CameraPose = EYE) -> CameraPose:
+        """Where a camera of the model is and how wide it sees.
+
+        Raises:
+            RenderError: Unknown camera.
+        """
+        return camera_pose(self._model, data, camera)
+
+    def _look(self, data: Any, camera: str | CameraPose) -> View:
+        self._stage.update(data)
+        return View.of(camera_pose(self._model, data, camera))
+
+    def close(self) -> None:
+        """Free the GL resources; again does nothing."""
+        self._stage.close()
+
+    def __enter__(self) -> "Renderer":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

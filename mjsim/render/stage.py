@@ -1,0 +1,240 @@
+"""The rasteriser: a model's GL resources, its scene, and the two kinds of pass drawn from it."""
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.errors import RenderError
+from mjsim.render import context
+from mjsim.render.cameras import View
+from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers
+from mjsim.render.profiles import RenderProfile
+from mjsim.render.xray import blend_hidden, screen_rectangle
+
+FIRST_PERSON_GROUPS = (0, 1, 2)
+TOP_DOWN_GROUPS = (0, 2)
+MAX_SIDE = 8192
+
+_Flag = mujoco.mjtRndFlag
+_BACKGROUND = -1
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """A light at infinity that replaces the model's lights.
+
+    Attributes:
+        direction: Where its rays travel, any length.
+        diffuse: Strength where it falls upright.
+        ambient: Strength everywhere.
+        shadow: Whether it casts shadows (if the profile draws any).
+        position: Centre of its shadow map, m.
+    """
+
+    direction: tuple[float, float, float]
+    diffuse: float
+    ambient: float = 0.0
+    shadow: bool = False
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Stage:
+    """GL resources of one model. Update and draw under one `current_context` where threads share it."""
+
+    def __init__(
+        self,
+        model: Any,
+        width: int,
+        height: int,
+        profile: RenderProfile,
+        groups: Collection[int] = FIRST_PERSON_GROUPS,
+        lights: Sequence[DirectionalLight] | None = None,
+    ) -> None:
+        self._size = checked_size(width), checked_size(height)
+        self._profile = profile
+        self._lights = lights
+        scale = profile.supersampling
+        self._drawn = checked_size(round(width * scale)), checked_size(round(height * scale))
+        self._option = _visual_option(groups, profile)
+        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + MAX_MARKERS)
+        self._xray_scene = mujoco.MjvScene(model, maxgeom=MAX_MARKERS)
+        self._xray_scene.flags[:] = 0
+        self._camera = mujoco.MjvCamera()
+        self._model = model
+        self._colour = np.empty((self._drawn[1], self._drawn[0], 3), np.uint8)
+        self._ids = np.empty((height, width, 3), np.uint8)
+        self._depth = np.empty((height, width), np.float32)
+        with context.current_context(), _buffer_settings(model, self._drawn, profile):
+            self._gl = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
+            self._gl.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        self._key: int | None = context.own(self._gl)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the frames, pixels."""
+        return self._size
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._key is None
+
+    def close(self) -> None:
+        """Free the GL resources; again does nothing."""
+        if self._key is not None:
+            context.release(self._key)
+            self._key = None
+
+    def update(self, data: Any) -> None:
+        """Take the geoms' poses and colours from `data`.
+
+        Raises:
+            RenderError: The stage is closed, or `data` belongs to another model.
+        """
+        if self.closed:
+            raise RenderError("the renderer is closed; make a new one")
+        if len(data.geom_xpos) != self._model.ngeom or len(data.qpos) != self._model.nq:
+            raise RenderError(
+                f"data has {len(data.geom_xpos)} geoms and {len(data.qpos)} coordinates, the renderer's model "
+                f"{self._model.ngeom} and {self._model.nq}; make a renderer for the model of this data"
+            )
+        category = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(self._model, data, self._option, None, self._camera, category, self._scene)
+        if self._lights is not None:
+            _set_lights(self._scene, self._lights)
+
+    def colour(self, view: View, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
+        """Frame (height, width, 3) of the scene as last updated, rows from the top."""
+        scene, model_geoms = self._scene, self._scene.ngeom
+        _set_flags(scene, self._profile)
+        view.aim(scene)
+        try:
+            add_markers(scene, markers)
+            with context.current_context():
+                rectangle = self._draw(scene, self._drawn, self._colour, None)
+                self._add_x_ray(view, [m for m in markers if m.x_ray], rectangle)
+        finally:
+            scene.ngeom = model_geoms
+        frame = cv2.flip(self._colour, 0)
+        if self._drawn != self._size:
+            frame = cv2.resize(frame, self._size, interpolation=cv2.INTER_AREA)
+        return np.asarray(frame, dtype=np.uint8)
+
+    def geometry(
+        self, view: View, markers: Sequence[MarkerLike] = ()
+    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Geom ids (height, width), -1 for background and markers, and raw reversed depth of one pass."""
+        scene, model_geoms = self._scene, self._scene.ngeom
+        scene.flags[:] = 0
+        scene.flags[[_Flag.mjRND_SEGMENT, _Flag.mjRND_IDCOLOR, _Flag.mjRND_CULL_FACE]] = 1
+        view.aim(scene)
+        try:
+            add_markers(scene, markers)
+            table = np.full(scene.ngeom + 1, _BACKGROUND, dtype=np.int32)
+            for index, geom in enumerate(scene.geoms[: scene.ngeom]):
+                # Ids are drawn as colours; a marker needs one as well, or it would not be drawn at all.
+                geom.segid = index
+                if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and index < model_geoms:
+                    table[index + 1] = geom.objid
+            with context.current_context():
+                self._draw(scene, self._size, self._ids, self._depth)
+        finally:
+            scene.ngeom = model_geoms
+        packed = cv2.flip(self._ids, 0).astype(np.int32)
+        ids = table[packed[..., 0] | packed[..., 1] << 8 | packed[..., 2] << 16]
+        return ids, np.asarray(cv2.flip(self._depth, 0), dtype=np.float32)
+
+    def _draw(
+        self,
+        scene: Any,
+        size: tuple[int, int],
+        colour: NDArray[np.uint8] | None,
+        depth: NDArray[np.float32] | None,
+    ) -> Any:
+        rectangle = mujoco.MjrRect(0, 0, *size)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._gl)
+        mujoco.mjr_render(rectangle, scene, self._gl)
+        mujoco.mjr_readPixels(colour, depth, rectangle, self._gl)
+        return rectangle
+
+    def _add_x_ray(self, view: View, markers: Sequence[MarkerLike], full: Any) -> None:
+        """Blend the hidden parts of see-through markers into the colour buffer (rows from the bottom)."""
+        box = screen_rectangle(view, markers, self._drawn)
+        if box is None:
+            return
+        left, bottom, width, height = box
+        part = mujoco.MjrRect(*box)
+        behind, before = np.empty((2, height, width), np.float32)
+        mujoco.mjr_readPixels(None, before, part, self._gl)
+        scene = self._xray_scene
+        scene.ngeom = 0
+        add_markers(scene, markers, flat=True)
+        view.aim(scene)
+        mujoco.mjr_render(full, scene, self._gl)
+        colour = np.empty((height, width, 3), np.uint8)
+        mujoco.mjr_readPixels(colour, behind, part, self._gl)
+        target = self._colour[bottom : bottom + height, left : left + width]
+        blend_hidden(target, colour, before, behind)
+
+
+def checked_size(pixels: int) -> int:
+    """The number itself.
+
+    Raises:
+        RenderError: It is no integer from 1 to `MAX_SIDE`.
+    """
+    if not isinstance(pixels, int | np.integer) or not 1 <= pixels <= MAX_SIDE:
+        raise RenderError(f"frame sides must be integers from 1 to {MAX_SIDE} pixels, got {pixels!r}")
+    return int(pixels)
+
+
+def _visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
+    option = mujoco.MjvOption()
+    option.flags[:] = 0
+    shown = [mujoco.mjtVisFlag.mjVIS_STATIC, mujoco.mjtVisFlag.mjVIS_SKIN]
+    if profile.textures:
+        shown.append(mujoco.mjtVisFlag.mjVIS_TEXTURE)
+    option.flags[shown] = 1
+    option.geomgroup[:] = [group in groups for group in range(len(option.geomgroup))]
+    option.sitegroup[:] = 0
+    return option
+
+
+@contextmanager
+def _buffer_settings(model: Any, size: tuple[int, int], profile: RenderProfile) -> Iterator[None]:
+    """Lend the model the profile's buffer sizes, which a MuJoCo context only reads from its model."""
+    general, quality = model.vis.global_, model.vis.quality
+    kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
+    general.offwidth, general.offheight = size
+    quality.offsamples, quality.shadowsize = profile.samples, profile.shadow_size
+    try:
+        yield
+    finally:
+        general.offwidth, general.offheight, quality.offsamples, quality.shadowsize = kept
+
+
+def _set_flags(scene: Any, profile: RenderProfile) -> None:
+    scene.flags[:] = 0
+    scene.flags[_Flag.mjRND_CULL_FACE] = 1
+    scene.flags[_Flag.mjRND_SHADOW] = profile.shadow_size > 0
+    scene.flags[_Flag.mjRND_REFLECTION] = profile.reflections
+    scene.flags[_Flag.mjRND_SKYBOX] = profile.skybox
+
+
+def _set_lights(scene: Any, lights: Sequence[DirectionalLight]) -> None:
+    scene.nlight = len(lights)
+    for target, light in zip(scene.lights, lights, strict=False):
+        direction = np.array(light.direction, dtype=np.float64)
+        target.headlight = 0
+        target.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        target.pos, target.dir = light.position, direction / np.linalg.norm(direction)
+        target.attenuation = (1.0, 0.0, 0.0)
+        target.ambient, target.diffuse = (light.ambient,) * 3, (light.diffuse,) * 3
+        target.specular = (0.0,) * 3
+        target.castshadow = int(light.shadow)
