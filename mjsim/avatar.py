@@ -41,7 +41,10 @@ EYE_FORWARD = 0.06
 FIELD_OF_VIEW = 70.0  # vertical, degrees
 START_PITCH = math.radians(-12.0)
 PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
-CARRY = (0.46, 0.27, 1.20)  # hand in the body frame: forward, to its own side, up; m
+# Postures of a hand in the body frame: forward, to its own side, up; m.
+REST = (0.34, 0.27, 1.00)
+CARRY = (0.48, 0.24, 1.22)
+ASIDE = (0.30, 0.42, 1.26)
 HAND_KP = 2000.0
 HAND_KV = 130.0
 HAND_FORCE = 80.0
@@ -67,10 +70,10 @@ def grip_name(hand: str, instance: str, grip: int) -> str:
     return f"{PREFIX}{hand}/holds/{instance}/{grip}"
 
 
-def hand_start(hand: str) -> tuple[float, float, float]:
-    """Carrying position of a hand in the body frame, m."""
-    forward, side, up = CARRY
-    return (forward, side if hand == "left" else -side, up)
+def posture(hand: int, place: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A posture such as `CARRY` for hand 0 (left) or 1 (right): x, y, z in the body frame, m."""
+    forward, side, up = place
+    return (forward, side if hand == 0 else -side, up)
 
 
 def attach_avatar(
@@ -89,8 +92,8 @@ def attach_avatar(
     _set_object_bits(spec, object_names)
     body = _add_body(spec, start)
     _add_head(spec, body)
-    for hand in HANDS:
-        _add_hand(spec, body, hand)
+    for number, hand in enumerate(HANDS):
+        _add_hand(spec, body, hand, posture(number, REST))
     _declare_welds(spec, object_names)
 
 
@@ -140,7 +143,7 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
     cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
     body.add_geom(
         name=TRUNK, type=cylinder, size=[TRUNK_RADIUS, 0.84, 0], pos=[0, 0, 0.88], group=4, contype=0,
-        conaffinity=STATIC_BIT, condim=1, priority=2, solref=[0.02, 1], rgba=[0.4, 0.5, 0.6, 1], mass=0,
+        conaffinity=STATIC_BIT, condim=1, priority=2, solref=[0.008, 1], rgba=[0.4, 0.5, 0.6, 1], mass=0,
     )  # fmt: skip
     # Soft, and lower than any carried object: light things are pushed along the floor, never launched.
     body.add_geom(
@@ -183,9 +186,8 @@ def _add_head(spec: mujoco.MjSpec, body: Any) -> None:
     head.add_camera(name=EYE, pos=[EYE_FORWARD, 0, 0], quat=[0.5, 0.5, -0.5, -0.5], fovy=FIELD_OF_VIEW)
 
 
-def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str) -> None:
-    side = 1.0 if hand == "left" else -1.0
-    position = hand_start(hand)
+def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, float, float]) -> None:
+    side = math.copysign(1.0, position[1])
     node = body.add_body(name=f"{PREFIX}{hand}_hand", pos=list(position))
     node.gravcomp = 1.0
     _set_inertia(node, 1.0, (0.002, 0.002, 0.002))

@@ -1,0 +1,83 @@
+"""Hands hold objects by welds between a hand's site and a grip site of the object."""
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim import avatar
+from mjsim.errors import AssetError
+from mjsim.rig import Rig
+from mjsim.scene import Scene
+
+
+class Grips:
+    """Closes, opens and watches the welds of the pool that `avatar.attach_avatar` declared."""
+
+    def __init__(self, scene: Scene, data: mujoco.MjData, rig: Rig) -> None:
+        self._data = data
+        self._hand_sites = rig.grip_sites
+        names = scene.index.names
+        self._sites = np.array(
+            [
+                [_id(scene.model, mujoco.mjtObj.mjOBJ_SITE, f"{n}/grip_{k}") for k in avatar.GRIPS]
+                for n in names
+            ],
+            np.intp,
+        )
+        self._welds = np.array(
+            [
+                [
+                    [
+                        _id(scene.model, mujoco.mjtObj.mjOBJ_EQUALITY, avatar.grip_name(h, n, k))
+                        for k in avatar.GRIPS
+                    ]
+                    for n in names
+                ]
+                for h in avatar.HANDS
+            ],
+            np.intp,
+        )
+        self._closed: list[tuple[int, int] | None] = [None, None]
+
+    def nearest_grip(self, hand: int, item: int) -> int:
+        """Grip of object `item` that has to be turned least to align with a hand: 0 or 1."""
+        forward = self._data.site_xmat[self._hand_sites[hand], 0::3]
+        agreement = [float(self._data.site_xmat[site, 0::3] @ forward) for site in self._sites[item]]
+        return int(np.argmax(agreement))
+
+    def point(self, item: int, grip: int) -> NDArray[np.float64]:
+        """Position of a grip site, m, shape (3,)."""
+        return np.array(self._data.site_xpos[self._sites[item, grip]])
+
+    def gap(self, hand: int, item: int, grip: int) -> float:
+        """Distance between a hand and a grip site, m."""
+        hand_point = self._data.site_xpos[self._hand_sites[hand]]
+        return float(np.linalg.norm(hand_point - self._data.site_xpos[self._sites[item, grip]]))
+
+    def close(self, hand: int, item: int, grip: int) -> None:
+        """Weld object `item` to a hand; a sleeping object wakes."""
+        self._data.eq_active[self._welds[hand, item, grip]] = 1
+        self._closed[hand] = (item, grip)
+
+    def open(self, hand: int) -> None:
+        """Let go of what a hand holds, if anything."""
+        closed = self._closed[hand]
+        if closed is not None:
+            self._data.eq_active[self._welds[hand, closed[0], closed[1]]] = 0
+            self._closed[hand] = None
+
+    def error(self, hand: int) -> float:
+        """How far the weld of a hand is stretched, m; 0 when it holds nothing."""
+        closed = self._closed[hand]
+        return 0.0 if closed is None else self.gap(hand, *closed)
+
+    def reset(self) -> None:
+        """Forget what was held; the state's welds are reset with the state."""
+        self._closed = [None, None]
+
+
+def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    found = int(mujoco.mj_name2id(model, kind, name))
+    if found < 0:
+        raise AssetError(f"the model has no {kind.name} {name!r}; compose the scene with avatar=True")
+    return found

@@ -1,0 +1,53 @@
+"""Rules of the world that a study may change."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+from mjsim.errors import ActionError
+
+
+@dataclass(frozen=True)
+class WorldOptions:
+    """Limits of walking, reach and grip.
+
+    Attributes:
+        control_timestep: Duration of one `World.step`, s; a multiple of the model's timestep.
+        max_speed: Fastest walk, m/s.
+        max_turn: Fastest turn of the body, rad/s.
+        max_look: Fastest pitch of the head, rad/s.
+        acceleration: How fast the walking velocity changes, m/s^2.
+        turn_acceleration: How fast the turning rate changes, rad/s^2.
+        pick_reach: Farthest an object's centre may be from the body axis, horizontally, m.
+        place_reach: Farthest a receptacle's volume may be from the body axis, horizontally, m.
+        grip_distance: A hand grips only within this distance of the grip site, m.
+        grip_error: A weld stretched farther than this slips, m.
+        grip_patience: For how long it may stay stretched, s.
+        settle_time: How long a released object may take to come to rest, s.
+        settle_speed: Slower than this is at rest, m/s.
+        volume_margin: How far outside of a receptacle's volume a centre still counts as inside, m.
+
+    Raises:
+        ActionError: A value is not a positive finite number.
+    """
+
+    control_timestep: float = 0.04
+    max_speed: float = 1.4
+    max_turn: float = 2.5
+    max_look: float = 1.5
+    acceleration: float = 3.0
+    turn_acceleration: float = 15.0
+    pick_reach: float = 1.0
+    place_reach: float = 1.0
+    grip_distance: float = 0.08
+    grip_error: float = 0.009
+    grip_patience: float = 0.1
+    settle_time: float = 2.5
+    settle_speed: float = 0.05
+    volume_margin: float = 0.005
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value > 0):
+                raise ActionError(f"WorldOptions.{field.name} must be a positive number, got {value!r}")

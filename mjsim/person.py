@@ -1,0 +1,156 @@
+"""What every motion of the person uses: scene, state, servos, grips and simple body movements."""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim import avatar
+from mjsim.actions import Move
+from mjsim.grips import Grips
+from mjsim.health import HealthMonitor
+from mjsim.options import WorldOptions
+from mjsim.rig import Rig
+from mjsim.scene import Scene
+
+# A motion sets the servos, yields once per control step, and returns whether it succeeded.
+Motion = Generator[None, None, bool]
+Steps = Generator[None, None, None]
+
+_TURN_GAIN = 6.0  # 1/s
+_FACE_TIMEOUT = 3.0  # s
+_POSTURE_GAIN = 7.0  # 1/s
+_POSTURE_SPEED = 1.0  # m/s
+
+
+@dataclass(eq=False)
+class Person:
+    """The body of the person in one running world.
+
+    Attributes:
+        held: Index of the object in the left and the right hand, or None.
+    """
+
+    scene: Scene
+    options: WorldOptions
+    data: mujoco.MjData
+    rig: Rig
+    grips: Grips
+    monitor: HealthMonitor
+    held: list[int | None] = field(default_factory=lambda: [None, None])
+
+    @property
+    def dt(self) -> float:
+        """Control step, s."""
+        return self.options.control_timestep
+
+    def steps(self, seconds: float) -> int:
+        """Control steps in a duration, at least 1."""
+        return max(1, round(seconds / self.dt))
+
+    def carried_bodies(self) -> frozenset[int]:
+        """Body ids of the objects in the hands."""
+        return frozenset(int(self.scene.index.bodies[item]) for item in self.held if item is not None)
+
+    def move_hand(self, hand: int, goal: NDArray[np.float64]) -> None:
+        """Move a hand's target towards a position (3,) in the body frame, slower as it comes near."""
+        targets = self.rig.hand_targets
+        offset = goal - targets[hand]
+        distance = float(np.linalg.norm(offset))
+        if distance > 0.0005:
+            step = min(_POSTURE_GAIN * distance, _POSTURE_SPEED) * self.dt
+            targets[hand] += offset * (step / distance)
+
+    def retire(self, hand: int) -> None:
+        """Move an empty hand towards its rest."""
+        self.move_hand(hand, np.array(avatar.posture(hand, avatar.REST)))
+
+    def center(self, item: int) -> NDArray[np.float64]:
+        """Centre of mass of object `item`, m, shape (3,)."""
+        return np.array(self.data.xipos[self.scene.index.bodies[item]])
+
+    def speed(self, item: int) -> float:
+        """Linear speed of object `item`, m/s."""
+        dof = self.scene.index.dofs[item]
+        return float(np.linalg.norm(self.data.qvel[dof : dof + 3]))
+
+    def asleep(self, item: int) -> bool:
+        """Whether the engine has put object `item` to sleep."""
+        return not self.data.tree_awake[self.scene.index.trees[item]]
+
+    def walk(self, move: Move) -> None:
+        """Slew the body's velocity and the head towards what is asked, within the limits."""
+        o, rig = self.options, self.rig
+        wanted = np.array([move.forward, move.left])
+        speed = float(np.linalg.norm(wanted))
+        if speed > o.max_speed:
+            wanted *= o.max_speed / speed
+        change = wanted - rig.velocity
+        size = float(np.linalg.norm(change))
+        allowed = o.acceleration * self.dt
+        rig.velocity = wanted if size <= allowed else rig.velocity + change * (allowed / size)
+        self.turn_at(move.turn)
+        look = _clip(move.look, o.max_look)
+        if look:
+            rig.look_at_pitch(rig.pitch_target + look * self.dt)
+
+    def turn_at(self, rate: float) -> None:
+        """Slew the yaw rate towards `rate`, rad/s."""
+        o, rig = self.options, self.rig
+        change = _clip(rate, o.max_turn) - rig.turn
+        rig.turn += _clip(change, o.turn_acceleration * self.dt)
+
+    def brake(self) -> None:
+        """Slew the walk to a stand; turning and looking are left to the motion."""
+        o, rig = self.options, self.rig
+        size = float(np.linalg.norm(rig.velocity))
+        rig.velocity = rig.velocity * (max(0.0, size - o.acceleration * self.dt) / size if size else 0.0)
+
+    def turn_towards(self, error: float) -> None:
+        """Slew the yaw rate so that a heading error, rad, decays without overshoot."""
+        self.turn_at(_TURN_GAIN * error)
+
+    def glance(self, point: NDArray[np.float64]) -> None:
+        """Move the head's pitch towards a point of the house frame."""
+        offset = point - self.rig.eye
+        wanted = math.atan2(offset[2], float(np.hypot(offset[0], offset[1])))
+        self.look_towards(wanted)
+
+    def look_towards(self, pitch: float) -> None:
+        """Move the head's pitch towards an angle, rad, at the pace of a glance."""
+        rig = self.rig
+        rig.look_at_pitch(rig.pitch_target + _clip(0.25 * (pitch - rig.pitch_target), 2.0 * self.dt))
+
+    def face(
+        self, point: NDArray[np.float64], heading: float | None = None, tolerance: float = 0.35
+    ) -> Steps:
+        """Stand still and turn to a point, or to an exact heading while glancing at the point."""
+        for _ in range(self.steps(_FACE_TIMEOUT)):
+            error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
+            standing = float(np.linalg.norm(self.rig.planar_velocity)) < 0.1
+            if abs(error) < tolerance and standing and abs(self.rig.turn_rate) < 0.5:
+                break
+            self.brake()
+            self.turn_towards(error if abs(error) > 0.5 * tolerance else 0.0)
+            self.glance(point)
+            yield
+        self.rig.velocity = np.zeros(2)
+        self.rig.turn = 0.0
+
+
+def wrap(angle: float) -> float:
+    """An angle in [-pi, pi), rad."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def minimum_jerk(phase: float) -> float:
+    """Progress 0..1 of the smoothest point-to-point movement at a phase (Flash and Hogan, 1985), clamped."""
+    s = min(1.0, max(0.0, phase))
+    return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+
+
+def _clip(value: float, limit: float) -> float:
+    return min(limit, max(-limit, value))

@@ -1,0 +1,81 @@
+"""Picking as a motion: stand, turn, reach, weld, lift into the carrying posture."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim import avatar
+from mjsim.person import Motion, Person, Steps, minimum_jerk
+
+_REACH_TIME = 0.44
+_APPROACH_TIME = 0.4  # longest wait for the hand to arrive after the reach
+_ALIGN_TIME = 0.12
+_LIFT_TIME = 0.48
+_SHIFT = 0.2  # share of a movement by which one of its two parts leads the other
+_CLOSE_ENOUGH = 0.012
+
+
+def pick(person: Person, hand: int, item: int) -> Motion:
+    """Reach for object `item` and lift it.
+
+    Returns:
+        Whether the hand holds the object in the carrying posture. If not, the hand is open.
+    """
+    rig, grips = person.rig, person.grips
+    pitch = rig.pitch_target
+    yield from person.face(person.center(item))
+    grip = grips.nearest_grip(hand, item)
+    yield from _reach(person, hand, item, grip)
+    for _ in range(person.steps(_APPROACH_TIME)):
+        if grips.gap(hand, item, grip) < _CLOSE_ENOUGH:
+            break
+        rig.hand_targets[hand] = rig.to_body(grips.point(item, grip))
+        yield
+    if grips.gap(hand, item, grip) > person.options.grip_distance:
+        return False
+    grips.close(hand, item, grip)
+    yield from _lift(person, hand, pitch)
+    if grips.error(hand) > person.options.grip_error:
+        grips.open(hand)
+        return False
+    return True
+
+
+def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
+    """Over the object first, then down to it; the goal is followed while it moves."""
+    rig = person.rig
+    start = rig.hand_targets[hand].copy()
+    count = person.steps(_REACH_TIME)
+    for k in range(1, count + 1):
+        goal = rig.to_body(person.grips.point(item, grip))
+        rig.hand_targets[hand] = lead_blend(start, goal, k / count, leading="across")
+        person.glance(person.center(item))
+        yield
+
+
+def _lift(person: Person, hand: int, pitch: float) -> Steps:
+    """Straight up first, so that nothing low is brushed, then back to the body."""
+    rig = person.rig
+    start = rig.hand_targets[hand].copy()
+    goal = np.array(avatar.posture(hand, avatar.CARRY))
+    for _ in range(person.steps(_ALIGN_TIME)):
+        yield
+    count = person.steps(_LIFT_TIME)
+    for k in range(1, count + 1):
+        rig.hand_targets[hand] = lead_blend(start, goal, k / count, leading="up")
+        person.look_towards(pitch)
+        yield
+    for _ in range(person.steps(0.2)):
+        if person.grips.error(hand) < 0.5 * person.options.grip_error:
+            break
+        yield
+
+
+def lead_blend(
+    start: NDArray[np.float64], goal: NDArray[np.float64], phase: float, *, leading: str
+) -> NDArray[np.float64]:
+    """A point between two positions (3,) where height leads (`up`) or follows (`across`) the horizontal."""
+    early = minimum_jerk(phase / (1.0 - _SHIFT))
+    late = minimum_jerk((phase - _SHIFT) / (1.0 - _SHIFT))
+    across, up = (late, early) if leading == "up" else (early, late)
+    share = np.array([across, across, up])
+    return start + share * (goal - start)

@@ -1,0 +1,62 @@
+"""Lines of sight and probing rays against the compiled model."""
+
+from collections.abc import Collection
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+# Structure and furniture (0), ceilings (1), collision guards (3); not decoration (2) and not the person (4).
+_SOLID = np.array([1, 1, 0, 1, 0, 0], np.uint8)
+_MAX_SKIPS = 32
+
+
+def first_hit(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    start: ArrayLike,
+    direction: ArrayLike,
+    *,
+    ignore: Collection[int] = (),
+    static_only: bool = False,
+) -> tuple[float, int]:
+    """Nearest solid geom along a ray.
+
+    Args:
+        model: Compiled scene.
+        data: State; positions are those of the last physics step.
+        start: Start (3,), m.
+        direction: Direction (3,); distances are in units of its length.
+        ignore: Body ids that the ray passes through.
+        static_only: Whether it passes through everything that can move.
+
+    Returns:
+        Distance and geom id; infinity and -1 when nothing is hit.
+    """
+    origin = np.array(start, np.float64)
+    along = np.array(direction, np.float64)
+    geom = np.zeros(1, np.int32)
+    travelled = 0.0
+    for _ in range(_MAX_SKIPS):
+        distance = mujoco.mj_ray(model, data, origin + travelled * along, along, _SOLID, 1, -1, geom)
+        if distance < 0:
+            break
+        travelled += distance
+        body = int(model.geom_bodyid[geom[0]])
+        if body not in ignore and not (static_only and model.body_weldid[body] != 0):
+            return travelled, int(geom[0])
+        travelled += 1e-6
+    return float("inf"), -1
+
+
+def sees(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    eye: NDArray[np.float64],
+    point: NDArray[np.float64],
+    *,
+    through: Collection[int] = (),
+) -> bool:
+    """Whether nothing static, but the bodies in `through`, lies between two points (3,), m."""
+    distance, _ = first_hit(model, data, eye, point - eye, ignore=through, static_only=True)
+    return distance >= 1.0
