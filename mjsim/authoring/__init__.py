@@ -1,0 +1,1 @@
+"""Scripts that author the data under ``models/``; nothing here runs with the simulator."""

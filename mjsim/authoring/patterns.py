@@ -1,0 +1,126 @@
+"""Building blocks of the procedural textures: periodic noise, colour ramps, tilings and painted shapes.
+
+Images are floats in [0, 1], shape (height, width) or (height, width, 3) in RGB order, unless said otherwise.
+"""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Colour = tuple[float, float, float]
+
+
+def rgb(code: str) -> Colour:
+    """Return the colour of a hexadecimal code such as ``"c8a06e"`` as three floats in [0, 1]."""
+    red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
+    return red, green, blue
+
+
+def noise(
+    rng: np.random.Generator, shape: tuple[int, int], *, roll_off: float = 1.0, stretch: float = 1.0
+) -> Floats:
+    """Periodic noise whose amplitude falls with spatial frequency f as 1 / f**`roll_off`.
+
+    Args:
+        rng: source of randomness.
+        shape: height and width in pixels.
+        roll_off: 0 is white noise; 2 is smooth as clouds.
+        stretch: features are this many times longer horizontally than vertically.
+
+    Returns:
+        (height, width) of zero mean and unit standard deviation.
+    """
+    spectrum = np.fft.fft2(rng.standard_normal(shape))
+    vertical = np.fft.fftfreq(shape[0])[:, None]
+    horizontal = np.fft.fftfreq(shape[1])[None, :] * stretch
+    frequency = np.hypot(vertical, horizontal)
+    frequency[0, 0] = np.inf
+    field = np.fft.ifft2(spectrum / frequency**roll_off).real
+    return np.asarray(field / field.std(), dtype=np.float64)
+
+
+def grid(shape: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Return x (rightwards) and y (downwards) of the pixel centres, each (height, width), in [0, 1]."""
+    y, x = np.mgrid[0 : shape[0], 0 : shape[1]]
+    return (x + 0.5) / shape[1], (y + 0.5) / shape[0]
+
+
+def smooth_step(value: Floats, low: float, high: float) -> Floats:
+    """Go smoothly from 0 at `low` to 1 at `high`."""
+    t = np.clip((value - low) / (high - low), 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t), dtype=np.float64)
+
+
+def ramp(value: Floats, stops: Sequence[tuple[float, Colour]]) -> Floats:
+    """Map (height, width) values to (height, width, 3) colours through linearly interpolated `stops`."""
+    positions = [stop for stop, _ in stops]
+    channels = [np.interp(value, positions, [colour[i] for _, colour in stops]) for i in range(3)]
+    return np.stack(channels, axis=-1)
+
+
+def flat(shape: tuple[int, int], colour: Colour) -> Floats:
+    """Return an image of a single colour."""
+    return np.broadcast_to(np.asarray(colour), (*shape, 3)).copy()
+
+
+def blend(image: Floats, colour: Colour, mask: Floats) -> Floats:
+    """Paint `colour` over an RGB `image` where the (height, width) `mask` is 1."""
+    weight = np.clip(mask, 0.0, 1.0)[..., None]
+    return np.asarray(image * (1.0 - weight) + np.asarray(colour) * weight, dtype=np.float64)
+
+
+def shape_mask(shape: tuple[int, int], outline: Sequence[tuple[float, float]]) -> Floats:
+    """Return the antialiased mask of a polygon given in fractions of the image's width and height."""
+    scale = np.array([shape[1], shape[0]]) * 16.0
+    points = np.round(np.asarray(outline) * scale).astype(np.int32)
+    mask = np.zeros(shape, np.uint8)
+    cv2.fillPoly(mask, [points], 255, cv2.LINE_AA, 4)
+    return mask / 255.0
+
+
+def disc_mask(shape: tuple[int, int], centre: tuple[float, float], radius: float) -> Floats:
+    """Return the antialiased mask of a disc; all lengths in fractions of the image's height."""
+    x, y = grid(shape)
+    distance = np.hypot((x - centre[0]) * shape[1] / shape[0], y - centre[1])
+    return 1.0 - smooth_step(distance, radius - 0.75 / shape[0], radius + 0.75 / shape[0])
+
+
+def joints(shape: tuple[int, int], rows: int, columns: int, width: float, offset: float = 0.0) -> Floats:
+    """Mask of the joints of a tiling.
+
+    Args:
+        shape: height and width in pixels.
+        rows: tiles from top to bottom.
+        columns: tiles from left to right.
+        width: joint width in pixels.
+        offset: how far every second row is shifted, in tiles (0.5 for a running bond).
+
+    Returns:
+        (height, width), 1 in the joints.
+    """
+    x, y = grid(shape)
+    row = np.floor(y * rows)
+    u = (x * columns + offset * (row % 2)) % 1.0
+    v = (y * rows) % 1.0
+    across = np.minimum(u, 1.0 - u) * shape[1] / columns
+    down = np.minimum(v, 1.0 - v) * shape[0] / rows
+    return 1.0 - smooth_step(np.minimum(across, down), width / 2.0 - 0.5, width / 2.0 + 0.5)
+
+
+def tile_tones(
+    rng: np.random.Generator, shape: tuple[int, int], rows: int, columns: int, offset: float = 0.0
+) -> Floats:
+    """Return one random value in [-1, 1] per tile of the tiling of :func:`joints`, as (height, width)."""
+    tones = rng.uniform(-1.0, 1.0, (rows, columns))
+    x, y = grid(shape)
+    row = np.floor(y * rows).astype(int)
+    column = np.floor(x * columns + offset * (row % 2)).astype(int) % columns
+    return np.asarray(tones[row, column], dtype=np.float64)
+
+
+def to_bytes(image: Floats) -> NDArray[np.uint8]:
+    """Round an image in [0, 1] to 8 bits."""
+    return np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)
