@@ -31,7 +31,7 @@ def object_textures() -> dict[str, Picture]:
 
 def receptacle_textures() -> dict[str, Picture]:
     """Texture name -> RGB picture."""
-    return {"wicker": _wicker()}
+    return {"wicker": _wicker(), "toys_sign": _toys_sign(), "office_sign": _office_sign()}
 
 
 def _blank(colour: Colour) -> Picture:
@@ -208,4 +208,24 @@ def _wicker() -> Picture:
     horizontal = 0.62 + 0.38 * np.outer(strand, bulge)
     vertical = 0.62 + 0.38 * np.outer(bulge, strand)
     shade = np.where(across, horizontal, vertical)
-    return np.clip(shade[..., None] * np.array([226, 182, 118]), 0, 255).astype(np.uint8)
+    picture: Picture = np.clip(shade[..., None] * np.array([226, 182, 118]), 0, 255).astype(np.uint8)
+    return picture
+
+
+def _toys_sign() -> Picture:
+    p = _blank((255, 250, 235))
+    for letter, x, colour in (
+        ("T", 22, (225, 40, 40)),
+        ("O", 52, (30, 110, 220)),
+        ("Y", 80, (40, 160, 60)),
+        ("S", 107, (240, 140, 20)),
+    ):
+        _write(p, letter, x, 92, 1.9, colour, 7)
+    return cv2.resize(p[20:108], (SIDE, SIDE // 2), interpolation=cv2.INTER_AREA).astype(np.uint8)
+
+
+def _office_sign() -> Picture:
+    p = _blank((250, 248, 240))
+    _write(p, "OFFICE", 64, 62, 1.05, (30, 50, 70), 3)
+    _write(p, "SUPPLIES", 64, 98, 0.78, (30, 50, 70), 2)
+    return cv2.resize(p[24:112], (SIDE, SIDE // 2), interpolation=cv2.INTER_AREA).astype(np.uint8)

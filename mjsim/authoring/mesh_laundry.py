@@ -11,11 +11,11 @@ from mjsim.authoring.mesh_tools import Floats, Surface, arc, cushion, extrude, f
 
 def meshes() -> dict[str, Surface]:
     """Mesh name -> surface."""
-    return {**_socks(), **_t_shirt(), "towel": _towel(), "shorts": _shorts(), **_cap()}
+    return {**_socks(), **_t_shirt(), "towel": _towel(), "jeans": _jeans(), **_cap()}
 
 
 def _socks() -> dict[str, Surface]:
-    """Two socks on top of each other, askew; leg along y."""
+    """Two socks side by side, one half on the other; legs along y."""
     leg = Polygon([(-0.028, -0.02), (-0.028, 0.11), (0.028, 0.11), (0.028, -0.05), (0.0, -0.085)])
     foot = Polygon(
         [(-0.028, -0.02), (0.0, -0.085), (0.028, -0.05), (-0.03, 0.0), (-0.1, -0.03), (-0.1, -0.085)]
@@ -28,7 +28,7 @@ def _socks() -> dict[str, Surface]:
         box(-0.2, 0.015, 0.2, 0.03),
         box(-0.3, -0.2, -0.085, 0.2),
     ]
-    knit = cushion(sock, 0.026, 0.008)
+    knit = cushion(sock, 0.026, 0.006)
     trim = join(
         [
             extrude(sock.intersection(b).buffer(0.0006, join_style="mitre"), 0.022).moved((0, 0, 0.0045))
@@ -37,7 +37,7 @@ def _socks() -> dict[str, Surface]:
     )
 
     def pair(part: Surface) -> Surface:
-        return join([part.moved((0.03, 0, 0)), part.turned(0.35).moved((0.045, -0.01, 0.024))])
+        return join([part.moved((0.0, -0.005, 0)), part.turned(0.12).moved((0.078, -0.022, 0.02))])
 
     return {"socks_knit": pair(knit), "socks_trim": pair(trim)}
 
@@ -47,9 +47,12 @@ def _t_shirt() -> dict[str, Surface]:
     half = [(0.04, 0.125), (0.085, 0.112), (0.152, 0.035), (0.112, 0.0), (0.068, 0.052), (0.074, -0.13)]
     outline = Polygon([*half, *((-x, y) for x, y in reversed(half))])
     shirt = outline.difference(affinity.scale(Point(0, 0.122).buffer(0.036, quad_segs=4), 1.0, 0.7))
-    shirt = shirt.buffer(-0.006, quad_segs=2).buffer(0.006, quad_segs=2)
-    neck = np.column_stack([arc(0.04, math.pi, 2 * math.pi, 9, 0.7) + [0, 0.122], np.full(9, 0.02)])
-    collar = sheet(np.stack([neck + [0, 0.003, 0.004], neck * [1.2, 1, 1] + [0, -0.011, 0.004]], axis=1))
+    neck = np.column_stack([arc(0.04, math.pi, 2 * math.pi, 9, 0.7) + np.array([0, 0.122]), np.full(9, 0.02)])
+    collar = sheet(
+        np.stack(
+            [neck + np.array([0, 0.003, 0.004]), neck * [1.2, 1, 1] + np.array([0, -0.011, 0.004])], axis=1
+        )
+    )
     spikes = [((0.045, 0.02)[k % 2], math.pi * (0.5 + k / 5)) for k in range(10)]
     star = Polygon([(r * math.cos(a), r * math.sin(a) - 0.03) for r, a in spikes])
     hems = [
@@ -57,7 +60,7 @@ def _t_shirt() -> dict[str, Surface]:
     ]
     trim = [extrude(hem, 0.024) for hem in hems]
     return {
-        "t_shirt": _rumpled(cushion(shirt, 0.022, 0.008), 0.004),
+        "t_shirt": _rumpled(cushion(shirt, 0.022, 0.006), 0.004),
         "t_shirt_print": join([extrude(star, 0.004).moved((0, 0, 0.0215)), collar, *trim]),
     }
 
@@ -68,7 +71,8 @@ def _rumpled(surface: Surface, depth: float) -> Surface:
     def rule(v: Floats) -> Floats:
         wave = np.sin(31 * v[:, 0] + 17 * v[:, 1]) + np.sin(43 * v[:, 1] - 13 * v[:, 0] + 1)
         upper = np.clip(v[:, 2] / v[:, 2].max(), 0, 1)
-        return v + np.column_stack([0 * wave, 0 * wave, 0.5 * depth * (wave - 1) * upper * (v[:, 2] > 0.004)])
+        dip = 0.5 * depth * (wave - 1) * upper * (v[:, 2] > 0.004)
+        return np.column_stack([v[:, :2], v[:, 2] + dip])
 
     return surface.bent(rule)
 
@@ -90,22 +94,11 @@ def _towel() -> Surface:
     return sheet(np.stack([reach * radius * np.cos(angle), reach * radius * np.sin(angle), height], axis=-1))
 
 
-def _shorts() -> Surface:
-    """Denim shorts spread out flat, waist at +y."""
-    outline = Polygon(
-        [
-            (-0.08, 0.125),
-            (0.08, 0.125),
-            (0.095, 0.05),
-            (0.14, -0.105),
-            (0.05, -0.125),
-            (0.0, 0.02),
-            (-0.05, -0.125),
-        ]
-        + [(-0.14, -0.105), (-0.095, 0.05)]
-    )
-    smooth = outline.buffer(-0.004, quad_segs=2).buffer(0.004, quad_segs=2)
-    return _rumpled(cushion(smooth, 0.026, 0.008), 0.003)
+def _jeans() -> Surface:
+    """Jeans spread out flat, waist at +y."""
+    half = [(0.08, 0.125), (0.095, 0.05), (0.14, -0.105), (0.05, -0.125)]
+    outline = Polygon([*half, (0.0, 0.02), *((-x, y) for x, y in reversed(half))])
+    return _rumpled(cushion(outline, 0.026, 0.006), 0.003)
 
 
 def _cap() -> dict[str, Surface]:

@@ -1,11 +1,10 @@
-"""Meshes of the recycling, and of the symbol on its bin."""
+"""Meshes of the recycling."""
 
 import math
 
 import numpy as np
 from shapely import affinity
 from shapely.geometry import LineString, Polygon
-from shapely.ops import unary_union
 
 from mjsim.authoring.mesh_tools import Surface, extrude, join, lathe, sheet, slab
 
@@ -16,10 +15,17 @@ def meshes() -> dict[str, Surface]:
 
 
 def _bottle() -> dict[str, Surface]:
-    body = lathe(
-        [(0, 0.004), (0.03, 0), (0.039, 0.008), (0.04, 0.06), (0.037, 0.066), (0.037, 0.145), (0.04, 0.151)]
-        + [(0.039, 0.17), (0.03, 0.2), (0.016, 0.225), (0.0145, 0.245), (0, 0.245)]
-    )
+    base = [
+        (0, 0.004),
+        (0.03, 0),
+        (0.039, 0.008),
+        (0.04, 0.06),
+        (0.037, 0.066),
+        (0.037, 0.145),
+        (0.04, 0.151),
+    ]
+    neck = [(0.039, 0.17), (0.03, 0.2), (0.016, 0.225), (0.0145, 0.245), (0, 0.245)]
+    body = lathe([*base, *neck])
     label = lathe([(0.0385, 0.07), (0.0385, 0.142)], 24)
     cap = lathe([(0, 0.24), (0.018, 0.24), (0.018, 0.258), (0.016, 0.26), (0, 0.26)], 14)
     return {"bottle_body": body, "bottle_label": label, "bottle_cap": cap}
@@ -74,18 +80,3 @@ def _newspaper() -> Surface:
     ]
     lower = Surface(sheets[0].vertices, sheets[0].faces, np.full((len(sheets[0].vertices), 2), 0.01))
     return join([lower, sheets[1]])
-
-
-def recycling_symbol(size: float) -> Surface:
-    """Three chasing arrows of overall height `size`, extruded 4 mm."""
-    arrows = []
-    for k in range(3):
-        shaft = LineString([(-0.20, -0.30), (-0.36, -0.30), (-0.50, -0.10), (-0.36, 0.14)])
-        band = shaft.buffer(0.085, cap_style="flat", join_style="bevel")
-        tip = np.array([-0.36, 0.14])
-        ahead = np.array([0.14, 0.24]) / math.hypot(0.14, 0.24)
-        across = np.array([-ahead[1], ahead[0]])
-        head = Polygon([tip + 0.17 * across, tip - 0.17 * across, tip + 0.22 * ahead])
-        arrows.append(affinity.rotate(unary_union([band, head]), 120 * k, origin=(0, 0)))
-    drawing = unary_union(arrows)
-    return extrude(affinity.scale(drawing, size, size, origin=(0, 0)), 0.004)

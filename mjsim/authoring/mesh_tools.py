@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.polygon import orient
 
+from mjsim.errors import AssetError
 from mjsim.files import write_text_atomically
 
 Floats = NDArray[np.float64]
@@ -118,8 +119,13 @@ def extrude(polygon: Polygon | MultiPolygon, height: float) -> Surface:
 
 
 def cushion(polygon: Polygon, height: float, edge: float) -> Surface:
-    """A flat pillow over a polygon: a prism with its upper and lower edges rounded by `edge`, UV from above."""
-    solid = orient(polygon)
+    """A flat pillow over a polygon: a prism with its upper and lower edges rounded by `edge`, UV from above.
+
+    Raises:
+        AssetError: `edge` is wider than the outline's rounded corners allow.
+    """
+    # Corners rounder than the edge is wide keep the inset outlines free of crossings.
+    solid = orient(polygon.buffer(-1.3 * edge, quad_segs=2).buffer(1.3 * edge, quad_segs=2).simplify(0.0005))
     levels = [
         (edge, 0.0),
         (0.0, edge),
@@ -133,7 +139,12 @@ def cushion(polygon: Polygon, height: float, edge: float) -> Surface:
     wall = sheet(np.stack([np.vstack([r, r[:1]]) for r in rings], axis=1))
     lids = []
     for ring, flip in ((rings[-1], False), (rings[0], True)):
-        flat, faces = trimesh.creation.triangulate_polygon(Polygon(ring[:, :2]), engine="manifold")
+        lid = Polygon(ring[:, :2])
+        if not lid.is_valid:
+            raise AssetError(
+                f"a cushion's edge of {edge} m is too wide for its outline; round its corners more"
+            )
+        flat, faces = trimesh.creation.triangulate_polygon(lid, engine="manifold")
         vertices = np.column_stack([flat, np.full(len(flat), ring[0, 2])])
         spans = flat[faces][:, 1:] - flat[faces][:, :1]
         downwards = (spans[:, 0, 0] * spans[:, 1, 1] - spans[:, 0, 1] * spans[:, 1, 0]).sum() < 0
@@ -156,7 +167,8 @@ def slab(width: float, depth: float, height: float) -> Surface:
     top = Surface(np.column_stack([corners, np.full(4, height)]), np.array([[0, 1, 2], [0, 2, 3]]))
     box = trimesh.creation.box((width, depth, height))
     rest = Surface(
-        np.asarray(box.vertices) + [0, 0, height / 2], np.asarray(box.faces[box.face_normals[:, 2] < 0.5])
+        np.asarray(box.vertices) + np.array([0, 0, height / 2]),
+        np.asarray(box.faces[box.face_normals[:, 2] < 0.5]),
     )
     edge = np.full((len(rest.vertices), 2), 0.01)
     return join([from_above(top), Surface(rest.vertices, rest.faces, edge)])
@@ -168,7 +180,9 @@ def rounded_box(width: float, depth: float, height: float, radius: float) -> Sur
     reach = np.array([width, depth, height]) / 2 - radius
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
     hull = trimesh.convex.convex_hull((ball[None] + (signs * reach)[:, None]).reshape(-1, 3))
-    return Surface(np.asarray(hull.vertices) + [0, 0, height / 2], np.asarray(hull.faces, dtype=np.int64))
+    return Surface(
+        np.asarray(hull.vertices) + np.array([0, 0, height / 2]), np.asarray(hull.faces, dtype=np.int64)
+    )
 
 
 def write_obj(path: Path, surface: Surface) -> None:
@@ -207,7 +221,8 @@ def _corner_normals(surface: Surface) -> Floats:
 
 def _without_slivers(vertices: Floats, faces: NDArray[np.int64]) -> NDArray[np.int64]:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-10]
+    kept: NDArray[np.int64] = faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-10]
+    return kept
 
 
 def _inward(outline: Floats) -> Floats:

@@ -10,6 +10,7 @@ from mjsim.authoring import (
     mesh_labels,
     mesh_laundry,
     mesh_office,
+    mesh_receptacles,
     mesh_recycling,
     mesh_toys,
 )
@@ -26,7 +27,7 @@ def object_meshes() -> dict[str, Surface]:
 
 def receptacle_meshes() -> dict[str, Surface]:
     """Every mesh of the receptacle models by name; the same on every call."""
-    return {"recycling_symbol": mesh_recycling.recycling_symbol(0.22)}
+    return mesh_receptacles.meshes()
 
 
 def build_meshes(models_root: Path) -> list[Path]:
