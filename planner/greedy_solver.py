@@ -25,8 +25,8 @@ class GreedySolver:
         """
         del seed, limit
         started = time.perf_counter()
-        bound = spanning_bound(problem, integer_metric(problem.distances))
-        return make_plan(problem, nearest_first(problem), bound, False, started)
+        metric = integer_metric(problem.distances)
+        return make_plan(problem, metric, nearest_first(problem), spanning_bound(problem, metric), started)
 
 
 def nearest_first(problem: RoutingProblem) -> list[Visit]:

@@ -20,7 +20,6 @@ from planner.tour import (
     place_onboard,
     possible_next,
     spanning_bound,
-    tour_length,
 )
 
 DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
@@ -45,41 +44,36 @@ class OrToolsSolver:
             limit: Solutions or seconds, whichever comes first; by default 200 solutions.
 
         Returns:
-            FEASIBLE with a spanning-tree bound, or OPTIMAL where every tour was tried (up to two objects).
+            FEASIBLE with a spanning-tree bound, or OPTIMAL where every tour was tried (up to three objects).
         """
         del seed
         started = time.perf_counter()
         metric = integer_metric(problem.distances)
-        if len(problem.shipments) + len(problem.onboard) <= 2:
-            visits = best_of_all(problem, metric)
-            bound = _length(metric, problem.start, visits)
-            return make_plan(problem, visits, bound, True, started)
-        bound = spanning_bound(problem, metric)
-        visits = _search(problem, metric, limit or SolveLimit(work=DEFAULT_SOLUTIONS))
-        return make_plan(problem, visits, bound, False, started)
+        if len(problem.shipments) + len(problem.onboard) <= 3:
+            visits, bound = best_of_all(problem, metric)
+        else:
+            bound = spanning_bound(problem, metric)
+            visits = _search(problem, metric, limit or SolveLimit(work=DEFAULT_SOLUTIONS))
+        return make_plan(problem, metric, visits, bound, started)
 
 
-def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> list[Visit]:
-    """The best of all tours, by trying them; for very few objects."""
+def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> tuple[list[Visit], int]:
+    """The best of all tours and its integer length, by trying them; for very few objects."""
     best: list[Visit] = []
     best_length = math.inf
 
-    def extend(visits: list[Visit]) -> None:
+    def extend(visits: list[Visit], here: int, length: int) -> None:
         nonlocal best, best_length
+        if length >= best_length:
+            return
         options = list(possible_next(problem, visits))
         if not options:
-            length = _length(metric, problem.start, visits)
-            if length < best_length:
-                best, best_length = visits, length
+            best, best_length = visits, length
         for option in options:
-            extend([*visits, option])
+            extend([*visits, option], option.location, length + int(metric[here, option.location]))
 
-    extend([])
-    return best
-
-
-def _length(metric: NDArray[np.int64], start: int, visits: list[Visit]) -> int:
-    return round(tour_length(metric.astype(np.float64), start, visits))
+    extend([], problem.start, 0)
+    return best, int(best_length)
 
 
 def _search(problem: RoutingProblem, metric: NDArray[np.int64], limit: SolveLimit) -> list[Visit]:
@@ -94,8 +88,14 @@ def _search(problem: RoutingProblem, metric: NDArray[np.int64], limit: SolveLimi
     routing.SetArcCostEvaluatorOfAllVehicles(routing.RegisterTransitMatrix(costs.tolist()))
     _constrain(problem, manager, routing)
     solution = routing.SolveWithParameters(_parameters(limit))
-    if solution is None:  # out of time before the first solution
-        return nearest_first(problem)
+    if solution is None:
+        # Insertion places pairs before single nodes, which fails with full hands; or time ran out.
+        greedy = nearest_first(problem)
+        node = {visit: k + 1 for k, visit in enumerate(visit_of)}
+        first = routing.ReadAssignmentFromRoutes([[node[v] for v in greedy]], True)
+        solution = routing.SolveFromAssignmentWithParameters(first, _parameters(limit))
+        if solution is None:
+            return greedy
     visits = []
     index = solution.Value(routing.NextVar(routing.Start(0)))
     while not routing.IsEnd(index):

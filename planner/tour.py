@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +58,8 @@ def possible_next(problem: RoutingProblem, visits: Sequence[Visit]) -> Iterator[
             yield place(problem, k)
 
 
-def tour_length(distances: NDArray[np.float64], start: int, visits: Sequence[Visit]) -> float:
-    """Length of an open tour, m."""
+def tour_length(distances: NDArray[Any], start: int, visits: Sequence[Visit]) -> float:
+    """Length of an open tour, in the unit of the distances; exact for integers below 2^53."""
     order = [start, *(v.location for v in visits)]
     return float(distances[order[:-1], order[1:]].sum())
 
@@ -78,24 +79,24 @@ def spanning_bound(problem: RoutingProblem, metric: NDArray[np.int64]) -> int:
 
 
 def make_plan(
-    problem: RoutingProblem, visits: Sequence[Visit], bound: int, proven: bool, started: float
+    problem: RoutingProblem, metric: NDArray[np.int64], visits: Sequence[Visit], bound: int, started: float
 ) -> Plan:
     """A plan with an honest lower bound.
 
     Args:
         problem: What was solved.
+        metric: Its integer metric.
         visits: The tour.
         bound: Lower bound in the integer metric, units of 0.1 mm.
-        proven: Whether the tour is optimal in the integer metric.
         started: `time.perf_counter()` when solving began.
 
     Returns:
-        OPTIMAL if proven, and if the tour is as long in the given distances as in the integer metric (to
-        rounding: 0.1 mm a leg). That fails only for distances that were no metric.
+        OPTIMAL if the tour meets the bound in the integer metric and is as long in the given distances (to
+        rounding). The latter fails only for distances that were no metric.
     """
     cost = tour_length(problem.distances, problem.start, visits)
     rounding = 2 * UNIT * len(visits)
-    optimal = proven and cost <= bound * UNIT + rounding
+    optimal = tour_length(metric, problem.start, visits) <= bound and cost <= bound * UNIT + rounding
     lower = cost if optimal else max(0.0, min(cost, bound * UNIT - rounding))
     status = Status.OPTIMAL if optimal else Status.FEASIBLE
     return Plan(tuple(visits), cost, lower, status, time.perf_counter() - started)

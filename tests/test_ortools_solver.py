@@ -47,19 +47,21 @@ def shortest_by_permutations(problem):
     return best
 
 
-@settings(max_examples=25, deadline=None)
-@given(seed=seeds, shipments=st.integers(0, 3), onboard=st.integers(0, 2), capacity=st.integers(2, 3))
-def test_up_to_four_objects_are_planned_optimally(seed, shipments, onboard, capacity):
-    problem = random_problem(seed, shipments, onboard if shipments < 3 else min(onboard, 1), capacity)
-    plan = solver("ortools").solve(problem, limit=SolveLimit(work=60))
+@settings(max_examples=40, deadline=None)
+@given(seed=seeds, shipments=st.integers(0, 3), onboard=st.integers(0, 2), capacity=st.integers(1, 3))
+def test_up_to_three_objects_are_proven_optimal(seed, shipments, onboard, capacity):
+    problem = random_problem(seed, shipments, min(onboard, capacity, 3 - shipments), capacity)
+    plan = solver("ortools").solve(problem)
     check(problem, plan)
+    assert plan.status is Status.OPTIMAL
     assert plan.cost == pytest.approx(shortest_by_permutations(problem), abs=5e-3)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_four_loose_objects_are_planned_optimally(seed):
-    problem = random_problem(seed, 4)
-    plan = solver("ortools").solve(problem, limit=SolveLimit(work=60))
+@pytest.mark.parametrize(("shipments", "onboard"), [(4, 0), (3, 1), (2, 2)])
+def test_local_search_finds_the_optimum_of_four_objects(seed, shipments, onboard):
+    problem = random_problem(seed, shipments, onboard)
+    plan = solver("ortools").solve(problem, limit=SolveLimit(work=150))
     check(problem, plan)
     assert plan.cost == pytest.approx(shortest_by_permutations(problem), abs=5e-3)
 
