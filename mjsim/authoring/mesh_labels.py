@@ -38,6 +38,11 @@ def _blank(colour: Colour) -> Picture:
     return np.full((SIDE, SIDE, 3), colour, dtype=np.uint8)
 
 
+def _halved(picture: Picture) -> Picture:
+    """The picture at half the height, for signs twice as wide as high."""
+    return np.asarray(cv2.resize(picture, (SIDE, SIDE // 2), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
 def _write(
     picture: Picture, text: str, x: int, y: int, scale: float, colour: Colour, weight: int = 2
 ) -> None:
@@ -221,11 +226,11 @@ def _toys_sign() -> Picture:
         ("S", 107, (240, 140, 20)),
     ):
         _write(p, letter, x, 92, 1.9, colour, 7)
-    return cv2.resize(p[20:108], (SIDE, SIDE // 2), interpolation=cv2.INTER_AREA).astype(np.uint8)
+    return _halved(p[20:108])
 
 
 def _office_sign() -> Picture:
     p = _blank((250, 248, 240))
     _write(p, "OFFICE", 64, 62, 1.05, (30, 50, 70), 3)
     _write(p, "SUPPLIES", 64, 98, 0.78, (30, 50, 70), 2)
-    return cv2.resize(p[24:112], (SIDE, SIDE // 2), interpolation=cv2.INTER_AREA).astype(np.uint8)
+    return _halved(p[24:112])
