@@ -24,7 +24,7 @@ POINTS = 40
 MIN_DISTANCE = 1.0  # m, between points, and from points to receptacles
 START_CLEARANCE = 0.5  # m, from the start to every object
 DROP = (0.01, 0.02)  # m above the floor
-PACKINGS, DRAWS = 40, 4000  # a jammed packing is given up as a whole, to keep the points uniform
+PACKINGS, DRAWS = 20, 4000  # a jammed packing is given up as a whole, to keep the points uniform
 DROPS = 8
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
 

@@ -1,0 +1,187 @@
+"""Fixtures shared by the tests: the apartment as shipped, and a small house written for tests."""
+
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from mjsim.catalogue import Catalogue
+from mjsim.episode import Episode
+from mjsim.footprint import Footprint, footprint
+from mjsim.sampling import sample_episode
+from mjsim.scene import Scene, compile_house, compose
+from planner.navmesh import NavMesh
+
+
+@pytest.fixture(scope="session")
+def catalogue() -> Catalogue:
+    """The apartment's catalogue."""
+    return Catalogue.load("apartment")
+
+
+@pytest.fixture(scope="session")
+def house_model(catalogue: Catalogue) -> mujoco.MjModel:
+    """The tidy apartment, without objects or person."""
+    return compile_house(catalogue)
+
+
+@pytest.fixture(scope="session")
+def house_footprint(house_model: mujoco.MjModel) -> Footprint:
+    return footprint(house_model)
+
+
+@pytest.fixture(scope="session")
+def navmesh(house_footprint: Footprint) -> NavMesh:
+    """Navigable floor of the apartment."""
+    return NavMesh.build(house_footprint.obstacles, house_footprint.bounds)
+
+
+@pytest.fixture(scope="session")
+def episode(catalogue: Catalogue, navmesh: NavMesh) -> Episode:
+    """A disorganized apartment with 24 objects."""
+    return sample_episode(catalogue, navmesh, objects=24, seed=5)
+
+
+@pytest.fixture(scope="session")
+def scene(episode: Episode, catalogue: Catalogue) -> Scene:
+    """The composed `episode`; do not change it."""
+    return compose(episode, catalogue)
+
+
+@pytest.fixture(scope="session")
+def small_house(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a house of two rooms, 3 m x 4 m each, with two receptacles and three object models."""
+    folder = tmp_path_factory.mktemp("small_house")
+    write_small_house(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small_catalogue(small_house: Path) -> Catalogue:
+    """Categories `solids` (cube, wedge) -> crate in the west, and `rounds` (ball) -> tray in the east."""
+    return Catalogue.load(str(small_house / "catalogue.toml"))
+
+
+def write_small_house(folder: Path) -> None:
+    for name, text in _SMALL_HOUSE.items():
+        (folder / name).write_text(text.replace("FOLDER", str(folder)), encoding="utf-8")
+
+
+def _receptacle(half: float) -> str:
+    wall = half - 0.01
+    return f"""
+<mujoco>
+  <compiler angle="radian"/>
+  <default><geom type="box" condim="6" solref="0.008 1"/></default>
+  <worldbody>
+    <body name="receptacle">
+      <geom pos="0 0 0.02" size="{half} {half} 0.02"/>
+      <geom pos="{wall} 0 0.15" size="0.01 {half} 0.15"/>
+      <geom pos="-{wall} 0 0.15" size="0.01 {half} 0.15"/>
+      <geom pos="0 {wall} 0.15" size="{half} 0.01 0.15"/>
+      <geom pos="0 -{wall} 0.15" size="{half} 0.01 0.15"/>
+      <site name="volume" type="box" pos="0 0 0.2" size="{wall} {wall} 0.16"/>
+      <site name="approach" pos="0 -{half + 0.35} 0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def _object(geom: str, top: float, asset: str = "") -> str:
+    return f"""
+<mujoco>
+  <compiler angle="radian"/>
+  {asset}
+  <worldbody>
+    <body name="object">
+      {geom}
+      <site name="grip_0" pos="0 0 {top}"/>
+      <site name="grip_1" pos="0 0 {top}" quat="0 0 0 1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+_SMALL_HOUSE = {
+    "house.xml": """
+<mujoco model="small">
+  <compiler angle="radian"/>
+  <default>
+    <default class="wall"><geom type="box"/></default>
+  </default>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 0.1" pos="3 2 0"/>
+    <geom name="south" class="wall" pos="3 -0.1 1.25" size="3.2 0.1 1.25"/>
+    <geom name="north" class="wall" pos="3 4.1 1.25" size="3.2 0.1 1.25"/>
+    <geom name="west" class="wall" pos="-0.1 2 1.25" size="0.1 2 1.25"/>
+    <geom name="east" class="wall" pos="6.1 2 1.25" size="0.1 2 1.25"/>
+    <geom name="partition_south" class="wall" pos="3 0.75 1.25" size="0.05 0.75 1.25"/>
+    <geom name="partition_north" class="wall" pos="3 3.25 1.25" size="0.05 0.75 1.25"/>
+    <geom name="lintel" class="wall" pos="3 2 2.25" size="0.05 0.5 0.25"/>
+    <geom name="lamp" type="sphere" pos="1.5 2 2.3" size="0.2" group="1" contype="0" conaffinity="0"/>
+    <site name="room:west" type="box" pos="1.5 2 1" size="1.5 2 1"/>
+    <site name="room:east:1" type="box" pos="4.5 1 1" size="1.5 1 1"/>
+    <site name="room:east:2" type="box" pos="4.5 3 1" size="1.5 1 1"/>
+    <site name="mount:crate" pos="0.3 3.7 0"/>
+    <site name="mount:tray" pos="5.7 3.6 0" quat="0.70710678 0 0 -0.70710678"/>
+  </worldbody>
+</mujoco>
+""",
+    "crate.xml": _receptacle(0.3),
+    "tray.xml": _receptacle(0.25),
+    "cube.xml": _object('<geom type="box" pos="0 0 0.05" size="0.05 0.05 0.05" mass="0.2"/>', 0.1),
+    "wedge.xml": _object(
+        '<geom type="mesh" mesh="wedge" mass="0.2"/>',
+        0.08,
+        '<asset><mesh name="wedge" vertex="-.08 -.05 0 .08 -.05 0 -.08 .05 0 .08 .05 0 -.08 -.05 .08 -.08 .05 .08"/>'
+        "</asset>",
+    ),
+    "ball.xml": _object(
+        '<geom type="sphere" pos="0 0 0.06" size="0.06" mass="0.1" condim="6" friction="1 0.01 0.003"/>', 0.12
+    ),
+    "catalogue.toml": """
+[house]
+label = "Small house"
+model = "house.xml"
+
+[rooms]
+west = "West room"
+east = "East room"
+
+[categories.solids]
+label = "Solids"
+receptacle = "crate"
+objects = ["cube", "wedge"]
+
+[categories.rounds]
+label = "Rounds"
+receptacle = "tray"
+objects = ["ball"]
+
+[receptacles.crate]
+label = "Crate"
+place = "in the corner"
+room = "west"
+model = "FOLDER/crate.xml"
+
+[receptacles.tray]
+label = "Tray"
+place = "by the wall"
+room = "east"
+model = "FOLDER/tray.xml"
+
+[objects.cube]
+label = "Cube"
+model = "FOLDER/cube.xml"
+
+[objects.wedge]
+label = "Wedge"
+model = "FOLDER/wedge.xml"
+
+[objects.ball]
+label = "Ball"
+model = "FOLDER/ball.xml"
+""",
+}
