@@ -12,28 +12,28 @@ FADE = 0.5  # s from opaque to gone
 
 _OK, _NO, _INFO = MessageKind.SUCCESS, MessageKind.REFUSAL, MessageKind.INFO
 
-# {object} and {receptacle} are labels as they read inside a sentence.
+# {object} and {receptacle} are labels as they read inside a sentence; no verb agrees with them ("denim shorts").
 TEXTS: Final = MappingProxyType(
     {
         "picked": (_OK, "You picked up the {object}."),
-        "placed": (_OK, "The {object} is in the {receptacle}."),
+        "placed": (_OK, "You put the {object} in the {receptacle}."),
         "finished": (_OK, "All done. Everything is where it belongs."),
         "replanned": (_INFO, "The plan has been updated."),
         "started": (_INFO, "Put every object into its bin."),
         "pick_failed": (_NO, "The {object} slipped. Try again from a little closer."),
-        "place_failed": (_NO, "The {object} did not stay in the {receptacle}. Pick it up again."),
-        "grip_lost": (_NO, "You lost the {object}: it caught on something."),
+        "place_failed": (_NO, "The {object} did not stay in the {receptacle}. Try again."),
+        "grip_lost": (_NO, "You dropped the {object} on the way."),
         "dislodged": (_NO, "The {object} fell out of the {receptacle}."),
         "busy": (_NO, "One moment: your hands are still moving."),
         "nothing_in_reach": (_NO, "Nothing in reach. Walk closer to an object or a bin."),
-        "out_of_reach": (_NO, "The {object} is out of reach. Walk closer."),
+        "out_of_reach": (_NO, "You cannot reach the {object} from here. Walk closer."),
         "hands_full": (_NO, "Both hands are full. Put something away first."),
         "hands_empty": (_NO, "Your hands are empty. Pick something up first."),
         "not_carried": (_NO, "You are not holding the {object}."),
         "already_carried": (_NO, "You are already holding the {object}."),
-        "already_delivered": (_NO, "The {object} is already where it belongs."),
-        "not_the_receptacle": (_NO, "Wrong bin: the {object} goes into the {receptacle}."),
-        "receptacle_out_of_reach": (_NO, "The {receptacle} is out of reach. Walk closer."),
+        "already_delivered": (_NO, "You have already put the {object} away."),
+        "not_the_receptacle": (_NO, "Not here: take the {object} to the {receptacle}."),
+        "receptacle_out_of_reach": (_NO, "You cannot reach the {receptacle} from here. Walk closer."),
         "unknown_object": (_NO, "There is no such object here."),
     }
 )

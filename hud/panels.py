@@ -98,7 +98,7 @@ def _row_text(canvas: Canvas, item: ChecklistItem, row: ListRow, x: int, top: in
     line = canvas.fit(item.text, face, row.text_width)
     baseline = top + (px(13) if row.detail else px(19))
     drawn = canvas.text(x, baseline, line, face, theme.DONE if item.done else theme.TEXT)
-    if item.done:
+    if item.done and drawn > 0:
         y = baseline - px(4.5)
         canvas.shape([(x - px(1), y), (x + drawn + px(1), y)], theme.TEXT, line=max(1.0, 1.2 * px(1)))
     for i, detail in enumerate(row.detail):
@@ -197,7 +197,7 @@ def draw_progress(pen: Pen, rect: Rect, delivered: int, total: int) -> Patch:
     done = round(track.width * min(delivered, total) / max(total, 1))
     if done > 0:
         bar = Rect(track.x, track.y, max(done, track.height), track.height)
-        canvas.rounded(bar, track.height / 2, theme.TONES[MessageKind.INFO], 1.0)
+        canvas.rounded(bar, track.height / 2, theme.PROGRESS, 1.0)
     return canvas.patch()
 
 

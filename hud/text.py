@@ -19,7 +19,7 @@ class Typeface:
         if not text:
             return 0
         left, _, width, _ = cv2.getTextSize((0, 0), text, (0, 0), self._face, size, weight)
-        return int(left + width)
+        return int(max(width, left + width))
 
     def fit(self, text: str, size: int, weight: int, width: int) -> str:
         """`text` in one line of at most `width` px, ending in an ellipsis when it had to be cut."""

@@ -21,11 +21,12 @@ TEXT: Final[Rgb] = (248, 250, 252)
 QUIET: Final[Rgb] = (216, 222, 230)
 DONE: Final[Rgb] = (206, 211, 218)
 ACCENT: Final[Rgb] = (240, 228, 66)
+PROGRESS: Final[Rgb] = (86, 180, 233)
 TILE: Final[Rgb] = (232, 236, 241)
 
 TONES: Final = MappingProxyType(
     {
-        MessageKind.INFO: (86, 180, 233),
+        MessageKind.INFO: (240, 228, 66),
         MessageKind.SUCCESS: (0, 158, 115),
         MessageKind.REFUSAL: (213, 94, 0),
     }

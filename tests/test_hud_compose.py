@@ -1,0 +1,264 @@
+"""The composed frame: pure, deterministic, legible at every supported size, safe for colour vision."""
+
+import dataclasses
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hud import sample, theme
+from hud.canvas import Rect
+from hud.compose import Compositor, compose
+from hud.conditions import condition
+from hud.errors import FrameError
+from hud.messages import message
+from hud.panels import clock_text
+from hud.state import ChecklistItem, HudState, InventorySlot, Marker, Message, MessageKind, Pointer
+
+SIZES = ((640, 480), (1280, 720), (1920, 1080))
+
+
+def optimal(count: int = 6, steps: int = 3) -> HudState:
+    return condition("optimal")(sample.task(count, steps=steps, message=message("replanned")))
+
+
+def plain(size: tuple[int, int], level: int) -> NDArray[np.uint8]:
+    return np.full((size[1], size[0], 3), level, dtype=np.uint8)
+
+
+def ink(state: HudState, other: HudState, size: tuple[int, int], level: int = 0) -> NDArray[np.bool_]:
+    """Where two states look clearly different."""
+    a, b = (compose(plain(size, level), s, sample.pictures()).astype(int) for s in (state, other))
+    return np.asarray(np.abs(a - b).max(axis=2) > 100)
+
+
+def text_height(state: HudState, other: HudState, size: tuple[int, int]) -> int:
+    rows = np.flatnonzero(ink(state, other, size).any(axis=1))
+    return int(rows[-1] - rows[0] + 1)
+
+
+def test_the_frame_given_is_left_alone_even_when_read_only() -> None:
+    frame = sample.backdrop(640, 480)
+    before = frame.copy()
+    frame.setflags(write=False)
+    drawn = compose(frame, optimal(), sample.pictures())
+    assert np.array_equal(frame, before) and drawn.shape == frame.shape and drawn.dtype == np.uint8
+    assert not np.array_equal(drawn, frame)
+
+
+def test_a_strided_frame_gives_the_same_picture() -> None:
+    frame = sample.backdrop(640, 480)
+    flipped = np.ascontiguousarray(frame[::-1])[::-1]
+    assert np.array_equal(compose(flipped, optimal(), {}), compose(frame, optimal(), {}))
+
+
+def test_what_a_compositor_drew_before_does_not_matter() -> None:
+    pictures = sample.pictures()
+    kept = Compositor(pictures)
+    for size in (SIZES[0], SIZES[1], SIZES[0]):
+        frame = sample.backdrop(*size)
+        for count, steps in ((6, 3), (24, 9), (6, 4), (6, 3)):
+            for name in ("none", "highlight", "optimal"):
+                view = sample.task(count, steps=steps, message=message("hands_full", opacity=0.2 * steps))
+                state = condition(name)(dataclasses.replace(view, clock=float(steps)))
+                assert np.array_equal(kept.compose(frame, state), compose(frame, state, pictures))
+
+
+PARTS = {
+    "title": {"checklist_title": "Other"},
+    "row": {"checklist": (ChecklistItem("Other", ""),)},
+    "bins": {"bins": ()},
+    "hands": {"inventory": (InventorySlot("Spoon"), InventorySlot())},
+    "message": {"message": Message("Other", MessageKind.INFO)},
+    "tone": {"message": Message(message("replanned").text, MessageKind.REFUSAL)},
+    "fade": {"message": message("replanned", opacity=0.5)},
+    "delivered": {"delivered": 5},
+    "total": {"total": 7},
+    "clock": {"clock": 90.0},
+    "pointer": {"pointer": Pointer(1.0)},
+}
+
+
+@pytest.mark.parametrize("part", sorted(PARTS))
+def test_every_part_of_the_state_shows(part: str) -> None:
+    kept = Compositor(sample.pictures())
+    frame = sample.backdrop(640, 480)
+    before = kept.compose(frame, optimal())
+    assert not np.array_equal(before, kept.compose(frame, dataclasses.replace(optimal(), **PARTS[part])))
+
+
+def test_markers_belong_to_the_world_and_are_not_drawn_twice() -> None:
+    frame = sample.backdrop(640, 480)
+    more = dataclasses.replace(
+        optimal(), markers=(Marker("sphere", (0, 0, 0), (1, 0, 0), (1, 0, 0, 1), "goal"),)
+    )
+    assert np.array_equal(compose(frame, more, {}), compose(frame, optimal(), {}))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_capitals_are_at_least_nine_pixels_high_at_480_and_grow_with_the_frame(size: tuple[int, int]) -> None:
+    def state(text: str, detail: str) -> HudState:
+        row = ChecklistItem(text, detail, current=False)
+        return HudState("T", (row,), (), (InventorySlot(), InventorySlot()))
+
+    wanted = 9 * size[1] // 480
+    assert text_height(state("HHHH", "x"), state("", "x"), size) >= wanted
+    assert text_height(state("x", "HHHH"), state("x", "IIII"), size) >= wanted
+    bar = dataclasses.replace(state("x", "x"), message=Message("HHHH HHHH", MessageKind.INFO))
+    other = dataclasses.replace(bar, message=Message("IIII IIII IIII", MessageKind.INFO))
+    assert text_height(bar, other, size) >= wanted
+    held = dataclasses.replace(state("x", "x"), inventory=(InventorySlot("HHHH"), InventorySlot()))
+    other = dataclasses.replace(held, inventory=(InventorySlot("IIII"), InventorySlot()))
+    assert text_height(held, other, size) >= wanted
+
+
+def luminance(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Relative luminance of sRGB 0..255 as WCAG 2 defines it."""
+    c = np.asarray(rgb, dtype=np.float64) / 255.0
+    linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    return np.asarray(linear @ np.array([0.2126, 0.7152, 0.0722]))
+
+
+@pytest.mark.parametrize("level", [0, 128, 255])
+@pytest.mark.parametrize("done", [False, True])
+def test_text_contrast_holds_over_any_background(level: int, done: bool) -> None:
+    size = (1920, 1080)  # large, so that strokes have fully covered pixels
+    for text, detail, rest in (("HHHHHH", "x", "x"), ("", "HHHHHHH", "")):
+        blank = HudState("", (ChecklistItem("", rest, done=done),), (), (InventorySlot(), InventorySlot()))
+        state = dataclasses.replace(blank, checklist=(ChecklistItem(text, detail, done=done),))
+        drawn = compose(plain(size, level), state, {})
+        covered = ink(state, blank, size, level)
+        panel = compose(plain(size, level), blank, {})[covered]
+        brightest = luminance(drawn[covered]).max()
+        ratio = (brightest + 0.05) / (luminance(panel).max() + 0.05)
+        assert ratio >= 4.5
+
+
+# Simulation of full colour-vision deficiencies on linear RGB (Machado, Oliveira and Fernandes, 2009).
+DEFICIENCIES = {
+    "protan": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "deutan": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    "tritan": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
+}
+
+
+@pytest.mark.parametrize("kind", sorted(DEFICIENCIES))
+def test_tones_stay_apart_for_colour_vision_deficiencies(kind: str) -> None:
+    tones = np.array([theme.TONES[k] for k in MessageKind], dtype=np.float64) / 255.0
+    linear = ((tones + 0.055) / 1.055) ** 2.4
+    seen = np.clip(linear @ np.array(DEFICIENCIES[kind]).T, 0.0, 1.0).astype(np.float32)
+    lab = cv2.cvtColor(seen[None], cv2.COLOR_LRGB2Lab)[0]
+    distances = [float(np.linalg.norm(lab[i] - lab[j])) for i in range(3) for j in range(i)]
+    assert min(distances) > 20.0
+
+
+def test_tones_differ_by_more_than_their_colour() -> None:
+    frame = plain((640, 480), 128)
+    shapes = []
+    for kind in MessageKind:
+        state = dataclasses.replace(optimal(), message=Message("Same text", kind))
+        rect = Compositor({}).layout(state, 640, 480).message
+        assert rect is not None
+        patch = compose(frame, state, {})[rect.y : rect.bottom, rect.x : rect.x + 32].astype(np.float64)
+        tone = np.array(theme.TONES[kind], dtype=np.float64)
+        shapes.append(np.abs(patch - tone).max(axis=2) < 12)
+    assert all((shapes[i] ^ shapes[j]).sum() > 15 for i in range(3) for j in range(i))
+
+
+def test_done_rows_carry_a_line_through_their_text() -> None:
+    size = (640, 480)
+    row = ChecklistItem("HHHH HHHH", "")
+    state = HudState("", (row,), (), (InventorySlot(), InventorySlot()))
+    crossed = dataclasses.replace(state, checklist=(dataclasses.replace(row, done=True),))
+    gap = dataclasses.replace(state, checklist=(ChecklistItem("HHHH", ""),))
+    drawn = compose(plain(size, 0), crossed, {}).max(axis=2)
+    text = ink(state, dataclasses.replace(state, checklist=(ChecklistItem("", ""),)), size)
+    rows, columns = np.flatnonzero(text.any(axis=1)), np.flatnonzero(text.any(axis=0))
+    box = drawn[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    assert (box > 120).all(axis=1).sum() in (1, 2), "one continuous line from the first letter to the last"
+    assert (
+        not (
+            compose(plain(size, 0), state, {}).max(axis=2)[
+                rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1
+            ]
+            > 120
+        )
+        .all(axis=1)
+        .any()
+    )
+    assert ink(state, gap, size).any()
+
+
+def test_a_message_fades_towards_the_frame() -> None:
+    frame = sample.backdrop(640, 480)
+    drawn = [
+        compose(frame, dataclasses.replace(optimal(), message=message("replanned", opacity=o)), {}).astype(
+            int
+        )
+        for o in (1.0, 0.5, 0.0)
+    ]
+    rect = Compositor({}).layout(optimal(), 640, 480).message
+    assert rect is not None
+    area = np.s_[rect.y : rect.bottom, rect.x : rect.right]
+    assert np.array_equal(drawn[2][area], frame[area])
+    assert np.abs(drawn[1][area] - (drawn[0][area] + frame[area]) / 2).max() <= 3
+
+
+def test_pictures_appear_where_the_row_is() -> None:
+    solid = np.zeros((32, 32, 4), dtype=np.uint8)
+    solid[...] = (255, 0, 255, 255)
+    row = ChecklistItem("x", "x", picture="object:a")
+    state = HudState("", (row,), (), (InventorySlot(), InventorySlot()))
+    drawn = compose(plain((640, 480), 0), state, {"object:a": solid})
+    rect = Compositor({}).layout(state, 640, 480).checklist
+    assert rect is not None
+    ys, xs = np.nonzero((drawn == (255, 0, 255)).all(axis=2))
+    assert len(ys) > 300
+    assert rect.x <= xs.min() and xs.max() < rect.right and rect.y <= ys.min() and ys.max() < rect.bottom
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.5707963, 3.1415926, -1.5707963])
+def test_the_pointer_sits_at_the_edge_it_points_to(angle: float) -> None:
+    layout = Compositor({}).layout(dataclasses.replace(optimal(), pointer=Pointer(angle)), 640, 480)
+    free, rect = layout.free, layout.pointer
+    assert rect is not None
+    middle: Rect = free
+    dx = rect.x + rect.width / 2 - (middle.x + middle.width / 2)
+    dy = rect.y + rect.height / 2 - (middle.y + middle.height / 2)
+    assert abs(np.arctan2(np.sin(np.arctan2(-dy, dx) - angle), np.cos(np.arctan2(-dy, dx) - angle))) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.0, "0:00"), (59.99, "0:59"), (83.0, "1:23"), (3600.0, "1:00:00"), (-1.0, "0:00")]
+)
+def test_the_clock_reads_like_a_clock(seconds: float, text: str) -> None:
+    assert clock_text(seconds) == text
+
+
+@pytest.mark.parametrize("shape", [(480, 640), (480, 640, 4), (100, 100, 3)])
+def test_an_unusable_frame_is_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(FrameError, match="frame"):
+        compose(np.zeros(shape, dtype=np.uint8), optimal(), {})
+
+
+def test_a_frame_of_floats_is_refused() -> None:
+    with pytest.raises(FrameError, match="float64"):
+        compose(np.zeros((480, 640, 3)), optimal(), {})  # type: ignore[arg-type]
+
+
+def test_an_unusable_picture_is_refused_by_its_key() -> None:
+    with pytest.raises(FrameError, match="'object:a'"):
+        compose(sample.backdrop(640, 480), optimal(), {"object:a": np.zeros((4, 4, 3), dtype=np.uint8)})

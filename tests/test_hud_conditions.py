@@ -1,0 +1,248 @@
+"""Rules of the assistance conditions (PAPER section 5), their discovery, and the message bar's texts."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hud import sample
+from hud.conditions import condition, condition_names
+from hud.errors import ConditionError, HudError, MessageError, TaskViewError
+from hud.lists import in_sentence
+from hud.messages import FADE, SHOWN, TEXTS, fade, message
+from hud.state import ChecklistItem, HudState, MessageKind
+from hud.task import PlannedStep, TaskView
+
+COUNTS = (6, 12, 18, 24)
+
+
+def shown(name: str, view: TaskView) -> HudState:
+    return condition(name)(view)
+
+
+def with_status(view: TaskView, **status: str) -> TaskView:
+    objects = tuple(dataclasses.replace(o, status=status.get(o.name, o.status)) for o in view.objects)  # type: ignore[arg-type]
+    return dataclasses.replace(view, objects=objects)
+
+
+def test_every_file_of_the_package_is_a_condition() -> None:
+    assert condition_names() == ("highlight", "none", "optimal")
+    for name in condition_names():
+        assert isinstance(shown(name, sample.task(6)), HudState)
+
+
+def test_an_unknown_condition_is_refused_with_the_choices() -> None:
+    with pytest.raises(ConditionError, match=r"'magic'.*highlight, none, optimal") as caught:
+        condition("magic")
+    assert isinstance(caught.value, HudError)
+
+
+@pytest.mark.parametrize(
+    "name", ["hud.nowhere:hud_state", "hud.conditions.none:missing", "hud.conditions.none:__doc__", ":x"]
+)
+def test_a_bad_outside_name_is_refused(name: str) -> None:
+    with pytest.raises(ConditionError, match="condition"):
+        condition(name)
+
+
+def test_a_condition_from_outside_is_found_by_module_and_attribute() -> None:
+    assert condition("hud.conditions.optimal:hud_state") is condition("optimal")
+
+
+@pytest.mark.parametrize("name", ["none", "highlight", "optimal"])
+@pytest.mark.parametrize("count", COUNTS)
+def test_all_conditions_list_every_bin_with_picture_and_place(name: str, count: int) -> None:
+    view = sample.task(count, steps=3)
+    listed = shown(name, view).bins
+    assert [b.label for b in listed] == [r.label for r in view.receptacles]
+    for entry, receptacle in zip(listed, view.receptacles, strict=True):
+        assert entry.picture == receptacle.picture
+        assert receptacle.room in entry.place and receptacle.place in entry.place
+
+
+@pytest.mark.parametrize("name", ["none", "highlight", "optimal"])
+def test_hands_progress_clock_and_message_pass_through(name: str) -> None:
+    text = message("hands_full")
+    view = sample.task(12, steps=6, message=text, clock=12.5)
+    state = shown(name, view)
+    labels = {o.name: o.label for o in view.objects}
+    assert [s.label for s in state.inventory] == [None if h is None else labels[h] for h in view.hands]
+    assert (state.delivered, state.total, state.clock, state.message) == (2, 12, 12.5, text)
+    assert sum(s.label is not None for s in state.inventory) == 2
+
+
+@pytest.mark.parametrize("name", ["none", "highlight"])
+def test_lists_start_in_the_participants_order(name: str) -> None:
+    view = sample.task(12)
+    reordered = dataclasses.replace(view, order=view.order[::-1])
+    labels = {o.name: o.label for o in view.objects}
+    assert [i.text for i in shown(name, view).checklist] == [labels[n] for n in view.order]
+    assert [i.text for i in shown(name, reordered).checklist] == [labels[n] for n in view.order[::-1]]
+
+
+@pytest.mark.parametrize("name", ["none", "highlight"])
+def test_picked_objects_are_crossed_out_and_move_to_the_bottom_in_order_of_picking(name: str) -> None:
+    view = sample.task(6)
+    steps = (("pick", "object_04"), ("pick", "object_01"), ("place", "object_04"))
+    view = with_status(view, object_04="delivered", object_01="carried")
+    rows = shown(name, dataclasses.replace(view, steps_done=steps)).checklist
+    waiting = [n for n in view.order if n not in ("object_04", "object_01")]
+    labels = {o.name: o.label for o in view.objects}
+    assert [r.text for r in rows] == [labels[n] for n in (*waiting, "object_04", "object_01")]
+    assert [r.done for r in rows] == [False] * 4 + [True] * 2
+
+
+def test_a_dropped_object_returns_to_its_place_in_the_list() -> None:
+    view = sample.task(6)
+    dropped = dataclasses.replace(view, steps_done=(("pick", view.order[0]),))
+    rows = shown("none", dropped).checklist
+    assert rows == shown("none", view).checklist
+    assert not any(r.done for r in rows)
+
+
+def test_none_names_bins_but_neither_rooms_nor_anything_in_the_world() -> None:
+    view = sample.task(24, steps=5)
+    state = shown("none", view)
+    assert state.markers == () and state.pointer is None
+    bins = {o.label: view.receptacle(o.receptacle) for o in view.objects}
+    for row in state.checklist:
+        assert row.detail == f"→ {bins[row.text].label}"
+        assert row.target_picture == bins[row.text].picture and row.picture == f"object:{row.text}"
+        assert row.number is None and not row.current
+
+
+def test_highlight_adds_the_room_of_what_lies_about() -> None:
+    view = sample.task(24, steps=5)
+    rooms = {o.label: o.room for o in view.objects}
+    for row in shown("highlight", view).checklist:
+        assert row.detail.startswith(rooms[row.text]) is not row.done
+
+
+def test_highlight_flags_exactly_the_misplaced_objects() -> None:
+    view = sample.task(12, steps=6)
+    flags = shown("highlight", view).markers
+    assert {m.role for m in flags} == {"flagpole"}
+    poles = [m for m in flags if m.shape == "cylinder"]
+    loose = [o for o in view.objects if o.status == "loose"]
+    assert len(loose) == 12 - 4
+    assert sorted(m.position[:2] for m in poles) == sorted(o.position[:2] for o in loose)
+    for pole in poles:
+        assert pole.position[2] - pole.size[1] > 0.1, "the pole stands clear above the object"
+
+
+def test_optimal_numbers_the_steps_and_highlights_the_next() -> None:
+    view = sample.task(6, steps=3)
+    rows = shown("optimal", view).checklist
+    assert [r.number for r in rows] == list(range(1, 13))
+    assert [r.done for r in rows] == [True] * 3 + [False] * 9
+    assert [r.current for r in rows] == [False] * 3 + [True] + [False] * 8
+    steps = (*view.steps_done, *view.plan)
+    for row, (kind, name) in zip(rows, steps, strict=True):
+        thing = view.object(name)
+        assert row.text == thing.label and row.picture == thing.picture
+        if kind == "pick":
+            assert row.detail.startswith("Pick up")
+            assert (thing.room in row.detail) is not row.done
+        else:
+            assert row.detail.startswith(f"Put in {view.receptacle(thing.receptacle).label}")
+            assert (view.receptacle(thing.receptacle).room in row.detail) is not row.done
+
+
+def test_optimal_keeps_the_order_in_which_steps_were_really_done() -> None:
+    view = sample.task(6)
+    deviated = dataclasses.replace(view, steps_done=(PlannedStep("pick", "object_05"),), plan=view.plan[:3])
+    assert [r.text for r in shown("optimal", deviated).checklist] == [
+        view.object(n).label for n in ("object_05", "object_00", "object_01", "object_00")
+    ]
+
+
+def test_optimal_with_everything_done_has_nothing_current_and_nothing_in_the_world() -> None:
+    state = shown("optimal", sample.task(6, steps=12))
+    assert all(r.done and not r.current for r in state.checklist)
+    assert state.markers == () and state.delivered == state.total == 6
+
+
+def test_optimal_points_to_the_goal_only_when_it_is_out_of_view() -> None:
+    view = sample.task(6, steps=0)
+    away = dataclasses.replace(view, camera=sample.camera(640, 480, yaw=3.0))
+    facing = dataclasses.replace(view, camera=sample.camera(640, 480, yaw=0.6))
+    assert view.goal is not None and view.goal[0] < 0, "the goal is ahead on the left"
+    assert shown("optimal", view).pointer is None
+    assert shown("optimal", facing).pointer is None
+    assert shown("optimal", away).pointer is not None
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"order": ("object_00",)}, "order"),
+        ({"hands": ("ghost", None)}, "ghost"),
+        ({"plan": (PlannedStep("pick", "ghost"),)}, "ghost"),
+        ({"steps_done": (("throw", "object_00"),)}, "throw"),
+        ({"receptacles": ()}, "dish_bin"),
+        ({"path": np.zeros((2, 3))}, r"\(2, 3\)"),
+    ],
+)
+def test_an_inconsistent_view_is_refused_by_name(change: dict[str, object], named: str) -> None:
+    with pytest.raises(TaskViewError, match=named):
+        dataclasses.replace(sample.task(6), **change)  # type: ignore[arg-type]
+
+
+def test_an_unknown_status_is_refused() -> None:
+    with pytest.raises(TaskViewError, match="lost"):
+        with_status(sample.task(6), object_00="lost")
+
+
+# Refusals and events that the physics side reports; the message bar must have a text for each.
+REPORTED = {
+    "busy", "nothing_in_reach", "out_of_reach", "hands_full", "hands_empty", "not_carried", "already_carried",
+    "already_delivered", "not_the_receptacle", "receptacle_out_of_reach", "unknown_object",
+    "picked", "pick_failed", "placed", "place_failed", "grip_lost", "dislodged",
+}  # fmt: skip
+
+
+def test_there_is_a_text_for_everything_that_is_reported() -> None:
+    assert set(TEXTS) >= REPORTED
+
+
+@pytest.mark.parametrize("key", sorted(TEXTS))
+def test_messages_are_sentences_with_and_without_labels(key: str) -> None:
+    for bar in (message(key), message(key, object="Blue mug", receptacle="Office supply box")):
+        assert bar.text[0].isupper() and bar.text.endswith(".") and "{" not in bar.text
+        assert "Blue mug" not in bar.text, "labels read as part of the sentence"
+    assert (message(key).kind is MessageKind.SUCCESS) is (key in ("picked", "placed", "finished"))
+
+
+def test_messages_name_what_they_are_about() -> None:
+    assert (
+        message("placed", object="Blue mug", receptacle="Dish bin").text
+        == "You put the blue mug in the dish bin."
+    )
+
+
+def test_an_unknown_message_is_refused_with_the_choices() -> None:
+    with pytest.raises(MessageError, match=r"'oops'.*hands_full"):
+        message("oops")
+
+
+@pytest.mark.parametrize(
+    ("label", "inside"),
+    [
+        ("Blue mug", "blue mug"), ("T-shirt", "T-shirt"), ("LEGO car", "LEGO car"), ("Office-supply box",
+        "office-supply box"), ("Turquoise T-shirt", "turquoise T-shirt"), ("Stapler", "stapler"), ("", ""),
+    ],
+)  # fmt: skip
+def test_labels_inside_a_sentence(label: str, inside: str) -> None:
+    assert in_sentence(label) == inside
+
+
+def test_messages_fade_linearly_after_they_were_shown() -> None:
+    assert [fade(t) for t in (0.0, SHOWN, SHOWN + FADE / 4, SHOWN + FADE, 1e9)] == pytest.approx(
+        [1, 1, 0.75, 0, 0]
+    )
+
+
+def test_rows_are_plain_values() -> None:
+    assert shown("none", sample.task(6)).checklist[0] == ChecklistItem(
+        "Blue mug", "→ Dish bin", "object:Blue mug", "receptacle:dish_bin"
+    )

@@ -1,0 +1,182 @@
+"""Laws of the layout: whatever is shown, panels stay apart, inside the frame and narrow, and the current row shows."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from hud import sample, theme
+from hud.canvas import Rect
+from hud.compose import Compositor
+from hud.conditions import condition
+from hud.errors import FrameError
+from hud.layout import Layout, window
+from hud.messages import TEXTS, message
+from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, Pointer
+from hud.text import Typeface
+
+FRAMES = ((640, 480), (1280, 720), (1920, 1080), (320, 240), (800, 600), (480, 640), (2560, 1080), (641, 479))
+
+labels = st.one_of(
+    st.text(max_size=40),
+    st.sampled_from(["Blue mug", "Set of very long wooden building blocks", "W" * 60, "ÄÖÅ ñ", ""]),
+)
+pictures = st.sampled_from([None, "object:Novel", "missing"])
+
+
+@st.composite
+def states(draw: st.DrawFn) -> HudState:
+    count = draw(st.integers(0, 48))
+    numbered = draw(st.booleans())
+    current = draw(st.integers(-1, count - 1))
+    items = tuple(
+        ChecklistItem(
+            draw(labels),
+            draw(labels),
+            "object:Novel",
+            draw(pictures),
+            i + 1 if numbered else None,
+            i < current,
+            i == current,
+        )
+        for i in range(count)
+    )
+    bins = tuple(
+        BinEntry(draw(labels), draw(labels), draw(pictures)) for _ in range(draw(st.integers(0, 12)))
+    )
+    text = draw(st.one_of(labels, st.text(min_size=50, max_size=200)))
+    return HudState(
+        checklist_title=draw(labels),
+        checklist=items,
+        bins=bins,
+        inventory=(InventorySlot(draw(labels), draw(pictures)), InventorySlot()),
+        message=draw(st.one_of(st.none(), st.builds(Message, st.just(text), st.sampled_from(MessageKind)))),
+        delivered=draw(st.integers(0, 40)),
+        total=draw(st.integers(0, 40)),
+        clock=draw(st.one_of(st.none(), st.floats(0.0, 1e5))),
+        pointer=draw(st.one_of(st.none(), st.builds(Pointer, st.floats(-math.pi, math.pi)))),
+    )
+
+
+def overlap(a: Rect, b: Rect) -> bool:
+    return a.x < b.right and b.x < a.right and a.y < b.bottom and b.y < a.bottom
+
+
+def layout(state: HudState, size: tuple[int, int]) -> Layout:
+    return Compositor({}).layout(state, *size)
+
+
+@settings(max_examples=60, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@given(states(), st.sampled_from(FRAMES))
+def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(
+    state: HudState, size: tuple[int, int]
+) -> None:
+    found = layout(state, size)
+    panels = found.panels()
+    for name, rect in panels.items():
+        assert rect.x >= 0 and rect.y >= 0 and rect.right <= size[0] and rect.bottom <= size[1], name
+        assert rect.width > 0 and rect.height > 0, name
+    for (a, left), (b, right) in itertools.combinations(panels.items(), 2):
+        assert not overlap(left, right), f"{a} {left} overlaps {b} {right}"
+    covered = sum(r.width * r.height for r in panels.values())
+    assert covered <= 0.55 * size[0] * size[1], "even with twelve bins and a long message"
+    if "checklist" in panels:
+        assert panels["checklist"].width <= 0.3 * size[0]
+    centre = Rect(size[0] // 2 - 1, size[1] // 2 - 1, 2, 2)
+    assert not any(overlap(centre, rect) for name, rect in panels.items()), "what the person looks at is free"
+
+
+@settings(max_examples=50, deadline=None)
+@given(states(), st.sampled_from(FRAMES))
+def test_the_current_row_is_shown_and_texts_stay_in_their_rows(
+    state: HudState, size: tuple[int, int]
+) -> None:
+    found = layout(state, size)
+    face = Typeface()
+    detail = max(1, round(theme.DETAIL.size * found.unit))
+    current = [i for i, item in enumerate(state.checklist) if item.current]
+    assert all(found.first <= i < found.stop for i in current)
+    assert len(found.rows) == found.stop - found.first
+    assert (found.checklist is None) is (not state.checklist)
+    for row in found.rows:
+        for line in row.detail:
+            assert face.width(line, detail, theme.DETAIL.weight) <= row.text_width
+    if found.message is not None:
+        size_px = max(1, round(theme.BAR.size * found.unit))
+        for line in found.message_lines:
+            assert face.width(line, size_px, theme.BAR.weight) <= found.message.width
+
+
+@settings(max_examples=25, deadline=None)
+@given(states(), st.sampled_from(FRAMES[:2]))
+def test_every_state_can_be_drawn_and_changes_only_its_panels(state: HudState, size: tuple[int, int]) -> None:
+    frame = sample.backdrop(*size)
+    compositor = Compositor(sample.pictures(48))
+    outside = np.ones(frame.shape[:2], dtype=bool)
+    for rect in compositor.layout(state, *size).panels().values():
+        outside[rect.y : rect.bottom, rect.x : rect.right] = False
+    drawn = compositor.compose(frame, state)
+    assert np.array_equal(drawn[outside], frame[outside])
+
+
+@given(st.lists(st.integers(1, 40), min_size=1, max_size=60), st.data())
+def test_a_window_holds_the_current_row_and_wastes_no_room(heights: list[int], data: st.DataObject) -> None:
+    current = data.draw(st.integers(0, len(heights) - 1))
+    room = data.draw(st.integers(40, 400))
+    first, stop = window(heights, current, room)
+    used = sum(heights[first:stop])
+    assert 0 <= first <= current < stop <= len(heights)
+    assert used <= room
+    assert stop == len(heights) or used + heights[stop] > room
+    if sum(heights) <= room:
+        assert (first, stop) == (0, len(heights))
+
+
+def test_a_plan_of_48_steps_is_windowed_around_the_current_step() -> None:
+    view = sample.task(24, steps=21)
+    found = layout(condition("optimal")(view), (640, 480))
+    assert found.first <= 19 and found.stop > 21, "two steps done and the next step are in sight"
+    assert found.stop - found.first >= 7
+    assert found.stop - 22 >= 4, "so are some that come after it"
+
+
+@pytest.mark.parametrize(("size", "share"), [((640, 480), 0.48), ((1280, 720), 0.42), ((1920, 1080), 0.42)])
+def test_the_view_stays_mostly_free_at_the_hardest_level(size: tuple[int, int], share: float) -> None:
+    for name in ("none", "highlight", "optimal"):
+        view = sample.task(24, steps=21, message=message("hands_full"))
+        covered = sum(r.width * r.height for r in layout(condition(name)(view), size).panels().values())
+        assert covered <= share * size[0] * size[1]
+
+
+def test_six_objects_all_fit_in_every_condition() -> None:
+    for name in ("none", "highlight"):
+        found = layout(condition(name)(sample.task(6)), (640, 480))
+        assert (found.first, found.stop) == (0, 6)
+
+
+@pytest.mark.parametrize("key", sorted(TEXTS))
+@pytest.mark.parametrize("size", FRAMES[:3])
+def test_messages_are_never_cut(key: str, size: tuple[int, int]) -> None:
+    bar = message(key, object="Stack of picture books", receptacle="Office-supply box")
+    state = HudState("", (), condition("none")(sample.task(6)).bins, (InventorySlot(), InventorySlot()), bar)
+    assert " ".join(layout(state, size).message_lines) == bar.text
+
+
+@pytest.mark.parametrize("size", FRAMES[:3])
+def test_places_and_details_of_the_sample_are_never_cut(size: tuple[int, int]) -> None:
+    for name in ("none", "highlight", "optimal"):
+        found = layout(condition(name)(sample.task(24, steps=9)), size)
+        lines = [
+            line
+            for row in (*found.rows, *found.bin_rows)
+            for line in getattr(row, "detail", getattr(row, "place", ()))
+        ]
+        assert lines and not any("…" in line for line in lines)
+
+
+def test_a_frame_too_small_to_read_is_refused() -> None:
+    with pytest.raises(FrameError, match="319 x 240"):
+        layout(condition("none")(sample.task(6)), (319, 240))
