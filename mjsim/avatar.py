@@ -43,7 +43,8 @@ START_PITCH = math.radians(-12.0)
 PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
 # Postures of a hand in the body frame: forward, to its own side, up; m.
 REST = (0.34, 0.27, 1.00)
-CARRY = (0.48, 0.24, 1.22)
+CARRY = (0.48, 0.24, 1.20)
+TUCKED = (0.27, 0.19, 1.22)
 ASIDE = (0.30, 0.42, 1.26)
 HAND_KP = 2000.0
 HAND_KV = 130.0
@@ -230,8 +231,8 @@ def _draw_hand(node: Any, hand: str, side: float) -> None:
         capsule(f"finger_{i}", _GLOVE, 0.0095, 0.02, y, 0.030, x, y, 0.008)
         capsule(f"tip_{i}", _GLOVE, 0.0088, x, y, 0.008, x - 0.004, y, -0.022)
     capsule("thumb", _GLOVE, 0.0105, -0.03, -side * 0.030, 0.024, 0.012, -side * 0.048, -0.012)
-    capsule("cuff", _GLOVE, 0.034, -0.045, 0, 0.036, -0.085, side * 0.011, 0.042)
-    capsule("sleeve", _SLEEVE, 0.040, -0.085, side * 0.011, 0.042, -0.27, side * 0.06, 0.07)
+    capsule("cuff", _GLOVE, 0.033, -0.045, 0, 0.034, -0.080, side * 0.012, 0.034)
+    capsule("sleeve", _SLEEVE, 0.036, -0.080, side * 0.012, 0.034, -0.150, side * 0.040, 0.030)
 
 
 def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:

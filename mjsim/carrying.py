@@ -30,23 +30,23 @@ class Carrying:
         self._yield[:] = 0.0
         self._stretched = [0, 0]
 
-    def update(self, moving_hand: int | None) -> None:
+    def update(self, held_posture: tuple[float, float, float]) -> None:
         """Set the targets of the hands that no motion moves, and guard the walking command.
 
         Args:
-            moving_hand: Hand that a pick or place moves, or None.
+            held_posture: Where a hand that holds something belongs, such as `avatar.CARRY`.
         """
         person = self._person
         self._yield *= 1.0 - _RELAX * person.dt
         for hand, item in enumerate(person.held):
-            if hand == moving_hand:
+            if hand == person.moving_hand:
                 continue
             if item is None:
                 person.retire(hand)
                 continue
             for normal in self._obstacle_normals(item):
                 self._give_way(hand, normal)
-            goal = np.array(avatar.posture(hand, avatar.CARRY if moving_hand is None else avatar.ASIDE))
+            goal = np.array(avatar.posture(hand, held_posture))
             goal[:2] += self._yield[hand]
             person.move_hand(hand, goal)
 

@@ -32,6 +32,7 @@ class Person:
 
     Attributes:
         held: Index of the object in the left and the right hand, or None.
+        moving_hand: Hand that a motion moves at present; the others keep their posture.
     """
 
     scene: Scene
@@ -41,6 +42,7 @@ class Person:
     grips: Grips
     monitor: HealthMonitor
     held: list[int | None] = field(default_factory=lambda: [None, None])
+    moving_hand: int | None = None
 
     @property
     def dt(self) -> float:

@@ -9,7 +9,7 @@ from mjsim.person import Motion, Person, Steps, minimum_jerk
 _REACH_TIME = 0.44
 _APPROACH_TIME = 0.4  # longest wait for the hand to arrive after the reach
 _ALIGN_TIME = 0.12
-_LIFT_TIME = 0.48
+_LIFT_TIME = 0.56
 _SHIFT = 0.2  # share of a movement by which one of its two parts leads the other
 _CLOSE_ENOUGH = 0.012
 
@@ -23,6 +23,7 @@ def pick(person: Person, hand: int, item: int) -> Motion:
     rig, grips = person.rig, person.grips
     pitch = rig.pitch_target
     yield from person.face(person.center(item))
+    person.moving_hand = hand
     grip = grips.nearest_grip(hand, item)
     yield from _reach(person, hand, item, grip)
     for _ in range(person.steps(_APPROACH_TIME)):

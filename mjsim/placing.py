@@ -52,6 +52,7 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry) 
     rig = person.rig
     pitch = rig.pitch_target
     yield from person.face(receptacle.center, heading=_square_heading(person, receptacle), tolerance=0.04)
+    person.moving_hand = hand
     corners = object_corners(person.scene.model, person.scene.index.geoms(person.scene.index.names[item]))
     footprint = _footprint(person, hand, item, receptacle, corners)
     slots = fill_slots(person, item, receptacle, footprint)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from mjsim import avatar
 from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick, Place, WorldEvent
 from mjsim.carrying import Carrying
 from mjsim.errors import ActionError, PhysicsError
@@ -77,6 +78,7 @@ class World:
         grips = Grips(scene, self.data, rig)
         self._person = Person(scene, self.options, self.data, rig, grips, HealthMonitor(rig.foot))
         self._carrying = Carrying(self._person)
+        self._motion: _Motion | None = None
         self.reset()
 
     @property
@@ -108,7 +110,7 @@ class World:
         person.rig.reset()
         person.grips.reset()
         self._carrying.reset()
-        self._motion: _Motion | None = None
+        self._end_motion()
         self._events: list[WorldEvent] = []
         self._set_inventory(Inventory())
         self._status = [ObjectStatus.LOOSE] * len(self.scene.index.names)
@@ -128,7 +130,7 @@ class World:
             self._person.walk(move)
         else:
             self._run_motion(self._motion)
-        self._carrying.update(self._motion.hand if self._motion else None)
+        self._carrying.update(self._held_posture())
         self._person.rig.advance()
         self._person.monitor.check(self.model, self.data)
         self._watch_grips()
@@ -192,7 +194,7 @@ class World:
             return
         except StopIteration as finished:
             success = bool(finished.value)
-        self._motion = None
+        self._end_motion()
         name = self.scene.index.names[motion.item]
         if isinstance(motion.action, Pick):
             if success:
@@ -206,6 +208,16 @@ class World:
         kind = EventKind.PLACED if success else EventKind.PLACE_FAILED
         self._report(kind, motion.item, motion.receptacle)
 
+    def _end_motion(self) -> None:
+        self._motion = None
+        self._person.moving_hand = None
+
+    def _held_posture(self) -> tuple[float, float, float]:
+        """Held things are drawn in to turn, and kept out of the way of a reaching hand."""
+        if self._motion is None:
+            return avatar.CARRY
+        return avatar.TUCKED if self._person.moving_hand is None else avatar.ASIDE
+
     def _watch_grips(self) -> None:
         motion = self._motion
         for hand, item in enumerate(self._person.held):
@@ -217,7 +229,7 @@ class World:
             self._report(EventKind.GRIP_LOST, item)
             if motion is not None and motion.hand == hand:
                 motion.steps.close()
-                self._motion = None
+                self._end_motion()
 
     def _watch_deliveries(self) -> None:
         for item, status in enumerate(self._status):
