@@ -116,7 +116,9 @@ class Assistant:
             deviated=self._route is not None and not self._route.follows(kind, event.object),
             alternatives=self._alternatives(observation, event),
             position=[round(float(v), 6) for v in here],
-            geodesic_m=round(self._house.geodesics.shortest_path(self._stood, here).geodesic_distance, 6),
+            geodesic_m=round(
+                self._house.body_geodesics.shortest_path(self._stood, here).geodesic_distance, 6
+            ),
         )
         self._stood = here
         self._board.did(STEP[kind], event.object)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.known_house import KnownHouse, spread_viewpoints
+from mjsim.avatar import TRUNK_RADIUS
 from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode
 from mjsim.footprint import footprint
@@ -27,7 +28,8 @@ class House:
     Attributes:
         catalogue: Rooms, categories, receptacles and object models.
         navmesh: Navigability from the compiled model's own geoms.
-        geodesics: Shortest paths on it.
+        geodesics: Shortest paths on it, for planning and guidance: a little away from the walls.
+        body_geodesics: Shortest paths of somebody who brushes along the walls; no walk is shorter.
         rooms: Which room a point lies in.
         receptacles: Receptacle key -> geometry.
         bounds: (x_min, y_min, x_max, y_max) of the floor, m.
@@ -36,6 +38,7 @@ class House:
     catalogue: Catalogue
     navmesh: NavMesh
     geodesics: Geodesics
+    body_geodesics: Geodesics
     rooms: RoomMap
     receptacles: Mapping[str, ReceptacleGeometry]
     bounds: tuple[float, float, float, float]
@@ -58,6 +61,7 @@ class House:
             catalogue=catalogue,
             navmesh=navmesh,
             geodesics=Geodesics(navmesh),
+            body_geodesics=Geodesics(NavMesh.build(floor.obstacles, floor.bounds, agent_radius=TRUNK_RADIUS)),
             rooms=RoomMap.from_model(model, catalogue.rooms),
             receptacles=receptacle_geometries(model, catalogue.receptacles),
             bounds=floor.bounds,

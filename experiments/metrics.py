@@ -41,11 +41,11 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
     """Measure a trial.
 
     A visit's place is where the person stood, not where the object lay: things are reached over up to a metre, and
-    the geodesic between standing places is the shortest walk that could have joined them, which keeps the inverse
-    path length at most 1.
+    the geodesic between standing places, for a body that brushes along the walls, is the shortest walk that could
+    have joined them. So the inverse path length never exceeds 1.
 
     Args:
-        events: The event log in order.
+        events: The event log in order; it ends with `end`, at the moment of the last delivery if that is why.
         positions: Floor position at every control step, m, shape (T, 2).
     """
     visits = [e for e in events if e["event"] == "visit"]
@@ -61,16 +61,9 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
         normalized_deviations=deviations / len(choices) if choices else 0.0,
         inverse_path_length=shortest / walked if walked > 0 else 1.0,
         task_distance_m=walked,
-        completion_time_s=_completion_time(events),
+        completion_time_s=float(events[-1]["t"]),
         optimal_distance_m=float(plans[0]["cost_m"]) if plans else 0.0,
         replans=max(len(plans) - 1, 0),
         refusals=sum(e["event"] == "attempt" and not e["applied"] for e in events),
         failures=sum(e["event"] in ("pick_failed", "place_failed", "grip_lost") for e in events),
     )
-
-
-def _completion_time(events: Sequence[Event]) -> float:
-    end = events[-1]
-    if end["event"] == "end" and end["reason"] == "all delivered":
-        return float(max(e["t"] for e in events if e["event"] == "placed"))
-    return float(end["t"])

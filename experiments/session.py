@@ -155,7 +155,9 @@ class Session:
             seen = visible_objects(
                 self._world.scene, self._world.data, observation.eye, observation.heading, observation.pitch
             )
-            return {name: _position_of(observation, name) for name in seen}
+            # What has been put away stays in view, in its bin, but nobody takes it for misplaced.
+            loose = set(observation.names_with(ObjectStatus.LOOSE))
+            return {name: _position_of(observation, name) for name in seen if name in loose}
 
         return Percept(
             time=observation.time,

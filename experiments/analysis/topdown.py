@@ -16,6 +16,7 @@ from experiments.records import Event
 from mjsim.files import replacing
 from mjsim.render import render_floorplan
 from mjsim.scene import Scene
+from mjsim.world import World
 
 # Okabe-Ito colours, told apart in all common kinds of colour vision.
 CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
@@ -41,9 +42,8 @@ def draw_topdown(
     )
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    floor = render_floorplan(
-        scene.model, scene.initial_data(), house.bounds, pixels_per_metre=PIXELS_PER_METRE
-    )
+    floor = render_floorplan(scene.model, World(scene).data, house.bounds, pixels_per_metre=PIXELS_PER_METRE)
+    x_min, y_min, x_max, y_max = floor.bounds
     axes.imshow(floor.rgb, extent=(x_min, x_max, y_min, y_max), interpolation="bilinear")
     _draw_rooms(axes, house)
     planned = planned_path(house, scene, plan)

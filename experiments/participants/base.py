@@ -46,7 +46,7 @@ class Percept:
         flagpoles: Object instance name -> floor position of the flagpole over it, m; empty in conditions without.
         targets: Object instance name -> receptacle key, from the lists in the HUD.
         answer: The world's answer to the previous action, if that was a pick or place.
-        look: Objects in view at this moment -> their floor position, m; computed only when asked.
+        look: Misplaced objects in view at this moment -> their floor position, m; computed only when asked.
     """
 
     time: float
