@@ -30,7 +30,10 @@ def export_house(scene: Scene, path: Path) -> None:
     """
     if path.suffix != ".xml":
         raise AssetError(f"cannot export to {path}: MuJoCo reads models from files that end in .xml")
-    root = ET.fromstring(scene.spec.to_xml())
+    try:
+        root = ET.fromstring(scene.spec.to_xml())
+    except ValueError as error:  # MuJoCo compiles anew, from the files
+        raise AssetError(f"cannot export to {path}: {error}") from error
     for compiler in root.findall("compiler"):
         for folder in ("meshdir", "texturedir", "assetdir"):
             compiler.attrib.pop(folder, None)
