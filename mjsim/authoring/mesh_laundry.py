@@ -91,7 +91,9 @@ def _towel() -> Surface:
         + 0.012 * np.sin(9 * u + 2) * np.cos(7 * v)
     )
     height = np.where(radius > 0.999, 0.0, np.maximum(height, 0.006))
-    return sheet(np.stack([reach * radius * np.cos(angle), reach * radius * np.sin(angle), height], axis=-1))
+    return sheet(
+        np.stack([reach * radius * np.cos(angle) - 0.008, reach * radius * np.sin(angle), height], axis=-1)
+    )
 
 
 def _jeans() -> Surface:

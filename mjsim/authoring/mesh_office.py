@@ -102,7 +102,7 @@ def _notebook() -> dict[str, Surface]:
     loops = []
     for y in np.linspace(-0.085, 0.085, 11):
         bow = arc(0.0115, 0, 2 * math.pi, 9)
-        loops.append(tube(np.column_stack([bow[:, 0] - 0.07, np.full(9, y), bow[:, 1] + 0.011]), 0.0022, 4))
+        loops.append(tube(np.column_stack([bow[:, 0] - 0.07, np.full(9, y), bow[:, 1] + 0.0138]), 0.0022, 4))
     return {
         "notebook_cover": slab(0.138, 0.2, 0.002).moved((0.004, 0, 0.018)),
         "notebook_spiral": join(loops),

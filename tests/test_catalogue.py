@@ -1,0 +1,135 @@
+"""The catalogue: what ships is complete, and every mistake in a file is reported by name."""
+
+from pathlib import Path
+
+import pytest
+
+import mjsim.assets
+from mjsim.assets import models_root
+from mjsim.catalogue import Catalogue
+from mjsim.errors import AssetError
+
+SHIPPED = models_root() / "houses" / "apartment" / "catalogue.toml"
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """The shipped catalogue beside an empty house, free to be spoiled."""
+    (tmp_path / "house.xml").write_text("<mujoco/>", encoding="utf-8")
+    path = tmp_path / "catalogue.toml"
+    path.write_text(SHIPPED.read_text(encoding="utf-8"), encoding="utf-8")
+    return path
+
+
+def test_the_apartment_has_the_six_categories_of_the_paper_with_distinct_models() -> None:
+    catalogue = Catalogue.load()
+    assert list(catalogue.categories) == ["dishes", "toys", "books", "laundry", "office", "recycling"]
+    for category in catalogue.categories.values():
+        assert len(category.objects) >= 4, category.key
+        assert catalogue.receptacles[category.receptacle].category == category.key
+        assert all(catalogue.objects[key].category == category.key for key in category.objects)
+    labels = [item.label for item in (*catalogue.objects.values(), *catalogue.receptacles.values())]
+    assert len(set(labels)) == len(labels)  # a participant tells things apart by label
+
+
+def test_every_file_on_disk_is_in_the_catalogue() -> None:
+    catalogue = Catalogue.load()
+    for folder, entries in (("objects", catalogue.objects), ("receptacles", catalogue.receptacles)):
+        assert {path.stem for path in (models_root() / folder).glob("*.xml")} == set(entries)
+
+
+def test_a_path_gives_the_same_catalogue_as_the_name() -> None:
+    named, by_path = Catalogue.load("apartment"), Catalogue.load(str(SHIPPED))
+    assert (named.objects, named.receptacles, named.categories) == (
+        by_path.objects,
+        by_path.receptacles,
+        by_path.categories,
+    )
+    assert named.house_path == by_path.house_path
+    assert list(named.objects) == list(by_path.objects)  # sampling depends on the order
+
+
+def test_receptacle_of_follows_the_category() -> None:
+    catalogue = Catalogue.load()
+    assert catalogue.receptacle_of("mug").key == "dish_bin"
+    with pytest.raises(AssetError, match="'banana'"):
+        catalogue.receptacle_of("banana")
+
+
+MISTAKES = {
+    "missing object file": ('"objects/mug.xml"', '"objects/mugg.xml"', "mugg.xml"),
+    "missing receptacle file": ('"receptacles/toy_box.xml"', '"receptacles/box.xml"', "box.xml"),
+    "missing house file": ('model = "house.xml"', 'model = "villa.xml"', "villa.xml"),
+    "unknown receptacle": ('receptacle = "dish_bin"', 'receptacle = "sink"', "'sink'"),
+    "shared receptacle": (
+        'receptacle = "dish_bin"',
+        'receptacle = "toy_box"',
+        "share the receptacle 'toy_box'",
+    ),
+    "unknown room": ('room = "bathroom"', 'room = "cellar"', "'cellar'"),
+    "unknown object": ('objects = ["mug", ', 'objects = ["cup", ', "'cup'"),
+    "object in two categories": ('objects = ["toy_car", ', 'objects = ["mug", "toy_car", ', "'mug'"),
+    "object in no category": ('objects = ["mug", ', "objects = [", "objects.mug"),
+    "empty label": ('label = "Blue mug"', 'label = " "', "objects.mug"),
+    "label of another type": ('label = "Blue mug"', "label = 7", "objects.mug"),
+    "entry that is no table": (
+        "[categories.dishes]",
+        "[categories]\nextra = 3\n[categories.dishes]",
+        "extra",
+    ),
+    "unknown table": ("[house]", "[houses]", "houses"),
+    "not TOML": ("[house]", "[house", "catalogue.toml"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_reported_with_the_file_and_the_culprit(copy: Path, mistake: str) -> None:
+    old, new, culprit = MISTAKES[mistake]
+    text = copy.read_text(encoding="utf-8")
+    assert old in text
+    copy.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(AssetError) as caught:
+        Catalogue.load(str(copy))
+    assert culprit in str(caught.value)
+    assert str(copy) in str(caught.value)
+
+
+def test_a_category_with_an_empty_list_is_reported(copy: Path) -> None:
+    lines = copy.read_text(encoding="utf-8").splitlines()
+    start = lines.index("[categories.laundry]")
+    row = next(i for i in range(start, len(lines)) if lines[i].startswith("objects"))
+    lines[row] = "objects = []"
+    copy.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(AssetError, match=r"categories\.laundry\] has no object"):
+        Catalogue.load(str(copy))
+
+
+def test_a_missing_table_is_reported(copy: Path) -> None:
+    copy.write_text('[house]\nlabel = "Hut"\nmodel = "house.xml"\n', encoding="utf-8")
+    with pytest.raises(AssetError, match=r"table \[\w+\] is missing"):
+        Catalogue.load(str(copy))
+
+
+@pytest.mark.parametrize("house", ["castle", "../houses/apartment", "", "nowhere/catalogue.toml"])
+def test_an_unknown_house_is_reported_by_name(house: str) -> None:
+    with pytest.raises(AssetError, match=r"house name|no house"):
+        Catalogue.load(house)
+
+
+def test_an_installed_package_prefers_the_models_it_carries(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "mjsim"
+    (tmp_path / "models" / "houses").mkdir(parents=True)
+    (package / "models" / "houses").mkdir(parents=True)
+    monkeypatch.setattr(mjsim.assets, "__file__", str(package / "assets.py"))
+    assert models_root() == (package / "models").resolve()
+
+
+def test_a_package_without_models_says_where_it_looked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mjsim.assets, "__file__", str(tmp_path / "mjsim" / "assets.py"))
+    with pytest.raises(AssetError) as caught:
+        models_root()
+    assert str(tmp_path.resolve() / "models") in str(caught.value)
