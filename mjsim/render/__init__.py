@@ -2,7 +2,9 @@
 
 from mjsim.render.cameras import CameraPose
 from mjsim.render.context import GlInfo, gl_info
+from mjsim.render.floorplan import FloorPlan, render_floorplan
 from mjsim.render.markers import MarkerLike
+from mjsim.render.pictures import render_picture, render_pictures
 from mjsim.render.profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
 from mjsim.render.renderer import Frame, Renderer
 
@@ -12,10 +14,14 @@ __all__ = [
     "PROFILES",
     "QUALITY",
     "CameraPose",
+    "FloorPlan",
     "Frame",
     "GlInfo",
     "MarkerLike",
     "RenderProfile",
     "Renderer",
     "gl_info",
+    "render_floorplan",
+    "render_picture",
+    "render_pictures",
 ]

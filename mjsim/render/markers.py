@@ -80,11 +80,7 @@ def geom_size(marker: MarkerLike) -> NDArray[np.float64]:
     size = _numbers(marker, "size", _SIZES[marker.shape])
     if min(size) <= 0.0:
         raise RenderError(f"marker sizes must be positive, got {marker.size!r} for a {marker.shape}")
-    if marker.shape == "sphere":
-        return np.full(3, size[0])
-    if marker.shape == "cylinder":
-        return np.array([size[0], size[0], size[1]])
-    return np.array(size)
+    return np.array((*size, 0.0, 0.0)[:3])
 
 
 def _numbers(marker: MarkerLike, field: str, count: int) -> list[float]:

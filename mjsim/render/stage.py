@@ -132,7 +132,8 @@ class Stage:
         """Geom ids (height, width), -1 for background and markers, and raw reversed depth of one pass."""
         scene, model_geoms = self._scene, self._scene.ngeom
         scene.flags[:] = 0
-        scene.flags[[_Flag.mjRND_SEGMENT, _Flag.mjRND_IDCOLOR, _Flag.mjRND_CULL_FACE]] = 1
+        for flag in (_Flag.mjRND_SEGMENT, _Flag.mjRND_IDCOLOR, _Flag.mjRND_CULL_FACE):
+            scene.flags[flag] = 1
         view.aim(scene)
         try:
             add_markers(scene, markers)
@@ -197,10 +198,9 @@ def checked_size(pixels: int) -> int:
 def _visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
     option = mujoco.MjvOption()
     option.flags[:] = 0
-    shown = [mujoco.mjtVisFlag.mjVIS_STATIC, mujoco.mjtVisFlag.mjVIS_SKIN]
-    if profile.textures:
-        shown.append(mujoco.mjtVisFlag.mjVIS_TEXTURE)
-    option.flags[shown] = 1
+    option.flags[mujoco.mjtVisFlag.mjVIS_STATIC] = 1
+    option.flags[mujoco.mjtVisFlag.mjVIS_SKIN] = 1
+    option.flags[mujoco.mjtVisFlag.mjVIS_TEXTURE] = profile.textures
     option.geomgroup[:] = [group in groups for group in range(len(option.geomgroup))]
     option.sitegroup[:] = 0
     return option

@@ -1,0 +1,115 @@
+"""What this machine offers to the simulator: versions, and what OpenGL draws with."""
+
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from mjsim.errors import RenderError
+from mjsim.render.context import EGL_PACKAGES, GlInfo, gl_info
+
+VENDOR_FOLDER = Path("/usr/share/glvnd/egl_vendor.d")
+DISTRIBUTIONS = ("mujoco", "dm-control", "numpy", "ortools", "opencv-python-headless", "pyopengl")
+
+
+@dataclass(frozen=True)
+class EnvironmentReport:
+    """Versions and graphics of this machine.
+
+    Attributes:
+        python: Version of the interpreter.
+        platform: Operating system and processor.
+        versions: Distribution -> version, or None where it is not installed.
+        egl_vendors: Names of the EGL vendor files found.
+        gl: What draws, or None where no context can be made.
+        problem: Why there is no context, or None.
+        advice: What to do, one step per entry; empty where nothing is amiss.
+    """
+
+    python: str
+    platform: str
+    versions: Mapping[str, str | None]
+    egl_vendors: tuple[str, ...]
+    gl: GlInfo | None
+    problem: str | None
+    advice: tuple[str, ...]
+
+    @property
+    def usable(self) -> bool:
+        """Whether everything needed is installed and frames can be drawn."""
+        return self.gl is not None and None not in self.versions.values()
+
+    def lines(self) -> tuple[str, ...]:
+        """The report as lines of text, advice last."""
+        rows = [f"python {self.python} on {self.platform}"]
+        rows += [f"{name} {version or 'not installed'}" for name, version in self.versions.items()]
+        rows.append(f"EGL vendor files: {', '.join(self.egl_vendors) or 'none'}")
+        if self.gl is None:
+            rows.append(f"OpenGL: unusable ({self.problem})")
+        else:
+            kind = "software" if self.gl.software else "hardware"
+            rows.append(f"OpenGL: {self.gl.renderer}, {self.gl.vendor}, {self.gl.version} ({kind})")
+        return (*rows, *self.advice)
+
+
+def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport:
+    """Look at this machine; makes an OpenGL context if that is possible.
+
+    Args:
+        vendor_folder: Where the vendor-neutral dispatch library looks for EGL drivers.
+    """
+    gl: GlInfo | None = None
+    problem: str | None = None
+    try:
+        gl = gl_info()
+    except RenderError as error:
+        problem = str(error)
+    versions = {name: _version(name) for name in DISTRIBUTIONS}
+    vendors = egl_vendors(vendor_folder)
+    return EnvironmentReport(
+        python=platform.python_version(),
+        platform=f"{platform.system()} {platform.machine()}",
+        versions=versions,
+        egl_vendors=vendors,
+        gl=gl,
+        problem=problem,
+        advice=advise(versions, vendors, gl),
+    )
+
+
+def egl_vendors(folder: Path = VENDOR_FOLDER) -> tuple[str, ...]:
+    """Names of the EGL vendor files in `folder`, in the order in which they are tried."""
+    return tuple(sorted(path.name for path in folder.glob("*.json")))
+
+
+def advise(
+    versions: Mapping[str, str | None], vendors: tuple[str, ...], gl: GlInfo | None
+) -> tuple[str, ...]:
+    """What to do about missing distributions, a missing OpenGL or an unused GPU."""
+    steps = [
+        f"{name} is missing: pip install {name}" for name, version in versions.items() if version is None
+    ]
+    if gl is None:
+        steps.append(
+            f"no frame can be drawn: on Debian or Ubuntu, apt-get install {' '.join(EGL_PACKAGES)}; "
+            "with an NVIDIA GPU also the driver's libnvidia-gl package"
+        )
+    elif gl.software and any("nvidia" in name for name in vendors):
+        steps.append(
+            f"an NVIDIA vendor file is present but {gl.renderer} draws: check that the driver is loaded "
+            "(nvidia-smi) and that the container may use graphics (NVIDIA_DRIVER_CAPABILITIES=all)"
+        )
+    elif gl.software:
+        steps.append(
+            "the CPU draws; with an NVIDIA GPU, 10_nvidia.json is missing from the EGL vendor folder: "
+            "install the driver's libnvidia-gl package"
+        )
+    return tuple(steps)
+
+
+def _version(distribution: str) -> str | None:
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return None

@@ -1,0 +1,75 @@
+"""The floor plan's scale is exact, and ceilings do not hide the rooms."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjsim.errors import RenderError
+from mjsim.render import render_floorplan
+
+# A red tile with its corners at whole centimetres, under a green ceiling; a tall blue post away from the centre.
+HOUSE = """<mujoco><worldbody>
+  <geom type="box" size="2 1.5 .05" pos="3 2 -.05" rgba="1 1 1 1"/>
+  <geom type="box" size=".25 .15 .01" pos="1.75 1.05 .01" rgba="1 0 0 1"/>
+  <geom type="box" size=".05 .05 1" pos="4.55 3.15 1" rgba="0 0 1 1"/>
+  <geom type="box" size="2 1.5 .05" pos="3 2 2.6" rgba="0 1 0 1" group="1"/>
+</worldbody></mujoco>"""
+BOUNDS = (1.0, 0.5, 5.0, 3.5)
+
+
+@pytest.fixture(scope="module")
+def house():
+    model = mujoco.MjModel.from_xml_string(HOUSE)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def box_of(mask: np.ndarray) -> tuple[int, int, int, int]:
+    """Columns and rows that a mask covers, ends exclusive."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
+
+
+def coloured(rgb: np.ndarray, channel: int) -> np.ndarray:
+    others = np.delete(rgb.astype(int), channel, axis=2).max(axis=2)
+    return rgb[..., channel].astype(int) > others + 60
+
+
+@pytest.mark.parametrize("scale", [40.0, 100.0])
+@pytest.mark.parametrize(
+    ("channel", "corners"), [(0, [(1.5, 1.2), (2.0, 0.9)]), (2, [(4.5, 3.2), (4.6, 3.1)])]
+)
+def test_known_tiles_land_on_their_pixels(house, scale, channel, corners):
+    """Upper left and lower right corner; the tall post shows no perspective."""
+    plan = render_floorplan(*house, BOUNDS, scale)
+    expected = plan.to_pixels(corners).ravel()
+    assert np.abs(np.array(box_of(coloured(plan.rgb, channel))) - expected).max() <= 0.5 + 1e-9
+
+
+def test_size_follows_bounds_and_scale(house):
+    plan = render_floorplan(*house, BOUNDS, 60)
+    assert plan.rgb.shape == (180, 240, 3)
+    assert plan.bounds == pytest.approx(BOUNDS)
+    np.testing.assert_allclose(plan.to_pixels([[1.0, 3.5], [5.0, 0.5]]), [[0, 0], [240, 180]], atol=1e-9)
+
+
+def test_bounds_grow_to_whole_pixels(house):
+    plan = render_floorplan(*house, (1.0, 0.5, 4.99, 3.49), 10)
+    assert plan.rgb.shape == (30, 40, 3)
+    np.testing.assert_allclose(plan.bounds, (1.0, 0.49, 5.0, 3.49))
+
+
+def test_the_ceiling_is_hidden_and_outside_is_paper(house):
+    plan = render_floorplan(*house, (0.0, 0.0, 6.0, 4.0), 20)
+    assert not coloured(plan.rgb, 1).any()
+    assert (plan.rgb[0, 0] == plan.rgb[-1, -1]).all() and plan.rgb[0, 0].min() > 200
+
+
+@pytest.mark.parametrize(
+    ("bounds", "scale"),
+    [((1, 0, 1, 2), 60), ((0, 0, 1, 1), 0), ((0, 0, np.inf, 1), 60), ((0, 0, 100, 1), 100)],
+)
+def test_unusable_bounds_and_scales_are_refused(house, bounds, scale):
+    with pytest.raises(RenderError):
+        render_floorplan(*house, bounds, scale)
