@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hud import panels
 from hud.canvas import Patch, Rect
 from hud.errors import FrameError
-from hud.layout import Layout, arrange
+from hud.layout import Layout, arrange, pointer_rect
 from hud.panels import Pen, Pictures
 from hud.state import HudState
 from hud.text import Typeface
@@ -74,11 +74,13 @@ class Compositor:
         Raises:
             FrameError: The frame is too small.
         """
-        clock = None if state.clock is None else 0.0
-        key = (width, height, dataclasses.replace(state, markers=(), clock=clock, delivered=0))
+        key = (width, height, _without_what_moves(state))
         if self._layout is None or self._layout[0] != key:
-            self._layout = (key, arrange(state, width, height, self._face))
-        return self._layout[1]
+            self._layout = (key, arrange(key[2], width, height, self._face))
+        found = self._layout[1]
+        if state.pointer is None:
+            return found
+        return dataclasses.replace(found, pointer=pointer_rect(state.pointer.angle, found.free, found.unit))
 
     def _patch(self, name: str, key: object, draw: Callable[[Pen], Patch], pen: Pen) -> Patch:
         known = self._patches.get(name)
@@ -100,6 +102,21 @@ def compose(frame: NDArray[np.uint8], state: HudState, pictures: Pictures) -> ND
         FrameError: The frame or a picture has another shape or type, or the frame is too small.
     """
     return Compositor(pictures).compose(frame, state)
+
+
+def _without_what_moves(state: HudState) -> HudState:
+    """The state less what changes from frame to frame without moving a panel."""
+    shown = state.message is not None and state.message.opacity > 0.0
+    return dataclasses.replace(
+        state,
+        markers=(),
+        clock=None if state.clock is None else 0.0,
+        delivered=0,
+        message=dataclasses.replace(state.message, opacity=1.0)
+        if state.message is not None and shown
+        else None,
+        pointer=None,
+    )
 
 
 def _part(name: str, rect: Rect, state: HudState, layout: Layout) -> tuple[object, Callable[[Pen], Patch]]:

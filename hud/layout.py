@@ -33,7 +33,7 @@ PADDING = 6
 TILE = 24
 TARGET = 20
 CONTEXT = 2  # rows above the current one that stay in sight
-NUMBER = 17
+NUMBER = 19
 LINE = 14
 SLOT_WIDTH = 118
 SLOT_HEIGHT = 40
@@ -170,7 +170,7 @@ def arrange(state: HudState, width: int, height: int, face: Typeface) -> Layout:
         checklist=checklist,
         bins=bins,
         inventory=inventory,
-        pointer=None if state.pointer is None else bounds.pointer(state.pointer.angle, free),
+        pointer=None if state.pointer is None else pointer_rect(state.pointer.angle, free, unit),
         free=free,
         first=first,
         stop=first + len(rows),
@@ -252,7 +252,7 @@ class _Bounds:
         rows: tuple[BinRow, ...] = ()
         for lines in (3, 2, 1, 0):
             wrapped = [
-                self.face.wrap(b.place, size, theme.DETAIL.weight, text, lines) if lines else ()
+                self.face.paragraph(b.place, size, theme.DETAIL.weight, text, lines) if lines else ()
                 for b in state.bins
             ]
             rows = tuple(BinRow(self.px(max(TILE, LINE * (1 + len(w))) + GAP), w) for w in wrapped)
@@ -301,20 +301,21 @@ class _Bounds:
         top = self.margin + self.px(CHIP_HEIGHT) + (MESSAGE_LINES - 1) * self.px(LINE + 3) + self.px(GAP)
         return Rect(left, top, width, inventory.y - self.px(GAP) - top)
 
-    def pointer(self, angle: float, free: Rect) -> Rect:
-        """A square at the edge of the free view in direction `angle`."""
-        side = self.px(POINTER)
-        half_width, half_height = (free.width - side) / 2.0, (free.height - side) / 2.0
-        dx, dy = math.cos(angle), -math.sin(angle)
-        reach = min(
-            half_width / abs(dx) if abs(dx) > 1e-9 else math.inf,
-            half_height / abs(dy) if abs(dy) > 1e-9 else math.inf,
-        )
-        x = free.x + half_width + reach * dx
-        y = free.y + half_height + reach * dy
-        return Rect(
-            min(max(round(x), free.x), free.right - side),
-            min(max(round(y), free.y), free.bottom - side),
-            side,
-            side,
-        )
+
+def pointer_rect(angle: float, free: Rect, unit: float) -> Rect:
+    """A square at the edge of the free view in direction `angle`, rad, counter-clockwise from the right."""
+    side = round(POINTER * unit)
+    half_width, half_height = (free.width - side) / 2.0, (free.height - side) / 2.0
+    dx, dy = math.cos(angle), -math.sin(angle)
+    reach = min(
+        half_width / abs(dx) if abs(dx) > 1e-9 else math.inf,
+        half_height / abs(dy) if abs(dy) > 1e-9 else math.inf,
+    )
+    x = free.x + half_width + reach * dx
+    y = free.y + half_height + reach * dy
+    return Rect(
+        min(max(round(x), free.x), free.right - side),
+        min(max(round(y), free.y), free.bottom - side),
+        side,
+        side,
+    )

@@ -17,7 +17,7 @@ def in_sentence(label: str) -> str:
 def bins(view: TaskView) -> tuple[BinEntry, ...]:
     """Every receptacle with picture and semantic location: all conditions show these (PAPER section 5)."""
     return tuple(
-        BinEntry(r.label, ", ".join(p for p in (r.room, r.place) if p), r.picture) for r in view.receptacles
+        BinEntry(r.label, ",\n".join(p for p in (r.room, r.place) if p), r.picture) for r in view.receptacles
     )
 
 

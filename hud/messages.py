@@ -26,14 +26,14 @@ TEXTS: Final = MappingProxyType(
         "dislodged": (_NO, "The {object} fell out of the {receptacle}."),
         "busy": (_NO, "One moment: your hands are still moving."),
         "nothing_in_reach": (_NO, "Nothing in reach. Walk closer to an object or a bin."),
-        "out_of_reach": (_NO, "You cannot reach the {object} from here. Walk closer."),
+        "out_of_reach": (_NO, "Walk closer to reach the {object}."),
         "hands_full": (_NO, "Both hands are full. Put something away first."),
         "hands_empty": (_NO, "Your hands are empty. Pick something up first."),
         "not_carried": (_NO, "You are not holding the {object}."),
         "already_carried": (_NO, "You are already holding the {object}."),
         "already_delivered": (_NO, "You have already put the {object} away."),
         "not_the_receptacle": (_NO, "Not here: take the {object} to the {receptacle}."),
-        "receptacle_out_of_reach": (_NO, "You cannot reach the {receptacle} from here. Walk closer."),
+        "receptacle_out_of_reach": (_NO, "Walk closer to reach the {receptacle}."),
         "unknown_object": (_NO, "There is no such object here."),
     }
 )

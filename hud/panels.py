@@ -73,7 +73,7 @@ def _checklist_row(pen: Pen, canvas: Canvas, item: ChecklistItem, row: ListRow, 
         area = Rect(px(3), top, canvas.width - 2 * px(3), row.height)
         canvas.rounded(area, 5.0 * pen.unit, theme.ACCENT, 0.16)
         canvas.rounded(
-            Rect(px(3), top + px(4), px(3), row.height - 2 * px(4)), 1.5 * pen.unit, theme.ACCENT, 1.0
+            Rect(px(2), top + px(4), px(3), row.height - 2 * px(4)), 1.5 * pen.unit, theme.ACCENT, 1.0
         )
     x = px(PADDING + 2)
     if item.number is not None:

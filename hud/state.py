@@ -73,7 +73,10 @@ class ChecklistItem:
 
 @dataclass(frozen=True)
 class BinEntry:
-    """A receptacle in the list that every condition shows: picture, name and semantic location."""
+    """A receptacle in the list that every condition shows: picture, name and semantic location.
+
+    A line break in `place` says where to break it when it does not fit in one line.
+    """
 
     label: str
     place: str

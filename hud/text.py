@@ -55,7 +55,7 @@ class Typeface:
         if lines <= 1 or self.width(whole, size, weight) <= width:
             fitted = self.fit(whole, size, weight, width)
             return (fitted,) if fitted else ()
-        parts = [part.strip(" ·") for part in text.split("\n")]
+        parts = [part.strip(" ·,") for part in text.split("\n")]
         broken: list[str] = []
         for i, part in enumerate(parts):
             still_to_come = len(parts) - 1 - i

@@ -143,7 +143,7 @@ def test_a_plan_of_48_steps_is_windowed_around_the_current_step() -> None:
     assert found.stop - 22 >= 4, "so are some that come after it"
 
 
-@pytest.mark.parametrize(("size", "share"), [((640, 480), 0.48), ((1280, 720), 0.42), ((1920, 1080), 0.42)])
+@pytest.mark.parametrize(("size", "share"), [((640, 480), 0.49), ((1280, 720), 0.42), ((1920, 1080), 0.42)])
 def test_the_view_stays_mostly_free_at_the_hardest_level(size: tuple[int, int], share: float) -> None:
     for name in ("none", "highlight", "optimal"):
         view = sample.task(24, steps=21, message=message("hands_full"))
