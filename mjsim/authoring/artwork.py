@@ -153,6 +153,18 @@ def keyboard(rng: np.random.Generator) -> Floats:  # noqa: ARG001 (all painters 
     return image
 
 
+def piano_keys(rng: np.random.Generator) -> Floats:  # noqa: ARG001
+    """Four octaves of a piano's keys seen from above."""
+    image = flat((64, 512), rgb("f4f2ec"))
+    whites = 28
+    for key in range(whites):
+        left = key / whites
+        image = _panel(image, (left - 0.001, 0.0, left + 0.001, 1.0), rgb("8d8b86"))
+        if key % 7 not in (0, 3):
+            image = _panel(image, (left - 0.009, 0.0, left + 0.009, 0.62), rgb("17171a"))
+    return image
+
+
 def book_spines(rng: np.random.Generator) -> Floats:
     """A row of books: coloured spines of different widths and heights with title bands."""
     shape = (128, 512)
@@ -221,6 +233,6 @@ def pinboard(rng: np.random.Generator) -> Floats:
 
 
 PICTURES = (
-    garden, art_hills, art_sea, art_shapes, art_leaf, poster_rocket, screen_desktop, keyboard, book_spines,
-    clock_face, mirror, pinboard,
+    garden, art_hills, art_sea, art_shapes, art_leaf, poster_rocket, screen_desktop, keyboard, piano_keys,
+    book_spines, clock_face, mirror, pinboard,
 )  # fmt: skip

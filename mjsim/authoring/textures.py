@@ -35,11 +35,6 @@ from mjsim.files import replacing
 Painter = Callable[[np.random.Generator], Floats]
 
 
-def plaster(rng: np.random.Generator) -> Floats:
-    """Grey: a painted wall with a faint mottle."""
-    return 0.965 + 0.012 * noise(rng, (256, 256), roll_off=1.2)
-
-
 def _planks(rng: np.random.Generator, light: Colour, dark: Colour) -> Floats:
     """Floor boards along x: 16 rows of two boards; 512 px stand for 2 m."""
     size, rows = 512, 16
@@ -152,7 +147,7 @@ def marble(rng: np.random.Generator) -> Floats:
 
 def brushed_steel(rng: np.random.Generator) -> Floats:
     """Grey: metal brushed along x."""
-    return 0.88 + 0.03 * noise(rng, (128, 128), roll_off=0.4, stretch=40.0)
+    return 0.92 + 0.012 * noise(rng, (128, 128), roll_off=0.5, stretch=40.0)
 
 
 def leaves(rng: np.random.Generator) -> Floats:
@@ -191,14 +186,15 @@ def quilt(rng: np.random.Generator) -> Floats:
     return blend(image, rgb("ffffff"), 0.75 * joints(shape, 4, 4, 5.0) * dots)
 
 
-def stars(rng: np.random.Generator) -> Floats:
-    """Wallpaper: pale yellow with scattered white and orange dots."""
+def polka_dots(rng: np.random.Generator) -> Floats:
+    """Wallpaper: pale yellow with staggered white, orange and teal dots."""
     shape = (256, 256)
-    image = flat(shape, rgb("f5dfae"))
+    image = flat(shape, rgb("fae7b8")) + 0.006 * noise(rng, shape, roll_off=0.8)[..., None]
     for index in range(16):
-        centre = ((index % 4 + 0.5 + rng.uniform(-0.2, 0.2)) / 4, (index // 4 + 0.5 + rng.uniform(-0.2, 0.2)) / 4)
-        colour = rgb("ffffff") if index % 3 else rgb("e9a25b")
-        image = blend(image, colour, disc_mask(shape, centre, 0.028))
+        row, column = divmod(index, 4)
+        centre = ((column + 0.25 + 0.5 * (row % 2)) / 4, (row + 0.5) / 4)
+        colour = rgb(("ffffff", "f0b06a", "ffffff", "8cc5bf")[(index + row // 2) % 4])
+        image = blend(image, colour, disc_mask(shape, centre, 0.026))
     return image
 
 
@@ -207,7 +203,7 @@ def damask(rng: np.random.Generator) -> Floats:
     shape = (256, 256)
     x, y = grid(shape)
     motif = np.cos(x * 4 * np.pi) + np.cos(y * 4 * np.pi) + 0.5 * np.cos(x * 8 * np.pi) * np.cos(y * 8 * np.pi)
-    return 0.93 + 0.035 * np.tanh(3.0 * motif) + 0.006 * noise(rng, shape, roll_off=1.0)
+    return 0.95 + 0.02 * np.tanh(3.0 * motif) + 0.006 * noise(rng, shape, roll_off=1.0)
 
 
 def _framed_rug(shape: tuple[int, int], field: Floats, bands: list[tuple[float, Colour]]) -> Floats:
@@ -267,26 +263,28 @@ def shadow_box(rng: np.random.Generator) -> Floats:  # noqa: ARG001 (all painter
     """RGBA: contact shadow of a box; the box covers the middle 80 % of the image."""
     x, y = grid((128, 128))
     inside = smooth_step(np.minimum(x, 1 - x), 0.0, 0.2) * smooth_step(np.minimum(y, 1 - y), 0.0, 0.2)
-    return _black_with_alpha(0.6 * inside)
+    return _black_with_alpha(0.38 * inside)
 
 
 def shadow_round(rng: np.random.Generator) -> Floats:  # noqa: ARG001
     """RGBA: contact shadow of something round."""
     x, y = grid((128, 128))
-    return _black_with_alpha(0.6 * (1.0 - smooth_step(np.hypot(x - 0.5, y - 0.5), 0.15, 0.5)))
+    return _black_with_alpha(0.38 * (1.0 - smooth_step(np.hypot(x - 0.5, y - 0.5), 0.15, 0.5)))
 
 
 def shadow_edge(rng: np.random.Generator) -> Floats:  # noqa: ARG001
     """RGBA: darkening towards a corner of the room, strongest at the lower edge of the image."""
-    _, y = grid((64, 16))
-    return _black_with_alpha(0.3 * y**2)
+    x, y = grid((64, 64))
+    ends = smooth_step(np.minimum(x, 1 - x), 0.0, 0.1)
+    # The last rows lie under the skirting; they are clear because a texture wraps round to its other edge.
+    return _black_with_alpha(np.where(y < 0.95, 0.3 * ends * y**2, 0.0))
 
 
 TEXTURES: Mapping[str, Painter] = {
     painter.__name__: painter
     for painter in (
-        plaster, oak_planks, pine_planks, wood_grain, kitchen_tiles, bath_tiles, metro_tiles, bricks, carpet,
-        fabric, towel, curtain, marble, brushed_steel, leaves, stripes, quilt, stars, damask, rug_living,
+        oak_planks, pine_planks, wood_grain, kitchen_tiles, bath_tiles, metro_tiles, bricks, carpet,
+        fabric, towel, curtain, marble, brushed_steel, leaves, stripes, quilt, polka_dots, damask, rug_living,
         rug_round, rug_runner, rug_bedroom, shadow_box, shadow_round, shadow_edge, *artwork.PICTURES,
     )
 }  # fmt: skip
