@@ -47,7 +47,7 @@ def _pot() -> dict[str, Surface]:
     ears = []
     for side in (-1, 1):
         bow = arc(0.026, -0.5 * math.pi, 0.5 * math.pi, 9)
-        ears.append(tube(np.column_stack([bow[:, 1], side * (0.07 + bow[:, 0]), np.full(9, 0.066)]), 0.0065))
+        ears.append(tube(np.column_stack([side * (0.07 + bow[:, 0]), bow[:, 1], np.full(9, 0.066)]), 0.0065))
     lid = lathe([(0.0, 0.085), (0.078, 0.085), (0.078, 0.09), (0.055, 0.102), (0.02, 0.108), (0, 0.108)], 28)
     knob = lathe([(0, 0.106), (0.008, 0.106), (0.009, 0.114), (0.017, 0.12), (0.015, 0.128), (0, 0.13)], 14)
     return {"pot_body": body, "pot_lid": lid, "pot_fittings": join([*ears, knob])}
@@ -76,6 +76,6 @@ def _teapot() -> dict[str, Surface]:
     knob = lathe([(0, 0.112), (0.006, 0.112), (0.012, 0.121), (0.009, 0.129), (0, 0.131)], 12)
     shift = (0, -0.01, 0)
     return {
-        "teapot_body": join([belly, spout, handle]).moved(shift),
-        "teapot_lid": join([lid, knob]).moved(shift),
+        "teapot_body": join([belly, spout, handle]).moved(shift).turned(-math.pi / 2),
+        "teapot_lid": join([lid, knob]).moved(shift).turned(-math.pi / 2),
     }

@@ -213,7 +213,7 @@ def _wicker() -> Picture:
     horizontal = 0.62 + 0.38 * np.outer(strand, bulge)
     vertical = 0.62 + 0.38 * np.outer(bulge, strand)
     shade = np.where(across, horizontal, vertical)
-    picture: Picture = np.clip(shade[..., None] * np.array([226, 182, 118]), 0, 255).astype(np.uint8)
+    picture: Picture = np.clip(shade[..., None] * np.array([250, 208, 142]), 0, 255).astype(np.uint8)
     return picture
 
 
