@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mjsim.scene import Scene
 
 SHOWN_GROUPS = (0, 1, 2)  # what the first-person view draws of the house and the objects
+PASS = 1e-4  # share of a ray that is skipped to get through a surface of the person
 INSET = 0.7  # of the half extents: box corners and face centres of round things are empty
 _OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
 
@@ -62,18 +63,33 @@ def visible_objects(
     owners, points = np.nonzero(inside)
     if not owners.size:
         return ()
-    directions = np.ascontiguousarray(rays[owners, points])
-    hits = np.full(len(directions), -1, np.int32)
-    distances = np.empty(len(directions))
-    groups = np.zeros(mujoco.mjNGROUP, np.uint8)
-    groups[list(SHOWN_GROUPS)] = 1
-    mujoco.mj_multiRay(
-        scene.model, data, origin, directions.ravel(), groups, True, -1, hits, distances, None,
-        len(directions), mujoco.mjMAXVAL,
-    )  # fmt: skip
+    hits = _first_hits(scene, data, origin, rays[owners, points])
     met = np.where(hits >= 0, scene.index.geom_owner[hits], -1)
     seen = np.unique(owners[met == owners])
     return tuple(scene.index.names[i] for i in seen)
+
+
+def _first_hits(
+    scene: Scene, data: mujoco.MjData, origin: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.int32]:
+    """Geom that each ray (k, 3) from `origin` meets first, the person's aside; -1 for none; shape (k,)."""
+    model, count = scene.model, len(directions)
+    groups = np.zeros(mujoco.mjNGROUP, np.uint8)
+    groups[list(SHOWN_GROUPS)] = 1
+    hits, distances = np.full(count, -1, np.int32), np.empty(count)
+    mujoco.mj_multiRay(
+        model, data, origin, np.ascontiguousarray(directions).ravel(), groups, True, -1, hits, distances, None,
+        count, mujoco.mjMAXVAL,
+    )  # fmt: skip
+    # What moves and is no object is the person: the hands are drawn, but nobody looks at them.
+    person = (scene.index.geom_owner == -1) & (model.body_weldid[model.geom_bodyid] != 0)
+    for ray in np.flatnonzero((hits >= 0) & person[hits]):
+        gone, geom = distances[ray], hits[ray : ray + 1]
+        while geom[0] >= 0 and person[geom[0]]:
+            gone += PASS
+            start = origin + gone * directions[ray]
+            gone += mujoco.mj_ray(model, data, start, directions[ray], groups, True, -1, geom)
+    return hits
 
 
 def _targets(scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
