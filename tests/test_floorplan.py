@@ -1,5 +1,7 @@
 """The floor plan's scale is exact, and ceilings do not hide the rooms."""
 
+import copy
+
 import mujoco
 import numpy as np
 import pytest
@@ -73,3 +75,20 @@ def test_the_ceiling_is_hidden_and_outside_is_paper(house):
 def test_unusable_bounds_and_scales_are_refused(house, bounds, scale):
     with pytest.raises(RenderError):
         render_floorplan(*house, bounds, scale)
+
+
+def test_objects_of_the_apartment_lie_where_the_plan_says(scene):
+    """Loose objects painted magenta must show at their computed pixels, up to their own size."""
+    model = copy.deepcopy(scene.model)
+    loose = scene.index.geom_owner >= 0
+    model.geom_matid[loose] = -1
+    model.geom_rgba[loose] = 1, 0, 1, 1
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    plan = render_floorplan(model, data, (-0.3, -0.3, 13.1, 10.7), 40)
+    rgb = plan.rgb.astype(int)
+    magenta = np.argwhere(rgb[..., [0, 2]].min(axis=2) > rgb[..., 1] + 80)[:, ::-1] + 0.5
+    places = plan.to_pixels(data.xpos[scene.index.bodies][:, :2])
+    apart = np.linalg.norm(places[:, None] - magenta[None], axis=2)
+    assert apart.min(axis=1).max() < 0.1 * 40
+    assert apart.min(axis=0).max() < 0.35 * 40  # and magenta is nowhere else

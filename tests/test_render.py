@@ -351,6 +351,27 @@ def test_the_rectangle_of_a_marker_holds_its_sphere(centre, radius, heading):
         assert bottom <= rows.min() and rows.max() < bottom + height
 
 
+# --- the apartment ----------------------------------------------------------------------------------------
+
+
+def test_the_person_sees_the_apartment_and_its_objects(scene):
+    """From the eye and from above every object: ids are those of shown groups, and each object is found."""
+    model = scene.model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hidden = np.flatnonzero(model.geom_group >= 3)
+    with Renderer(model, width=160, height=120) as made:
+        frame = made.frame(data, segmentation=True, depth=True)
+        assert frame.rgb.std() > 15
+        assert not np.isin(frame.segmentation, hidden).any()
+        assert len(np.unique(frame.segmentation)) > 10
+        np.testing.assert_allclose(frame.camera.position, data.camera("avatar/eye").xpos)
+        for name in scene.index.names:
+            position = data.body(f"{name}/object").xpos
+            above = CameraPose.looking_at(position + np.array([0, 0, 0.5]), position, 1.0)
+            assert np.isin(made.segmentation(data, above), scene.index.geoms(name)).sum() > 30, name
+
+
 # --- determinism, lifetime, errors ------------------------------------------------------------------------
 
 DIGEST = """

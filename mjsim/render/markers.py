@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from mjsim.errors import RenderError
 
 MAX_MARKERS = 1024
-# Three quarters of a marker's colour is its own light and a little is lit, so that it reads as a solid but
-# shines alike in every room.
-_GLOW = 0.75
-_LIT = 0.3
+# Most of a marker's colour is its own light and a little is lit, so that it reads as a solid but shines alike
+# in every room.
+_GLOW = 0.62
+_LIT = 0.32
 _SHAPES = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,

@@ -137,12 +137,13 @@ class Stage:
         view.aim(scene)
         try:
             add_markers(scene, markers)
-            table = np.full(scene.ngeom + 1, _BACKGROUND, dtype=np.int32)
-            for index, geom in enumerate(scene.geoms[: scene.ngeom]):
-                # Ids are drawn as colours; a marker needs one as well, or it would not be drawn at all.
-                geom.segid = index
-                if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and index < model_geoms:
-                    table[index + 1] = geom.objid
+            geoms = scene.geoms[: scene.ngeom]
+            for index in range(model_geoms, scene.ngeom):
+                # Ids are drawn as colours, and what has none is not drawn at all.
+                geoms[index].segid = index
+            kind = mujoco.mjtObj.mjOBJ_GEOM
+            owners = [_BACKGROUND] + [g.objid if g.objtype == kind else _BACKGROUND for g in geoms]
+            table = np.array(owners, dtype=np.int32)
             with context.current_context():
                 self._draw(scene, self._size, self._ids, self._depth)
         finally:
