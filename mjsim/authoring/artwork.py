@@ -56,7 +56,9 @@ def art_sea(rng: np.random.Generator) -> Floats:
     """A sailing boat at sea."""
     shape = (256, 384)
     _, y = grid(shape)
-    image = ramp(y, [(0.0, rgb("8cc4e8")), (0.55, rgb("e3f1f2")), (0.551, rgb("2f7fa3")), (1.0, rgb("14425f"))])
+    image = ramp(
+        y, [(0.0, rgb("8cc4e8")), (0.55, rgb("e3f1f2")), (0.551, rgb("2f7fa3")), (1.0, rgb("14425f"))]
+    )
     waves = noise(rng, shape, roll_off=1.0, stretch=8.0)
     image = blend(image, rgb("bfe3ea"), 0.5 * smooth_step(waves, 0.8, 1.8) * (y > 0.56))
     image = blend(image, rgb("fdfbf5"), shape_mask(shape, [(0.50, 0.16), (0.50, 0.62), (0.66, 0.62)]))
@@ -71,15 +73,21 @@ def art_shapes(rng: np.random.Generator) -> Floats:
     image = flat(shape, rgb("f0e9dc")) + 0.006 * noise(rng, shape, roll_off=0.8)[..., None]
     image = blend(image, rgb("d8572a"), disc_mask(shape, (0.38, 0.40), 0.24))
     image = blend(image, rgb("1f3b4d"), 0.92 * disc_mask(shape, (0.64, 0.60), 0.20))
-    image = blend(image, rgb("e8b04a"), shape_mask(shape, [(0.1, 0.72), (0.9, 0.66), (0.9, 0.71), (0.1, 0.77)]))
-    return blend(image, rgb("1f3b4d"), shape_mask(shape, [(0.18, 0.1), (0.22, 0.1), (0.22, 0.9), (0.18, 0.9)]))
+    image = blend(
+        image, rgb("e8b04a"), shape_mask(shape, [(0.1, 0.72), (0.9, 0.66), (0.9, 0.71), (0.1, 0.77)])
+    )
+    return blend(
+        image, rgb("1f3b4d"), shape_mask(shape, [(0.18, 0.1), (0.22, 0.1), (0.22, 0.9), (0.18, 0.9)])
+    )
 
 
 def art_leaf(rng: np.random.Generator) -> Floats:
     """A botanical print: one stem with paired leaves."""
     shape = (384, 256)
     image = flat(shape, rgb("f3efe4")) + 0.006 * noise(rng, shape, roll_off=0.8)[..., None]
-    image = blend(image, rgb("4d6b45"), shape_mask(shape, [(0.49, 0.1), (0.51, 0.1), (0.515, 0.9), (0.485, 0.9)]))
+    image = blend(
+        image, rgb("4d6b45"), shape_mask(shape, [(0.49, 0.1), (0.51, 0.1), (0.515, 0.9), (0.485, 0.9)])
+    )
     for index in range(5):
         base = 0.78 - 0.13 * index
         reach = 0.33 - 0.035 * index
@@ -136,7 +144,9 @@ def screen_desktop(rng: np.random.Generator) -> Floats:
     image = _panel(image, (0.63, 0.18, 0.94, 0.66), rgb("ffffff"))
     for bar in range(5):
         left = 0.66 + 0.053 * bar
-        image = _panel(image, (left, 0.62 - 0.38 * float(rng.uniform(0.3, 1)), left + 0.036, 0.62), rgb("e08a3c"))
+        image = _panel(
+            image, (left, 0.62 - 0.38 * float(rng.uniform(0.3, 1)), left + 0.036, 0.62), rgb("e08a3c")
+        )
     return _panel(image, (0.0, 0.92, 1.0, 1.0), rgb("1b2733"))
 
 
@@ -169,7 +179,18 @@ def book_spines(rng: np.random.Generator) -> Floats:
     """A row of books: coloured spines of different widths and heights with title bands."""
     shape = (128, 512)
     image = flat(shape, rgb("2a211b"))
-    codes = ("8c2f2b", "2f4f6f", "3f6b4a", "c59b4a", "5b3f66", "d9d0bd", "b5623a", "27343f", "7f9aa3", "e0b7a0")
+    codes = (
+        "8c2f2b",
+        "2f4f6f",
+        "3f6b4a",
+        "c59b4a",
+        "5b3f66",
+        "d9d0bd",
+        "b5623a",
+        "27343f",
+        "7f9aa3",
+        "e0b7a0",
+    )
     left = 2
     while left < shape[1] - 8:
         width = int(rng.integers(11, 26))

@@ -202,7 +202,9 @@ def damask(rng: np.random.Generator) -> Floats:
     """Grey: wallpaper of interlocking leaf-shaped lozenges."""
     shape = (256, 256)
     x, y = grid(shape)
-    motif = np.cos(x * 4 * np.pi) + np.cos(y * 4 * np.pi) + 0.5 * np.cos(x * 8 * np.pi) * np.cos(y * 8 * np.pi)
+    motif = (
+        np.cos(x * 4 * np.pi) + np.cos(y * 4 * np.pi) + 0.5 * np.cos(x * 8 * np.pi) * np.cos(y * 8 * np.pi)
+    )
     return 0.95 + 0.02 * np.tanh(3.0 * motif) + 0.006 * noise(rng, shape, roll_off=1.0)
 
 
