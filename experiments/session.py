@@ -98,7 +98,7 @@ class Session:
     ) -> tuple[Observation, str]:
         answer: ActionResult | None = None
         total = len(observation.object_names)
-        while observation.time < self._time_limit:
+        while observation.time < self._time_limit - 1e-9:
             self._film(observation)
             action = self._participant.act(self._percept(observation, answer))
             self.trajectory.append(observation, action)

@@ -53,6 +53,8 @@ class TrialConfig:
     time_limit: float | None = None
 
     def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ConfigError(f"seed must not be negative, got {self.seed}")
         if self.time_limit is not None and not self.time_limit > 0:
             raise ConfigError(f"time limit must be positive, got {self.time_limit} s")
 

@@ -15,10 +15,11 @@ def in_sentence(label: str) -> str:
 
 
 def bins(view: TaskView) -> tuple[BinEntry, ...]:
-    """Every receptacle with picture and semantic location: all conditions show these (PAPER section 5)."""
-    return tuple(
-        BinEntry(r.label, ",\n".join(p for p in (r.room, r.place) if p), r.picture) for r in view.receptacles
-    )
+    """Every receptacle with picture and room: all conditions show these (PAPER section 5).
+
+    The place within the room stays out: it would widen the panel into the view.
+    """
+    return tuple(BinEntry(r.label, r.room, r.picture) for r in view.receptacles)
 
 
 def inventory(view: TaskView) -> tuple[InventorySlot, InventorySlot]:

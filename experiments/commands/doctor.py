@@ -3,9 +3,6 @@
 import argparse
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
 from mjsim.environment_report import environment_report
 
 DESCRIPTION = """\
@@ -27,11 +24,6 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:  # noqa: ARG001 - every subcommand takes them
     """Print the report."""
     report = environment_report()
-    console = Console(highlight=False, soft_wrap=True)
-    table = Table(show_header=False, box=None)
-    for label, value in report.rows():
-        table.add_row(label, value)
-    console.print(table)
-    for line in report.advice:
-        console.print(line)
-    return 0 if report.can_render else 1
+    for line in report.lines():
+        print(line)
+    return 0 if report.usable else 1

@@ -1,0 +1,90 @@
+"""Batches: the whole design, in parallel, surviving a kill."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pyarrow.parquet as pq
+import pytest
+
+from experiments.batch import BatchConfig, run_batch, trial_name
+from experiments.errors import ConfigError
+from experiments.records import METRICS
+from experiments.trial import TrialConfig
+
+COMMAND = [
+    sys.executable,
+    "-m",
+    "experiments.cli",
+    "batch",
+    "--objects",
+    "6",
+    "--assistance",
+    "optimal,highlight",
+]
+
+
+def finished(out):
+    return sorted(out.glob(f"trials/*/{METRICS}"))
+
+
+def test_a_killed_batch_goes_on_where_it_stopped(tmp_path):
+    arguments = [*COMMAND, "--seeds", "0:2", "--workers", "1", "--out", str(tmp_path)]
+    process = subprocess.Popen(arguments, stderr=subprocess.DEVNULL, start_new_session=True)
+    deadline = time.monotonic() + 120
+    while not finished(tmp_path) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    before = {path: path.stat().st_mtime_ns for path in finished(tmp_path)}
+    assert 1 <= len(before) < 4
+
+    done = subprocess.run(arguments, check=True, capture_output=True, text=True, timeout=240)
+    assert "4 trials" in done.stderr
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    table = pq.read_table(tmp_path / "trials.parquet").to_pydict()
+    assert list(zip(table["assistance"], table["seed"], strict=True)) == [
+        ("optimal", 0),
+        ("optimal", 1),
+        ("highlight", 0),
+        ("highlight", 1),
+    ]
+    assert table["delivered"] == [6] * 4
+    assert len((tmp_path / "trials.csv").read_text().splitlines()) == 5
+
+
+def test_one_failing_trial_does_not_stop_the_others(tmp_path):
+    reports = []
+    batch = BatchConfig(objects=[6, 41], assistance=["optimal"], seeds=[0])
+    rows = run_batch(batch, tmp_path, workers=1, on_progress=reports.append)
+    assert [row["objects"] for row in rows] == [6]
+    assert (reports[-1].done, reports[-1].failed) == (1, 1)
+    assert any("objects is 41" in (r.failure or "") for r in reports)
+
+
+def test_unlike_trials_have_unlike_names():
+    configs = list(BatchConfig(objects=[6, 12], assistance=["none", "optimal"], seeds=range(3)).trials())
+    configs.append(TrialConfig(objects=6, assistance="none", seed=0, user="my.users:lazy"))
+    configs.append(TrialConfig(objects=6, assistance="none", seed=0, planner="greedy"))
+    assert len({trial_name(c) for c in configs}) == len(configs) == 14
+    assert not any("/" in trial_name(c) or ":" in trial_name(c) for c in configs)
+
+
+@pytest.mark.parametrize(
+    ("design", "fault"),
+    [
+        ({"seeds": []}, "at least one value for --seeds"),
+        ({"objects": [6, 6]}, "--objects names a value twice"),
+        ({"assistance": []}, "at least one value for --assistance"),
+    ],
+)
+def test_a_design_that_makes_no_sense_is_refused(design, fault):
+    with pytest.raises(ConfigError, match=fault):
+        BatchConfig(**{"objects": [6], "assistance": ["none"], "seeds": [0], **design})
+
+
+def test_a_batch_needs_a_worker(tmp_path):
+    with pytest.raises(ConfigError, match="at least one worker, got 0"):
+        run_batch(BatchConfig(objects=[6], assistance=["none"], seeds=[0]), tmp_path, workers=0)

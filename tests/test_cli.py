@@ -1,0 +1,86 @@
+"""The command line teaches, and names what is wrong with what it was given."""
+
+import argparse
+
+import mujoco
+import pytest
+
+from experiments.cli import main, parser
+from experiments.commands.options import frame_size, int_list, text_list
+from mjsim.episode import Episode
+
+
+@pytest.mark.parametrize(
+    ("text", "values"), [("6", [6]), ("6,12", [6, 12]), ("0:3", [0, 1, 2]), ("7,0:2", [7, 0, 1])]
+)
+def test_lists_of_numbers(text, values):
+    assert int_list(text) == values
+
+
+@pytest.mark.parametrize("text", ["", "a", "1:b", "3:3", "-1", "1;2"])
+def test_lists_that_are_none(text):
+    with pytest.raises(argparse.ArgumentTypeError):
+        int_list(text)
+
+
+def test_lists_of_words():
+    assert text_list("none, optimal,") == ["none", "optimal"]
+
+
+@pytest.mark.parametrize(("text", "size"), [("640x480", (640, 480)), ("1920x1080", (1920, 1080))])
+def test_frame_sizes(text, size):
+    assert frame_size(text) == size
+
+
+@pytest.mark.parametrize("text", ["640", "641x480", "8x8", "axb", "640x480x3"])
+def test_unusable_frame_sizes(text):
+    with pytest.raises(argparse.ArgumentTypeError, match=text):
+        frame_size(text)
+
+
+@pytest.mark.parametrize("command", ["run", "batch", "house", "gallery", "doctor"])
+def test_every_command_explains_itself(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([command, "--help"])
+    assert stop.value.code == 0
+    text = capsys.readouterr().out
+    assert len(text.splitlines()) > 5
+    assert parser().prog == "mjsim"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (["run", "--objects", "0", "--no-video"], "objects is 0"),
+        (["run", "--seed", "-1", "--no-video"], "seed must not be negative"),
+        (["run", "--assistance", "telepathy", "--no-video"], "no assistance condition 'telepathy'"),
+        (["run", "--user", "ghost", "--no-video"], "no participant 'ghost'"),
+        (["run", "--planner", "oracle", "--no-video"], "unknown solver 'oracle'"),
+        (["run", "--house", "castle", "--no-video"], "no house 'castle'"),
+        (["batch", "--seeds", "1,1"], "--seeds names a value twice"),
+    ],
+)
+def test_bad_input_is_named_in_one_line_and_leaves_nothing(arguments, fault, tmp_path, capsys):
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message.startswith("mjsim: ")
+    assert fault in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_house_for_stock_mujoco(tmp_path, capsys):
+    assert main(["house", "--objects", "12", "--seed", "3", "--out", str(tmp_path / "house.xml")]) == 0
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "house.xml"))
+    episode = Episode.load(tmp_path / "house.episode.json")
+    assert len(episode.objects) == 12
+    for placed in episode.objects:
+        address = model.joint(f"{placed.name}/free").qposadr[0]
+        assert model.qpos0[address : address + 3] == pytest.approx(placed.position)
+    assert "12 misplaced objects" in capsys.readouterr().out
+
+
+def test_the_doctor_names_the_renderer(capsys):
+    assert main(["doctor"]) == 0
+    text = capsys.readouterr().out
+    assert "OpenGL" in text
+    assert "mujoco" in text
