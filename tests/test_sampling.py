@@ -209,6 +209,9 @@ def test_composed_episode_is_at_rest(episodes: dict[tuple[int, int], Episode], c
     """Settled without the person, at rest with the person there as well."""
     scene = compose(episodes[3, 24], catalogue)
     data = mujoco.MjData(scene.model)
+    mujoco.mj_forward(scene.model, data)
+    touched = scene.index.geom_owner[data.contact.geom].ravel()
+    assert set(range(24)) <= set(touched.tolist())  # none floats
     # Hold the servos, or the hands leave for the origin.
     data.ctrl[:] = [
         scene.model.qpos0[scene.model.jnt_qposadr[scene.model.actuator_trnid[i, 0]]]
