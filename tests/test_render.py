@@ -14,8 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjsim.errors import RenderError
-from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info
+from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info, stage
 from mjsim.render.cameras import View
+from mjsim.render.culling import outside
 from mjsim.render.xray import screen_rectangle
 
 # A room seen along +x: back wall at x = 4, a low partition at x = 2 on the right (y < 0), a tilted camera as well.
@@ -370,6 +371,54 @@ def test_the_person_sees_the_apartment_and_its_objects(scene):
             position = data.body(f"{name}/object").xpos
             above = CameraPose.looking_at(position + np.array([0, 0, 0.5]), position, 1.0)
             assert np.isin(made.segmentation(data, above), scene.index.geoms(name)).sum() > 30, name
+
+
+@pytest.mark.parametrize("turn", range(6))
+def test_leaving_out_what_is_beside_the_view_changes_no_pixel(scene, monkeypatch, turn):
+    model = scene.model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    eye = data.camera("avatar/eye").xpos
+    pose = CameraPose.looking_at(eye, eye + np.array([np.cos(turn), np.sin(turn), -0.3]), 1.2)
+    markers = [Marker(tuple(eye + 2 * np.array([np.cos(turn), np.sin(turn), 0])), x_ray=True)]
+    with Renderer(model, width=120, height=90, profile="draft") as made:
+        kept = made.frame(data, pose, markers, depth=True, segmentation=True)
+        left_out = []
+        monkeypatch.setattr(
+            stage, "outside", lambda *a: left_out.append(outside(*a).mean()) or np.zeros(model.ngeom, bool)
+        )
+        whole = made.frame(data, pose, markers, depth=True, segmentation=True)
+    assert left_out[0] > 0.3  # or nothing was tested
+    np.testing.assert_array_equal(kept.rgb, whole.rgb)
+    np.testing.assert_array_equal(kept.depth, whole.depth)
+    np.testing.assert_array_equal(kept.segmentation, whole.segmentation)
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(0.05, 20)),
+    st.floats(0.01, 2.0),
+    st.floats(0, 1),
+    st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1)),
+    st.booleans(),
+)
+def test_a_sphere_with_a_point_in_view_is_never_left_out(place, radius, share, direction, orthographic):
+    """Start from a visible point and put a sphere around it anywhere."""
+    view = View(np.array([1.0, 2.0, 3.0]), np.eye(3), 0.7, orthographic=orthographic)
+    x, y, ahead = place
+    reach = 0.7 if orthographic else 0.7 * ahead
+    x, y = np.clip(x, -1.3, 1.3) / 1.3 * reach * 1.5, np.clip(y, -1, 1) * reach
+    point = view.position + np.array([x, y, -ahead])
+    norm = np.linalg.norm(direction)
+    centre = point + share * radius * np.array(direction) / max(norm, 1e-9)
+    assert not outside(view, 1.5, centre[None], np.array([radius]))[0]
+
+
+def test_planes_are_never_left_out():
+    view = View(np.zeros(3), np.eye(3), 0.7)
+    far_behind = np.array([[0.0, 0.0, 50.0]])
+    assert outside(view, 1.0, far_behind, np.array([1.0]))[0]
+    assert not outside(view, 1.0, far_behind, np.array([0.0]))[0]
 
 
 # --- determinism, lifetime, errors ------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mjsim.errors import RenderError
 from mjsim.render import context
 from mjsim.render.cameras import View
+from mjsim.render.culling import outside, without
 from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.xray import blend_hidden, screen_rectangle
@@ -67,6 +68,7 @@ class Stage:
         self._xray_scene.flags[:] = 0
         self._camera = mujoco.MjvCamera()
         self._model = model
+        self._centres = np.zeros((model.ngeom, 3))
         self._colour = np.empty((self._drawn[1], self._drawn[0], 3), np.uint8)
         self._ids = np.empty((height, width, 3), np.uint8)
         self._depth = np.empty((height, width), np.float32)
@@ -104,6 +106,7 @@ class Stage:
                 f"data has {len(data.geom_xpos)} geoms and {len(data.qpos)} coordinates, the renderer's model "
                 f"{self._model.ngeom} and {self._model.nq}; make a renderer for the model of this data"
             )
+        self._centres = data.geom_xpos.copy()
         category = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(self._model, data, self._option, None, self._camera, category, self._scene)
         if self._lights is not None:
@@ -116,7 +119,7 @@ class Stage:
         view.aim(scene)
         try:
             add_markers(scene, markers)
-            with context.current_context():
+            with context.current_context(), without(scene, self._unseen(view, self._profile)):
                 rectangle = self._draw(scene, self._drawn, self._colour, None)
                 self._add_x_ray(view, [m for m in markers if m.x_ray], rectangle)
         finally:
@@ -144,13 +147,20 @@ class Stage:
             kind = mujoco.mjtObj.mjOBJ_GEOM
             owners = [_BACKGROUND] + [g.objid if g.objtype == kind else _BACKGROUND for g in geoms]
             table = np.array(owners, dtype=np.int32)
-            with context.current_context():
+            with context.current_context(), without(scene, self._unseen(view)):
                 self._draw(scene, self._size, self._ids, self._depth)
         finally:
             scene.ngeom = model_geoms
         packed = cv2.flip(self._ids, 0).astype(np.int32)
         ids = table[packed[..., 0] | packed[..., 1] << 8 | packed[..., 2] << 16]
         return ids, np.asarray(cv2.flip(self._depth, 0), dtype=np.float32)
+
+    def _unseen(self, view: View, profile: RenderProfile | None = None) -> NDArray[np.bool_]:
+        """Geoms (ngeom,) that can leave no trace in this view."""
+        if profile is not None and (profile.shadow_size or profile.reflections):
+            return np.zeros(self._model.ngeom, dtype=bool)
+        aspect = max(width / height for width, height in (self._size, self._drawn))
+        return outside(view, aspect, self._centres, self._model.geom_rbound)
 
     def _draw(
         self,
