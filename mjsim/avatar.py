@@ -250,7 +250,7 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
                     name1=f"{PREFIX}{hand}_grip",
                     name2=site,
                     active=False,
-                    solref=[0.05, 1.0],
+                    solref=[0.02, 1.0],
                     solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
                 )
                 weld.data[_TORQUESCALE] = 0.5

@@ -1,34 +1,63 @@
-"""Carrying: the posture of the hands, and how they give way when what they hold touches the house.
+"""Carrying: the posture of the hands, and how they keep what they hold off the house.
 
-A held object that touches something static is not dragged on until the grip breaks. The hand gives way along
-the contact's normal, as an arm would; where it cannot any further, the body does not walk or turn into the
-contact. What still gets caught, by a blow or from above, slips out of the hand.
+A person draws a box in when passing a door frame. Here a hand looks up the clearance around the place where it
+is about to be and moves away from what is too near. Should the object touch something static all the same, the
+hand gives way along the contact's normal, and where it cannot any further, the body does not walk or turn into
+the contact. What still gets caught, by a blow or from above, slips out of the hand.
 """
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim import avatar
+from mjsim.clearance import ClearanceField
+from mjsim.inventory import LEFT, RIGHT
 from mjsim.person import Person
+from mjsim.placing import object_corners
 
+CARRY_BAND = (0.93, 1.60)  # heights that carried things take up, m
+_LOWEST = 0.97  # m, for the underside of what is carried: above counters
+_MARGIN = 0.03  # m
+_HORIZONS = (0.0, 0.15, 0.3)  # s, how far ahead a hand looks
+_ROUNDS = 3
+_MOST_SHIFT = 0.2  # m
+_EXTENSIONS = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.1, 0.0)
+_OVER_GAP = 0.04  # m, between two held things one above the other
+_PASSING = 0.10  # m of approach over which one is raised above the other
 _PUSH_BACK = 0.25  # m/s beyond the speed of approach
 _RELAX = 0.9  # 1/s
-_MOST_YIELD = 0.2  # m
+_MOST_YIELD = 0.15  # m
+_MOST_HELD_BACK = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
 _UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
+
+
+@dataclass(frozen=True)
+class _Load:
+    """Size of an object about its grip: how far it reaches sideways and down, m."""
+
+    radius: float
+    height: float
 
 
 class Carrying:
     """Keeps both hands in posture; one instance per world."""
 
     def __init__(self, person: Person) -> None:
+        scene = person.scene
+        low, high = CARRY_BAND
         self._person = person
+        self._clearance = ClearanceField.from_model(scene.model, low=low, high=high)
+        self._loads = [_load(person, item) for item in range(len(scene.index.names))]
         self._yield = np.zeros((2, 2))
-        self._stretched = [0, 0]
+        self._strained = [0, 0]
 
     def reset(self) -> None:
         """Forget all contacts."""
         self._yield[:] = 0.0
-        self._stretched = [0, 0]
+        self._strained = [0, 0]
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
         """Set the targets of the hands that no motion moves, and guard the walking command.
@@ -38,26 +67,81 @@ class Carrying:
         """
         person = self._person
         self._yield *= 1.0 - _RELAX * person.dt
+        goals = [np.array(avatar.posture(hand, avatar.REST)) for hand in (LEFT, RIGHT)]
         for hand, item in enumerate(person.held):
-            if hand == person.moving_hand:
-                continue
-            if item is None:
-                person.retire(hand)
+            if item is None or hand == person.moving_hand:
                 continue
             for normal in self._obstacle_normals(item):
                 self._give_way(hand, normal)
-            goal = np.array(avatar.posture(hand, held_posture))
-            goal[:2] += self._yield[hand]
-            person.move_hand(hand, goal)
+            load = self._loads[item]
+            forward, side, up = avatar.posture(hand, held_posture)
+            goals[hand] = np.array([forward, side, max(up, _LOWEST + load.height)])
+            goals[hand][:2] = self._yield[hand] + self._drawn_in(forward, side, load.radius)
+        if None not in person.held and person.moving_hand is None:
+            self._raise_right(goals)
+        for hand, goal in enumerate(goals):
+            if hand != person.moving_hand:
+                person.move_hand(hand, goal)
+
+    def _raise_right(self, goals: list[NDArray[np.float64]]) -> None:
+        """Where two held things would meet, pass the right one over the left one."""
+        left, right = (self._loads[item] for item in self._person.held if item is not None)
+        apart = math.hypot(*(goals[RIGHT] - goals[LEFT])[:2])
+        near = (left.radius + right.radius + _PASSING - apart) / _PASSING
+        over = goals[LEFT][2] + right.height + _OVER_GAP - goals[RIGHT][2]
+        goals[RIGHT][2] += min(1.0, max(0.0, near)) * max(0.0, over)
 
     def slipped(self, hand: int) -> bool:
-        """Whether the weld of a hand has been stretched for longer than the grip holds; counts this step."""
+        """Whether a hand has for too long been stretched off its load, or held back by it; counts this step."""
         person = self._person
         error = person.grips.error(hand)
         person.monitor.max_weld_error = max(person.monitor.max_weld_error, error)
-        stretched = error > person.options.grip_error
-        self._stretched[hand] = self._stretched[hand] + 1 if stretched else 0
-        return self._stretched[hand] * person.dt > person.options.grip_patience
+        held_back = float(np.linalg.norm(person.rig.hands[hand] - person.rig.hand_targets[hand]))
+        strained = error > person.options.grip_error or held_back > _MOST_HELD_BACK
+        self._strained[hand] = self._strained[hand] + 1 if strained else 0
+        return self._strained[hand] * person.dt > person.options.grip_patience
+
+    def _drawn_in(self, forward: float, left: float, radius: float) -> tuple[float, float]:
+        """Place nearest to a posture (forward, left) where a load is clear of the house, now and shortly.
+
+        Sideways first, as past a door frame; then towards the body's axis, which is always clear.
+        """
+        shift_f, shift_l = self._sideways(forward, left, radius + _MARGIN)
+        forward, left = forward + shift_f, left + shift_l
+        best, best_room = (forward, left), -math.inf
+        for share in _EXTENSIONS:
+            place = (share * forward, share * left)
+            room = min(self._room(*place, horizon)[0] for horizon in _HORIZONS) - radius
+            if room >= 0.5 * _MARGIN:
+                return place
+            if room > best_room:
+                best, best_room = place, room
+        return best
+
+    def _sideways(self, forward: float, left: float, needed: float) -> tuple[float, float]:
+        """Shift in the body frame, away from what is too near."""
+        shift_f, shift_l = 0.0, 0.0
+        for horizon in _HORIZONS:
+            for _ in range(_ROUNDS):
+                room, away_f, away_l = self._room(forward + shift_f, left + shift_l, horizon)
+                if room >= needed:
+                    break
+                shift_f += (needed - room) * away_f
+                shift_l += (needed - room) * away_l
+        size = math.hypot(shift_f, shift_l)
+        limit = min(1.0, _MOST_SHIFT / size) if size else 1.0
+        return shift_f * limit, shift_l * limit
+
+    def _room(self, forward: float, left: float, horizon: float) -> tuple[float, float, float]:
+        """Clearance in `horizon` seconds at a place of the body frame, and the way out, in that frame."""
+        rig = self._person.rig
+        forward += float(rig.velocity[0]) * horizon
+        left += float(rig.velocity[1]) * horizon
+        heading = rig.heading + rig.turn * horizon
+        x, y = rig.position.tolist()
+        c, s = math.cos(heading), math.sin(heading)
+        room, away_x, away_y = self._clearance.at(x + c * forward - s * left, y + s * forward + c * left)
+        return room, c * away_x + s * away_y, c * away_y - s * away_x
 
     def _obstacle_normals(self, item: int) -> NDArray[np.float64]:
         """Horizontal normals, away from static geoms that object `item` touches, house frame, (k, 2)."""
@@ -76,13 +160,13 @@ class Carrying:
         return np.asarray(normals[keep] / sizes[keep, None])
 
     def _give_way(self, hand: int, normal: NDArray[np.float64]) -> None:
-        person, rig = self._person, self._person.rig
+        rig = self._person.rig
         c, s = np.cos(rig.heading), np.sin(rig.heading)
         away = np.array([c * normal[0] + s * normal[1], c * normal[1] - s * normal[0]])
         x, y = rig.hand_targets[hand, :2]
         swing = float(away @ np.array([-y, x])) * rig.turn
         approach = -(float(away @ rig.velocity) + swing)
-        self._yield[hand] += away * ((max(approach, 0.0) + _PUSH_BACK) * person.dt)
+        self._yield[hand] += away * ((max(approach, 0.0) + _PUSH_BACK) * self._person.dt)
         size = float(np.linalg.norm(self._yield[hand]))
         if size > _MOST_YIELD:
             self._yield[hand] *= _MOST_YIELD / size
@@ -91,3 +175,11 @@ class Carrying:
             into = float(away @ rig.velocity)
             if into < 0.0:
                 rig.velocity = rig.velocity - into * away
+
+
+def _load(person: Person, item: int) -> _Load:
+    index = person.scene.index
+    corners = object_corners(person.scene.model, index.geoms(index.names[item]))
+    grip = person.scene.model.site(f"{index.names[item]}/grip_0").pos
+    about = corners - grip
+    return _Load(radius=float(np.hypot(about[:, 0], about[:, 1]).max()), height=float(-about[:, 2].min()))

@@ -23,7 +23,8 @@ Steps = Generator[None, None, None]
 _TURN_GAIN = 6.0  # 1/s
 _FACE_TIMEOUT = 3.0  # s
 _POSTURE_GAIN = 7.0  # 1/s
-_POSTURE_SPEED = 1.0  # m/s
+_POSTURE_SPEED = 1.5  # m/s
+_POSTURE_ACCELERATION = 8.0  # m/s^2
 
 
 @dataclass(eq=False)
@@ -32,6 +33,7 @@ class Person:
 
     Attributes:
         held: Index of the object in the left and the right hand, or None.
+        hand_velocities: How fast the hands' targets move where no motion moves them, m/s, shape (2, 3).
         moving_hand: Hand that a motion moves at present; the others keep their posture.
     """
 
@@ -42,6 +44,7 @@ class Person:
     grips: Grips
     monitor: HealthMonitor
     held: list[int | None] = field(default_factory=lambda: [None, None])
+    hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     moving_hand: int | None = None
 
     @property
@@ -62,9 +65,15 @@ class Person:
         targets = self.rig.hand_targets
         offset = goal - targets[hand]
         distance = float(np.linalg.norm(offset))
-        if distance > 0.0005:
-            step = min(_POSTURE_GAIN * distance, _POSTURE_SPEED) * self.dt
-            targets[hand] += offset * (step / distance)
+        if distance < 0.0005:
+            self.hand_velocities[hand] = 0.0
+            return
+        wanted = offset * (min(_POSTURE_GAIN * distance, _POSTURE_SPEED) / distance)
+        change = wanted - self.hand_velocities[hand]
+        size = float(np.linalg.norm(change))
+        allowed = _POSTURE_ACCELERATION * self.dt
+        self.hand_velocities[hand] += change * (min(1.0, allowed / size) if size else 0.0)
+        targets[hand] += self.hand_velocities[hand] * self.dt
 
     def retire(self, hand: int) -> None:
         """Move an empty hand towards its rest."""

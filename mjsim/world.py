@@ -109,6 +109,7 @@ class World:
         person.monitor = HealthMonitor(person.rig.foot)
         person.rig.reset()
         person.grips.reset()
+        person.hand_velocities = np.zeros((2, 3))
         self._carrying.reset()
         self._end_motion()
         self._events: list[WorldEvent] = []
@@ -209,6 +210,7 @@ class World:
         self._report(kind, motion.item, motion.receptacle)
 
     def _end_motion(self) -> None:
+        self._person.hand_velocities[:] = 0.0
         self._motion = None
         self._person.moving_hand = None
 
