@@ -196,6 +196,7 @@ def test_nothing_can_be_kicked_under_low_furniture(model: mujoco.MjModel, data: 
 def test_textures_are_what_the_scripts_paint(name: str) -> None:
     """One grey level of slack: another processor may round the last bit of a noise field differently."""
     stored = cv2.imread(str(MODELS / "textures" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
+    assert stored is not None, "run python -m mjsim.authoring"
     painted = textures.paint(name)
     if painted.ndim == 3:
         painted = painted[..., [2, 1, 0, *range(3, painted.shape[2])]]

@@ -232,13 +232,14 @@ def rug_living(rng: np.random.Generator) -> Floats:
 
 
 def rug_round(rng: np.random.Generator) -> Floats:
-    """Concentric rings for a round rug, seen as a square."""
+    """RGBA: a round rug of concentric rings; the corners are clear."""
     shape = (256, 256)
     x, y = grid(shape)
     radius = np.hypot(x - 0.5, y - 0.5) * 2
     colours = ("f6ead2", "5fb3b3", "f6ead2", "f2c14e", "f6ead2", "ee8572")
     image = np.asarray([rgb(code) for code in colours])[np.minimum((radius * 6).astype(int), 5)]
-    return np.asarray(image + 0.02 * noise(rng, shape, roll_off=0.4)[..., None], dtype=np.float64)
+    pile = image + 0.02 * noise(rng, shape, roll_off=0.4)[..., None]
+    return np.concatenate([pile, 1.0 - smooth_step(radius, 0.985, 1.0)[..., None]], axis=-1)
 
 
 def rug_runner(rng: np.random.Generator) -> Floats:
