@@ -117,8 +117,7 @@ def _in_field(
     left = rays @ np.array([-s, c, 0.0])
     up = rays @ np.array([-c * sp, -s * sp, cp])
     return np.asarray(
-        (forward > 0)
-        & (np.abs(left) <= forward * math.tan(field.horizontal / 2))
+        (np.abs(left) <= forward * math.tan(field.horizontal / 2))
         & (np.abs(up) <= forward * math.tan(field.vertical / 2))
         & (np.linalg.norm(rays, axis=-1) <= field.range)
     )

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mjsim.catalogue import Catalogue
-from mjsim.episode import Episode
+from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import AssetError
 from mjsim.export import export_house
 from mjsim.scene import Scene, compose
@@ -108,41 +108,55 @@ def test_other_endings_are_refused(scene: Scene, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def _with_mesh_files(small_house: Path, folder: Path) -> Catalogue:
+    """The small house with its wedge and its ball drawn by two files of the same name."""
+    for file in small_house.iterdir():
+        text = file.read_text(encoding="utf-8").replace(str(small_house), str(folder))
+        (folder / file.name).write_text(text, encoding="utf-8")
+    for name, top in (("wedge", 0.1), ("ball", 0.2)):
+        (folder / name).mkdir()
+        corners = f"v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 {top}\n"
+        faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+        (folder / name / "part.obj").write_text(corners + faces, encoding="utf-8")
+        (folder / f"{name}.xml").write_text(
+            f"""<mujoco><compiler meshdir="{name}"/><asset><mesh name="part" file="part.obj"/></asset>
+            <worldbody><body name="object"><geom type="mesh" mesh="part"/>
+            <site name="grip_0" pos="0 0 .1"/><site name="grip_1" pos="0 0 .1"/></body></worldbody></mujoco>""",
+            encoding="utf-8",
+        )
+    return Catalogue.load(str(folder / "catalogue.toml"))
+
+
+def test_files_of_the_same_name_are_kept_apart(small_house: Path, tmp_path: Path) -> None:
+    (tmp_path / "source").mkdir()
+    catalogue = _with_mesh_files(small_house, tmp_path / "source")
+    scene = compose(_on_the_floor(catalogue, "wedge", "ball"), catalogue)
+    export_house(scene, tmp_path / "house.xml")
+    shutil.rmtree(tmp_path / "source")
+    copy = mujoco.MjModel.from_xml_path(str(tmp_path / "house.xml"))
+    assert copy.nmesh == 2
+    np.testing.assert_allclose(copy.body_mass, scene.model.body_mass, rtol=1e-4)
+
+
 def test_lost_asset_is_named_and_leaves_no_house(small_house: Path, tmp_path: Path) -> None:
     """An asset file that vanished between composing and exporting."""
-    source = tmp_path / "source"
-    shutil.copytree(small_house, source)
-    for file in source.iterdir():
-        file.write_text(
-            file.read_text(encoding="utf-8").replace(str(small_house), str(source)), encoding="utf-8"
-        )
-    mesh = source / "wedge.obj"
-    mesh.write_text(
-        "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", encoding="utf-8"
-    )
-    wedge = source / "wedge.xml"
-    root = ET.parse(wedge).getroot()
-    asset = root.find("asset/mesh")
-    assert asset is not None
-    asset.attrib = {"name": "wedge", "file": "wedge.obj"}
-    ET.ElementTree(root).write(wedge)
-    catalogue = Catalogue.load(str(source / "catalogue.toml"))
-    placed = _on_the_floor(catalogue, "wedge")
-    composed = compose(placed, catalogue)
-    export_house(composed, tmp_path / "whole" / "house.xml")
-    assert [p.suffix for p in (tmp_path / "whole" / "assets").iterdir()] == [".obj"]
-    mesh.unlink()
-    with pytest.raises(AssetError, match=r"wedge\.obj"):
-        export_house(composed, tmp_path / "lost" / "house.xml")
+    (tmp_path / "source").mkdir()
+    catalogue = _with_mesh_files(small_house, tmp_path / "source")
+    scene = compose(_on_the_floor(catalogue, "wedge"), catalogue)
+    (tmp_path / "source" / "wedge" / "part.obj").unlink()
+    with pytest.raises(AssetError, match=r"wedge/part\.obj"):
+        export_house(scene, tmp_path / "lost" / "house.xml")
     assert not (tmp_path / "lost" / "house.xml").exists()
 
 
-def _on_the_floor(catalogue: Catalogue, model: str) -> Episode:
-    raw = {
-        "format": 1, "house": catalogue.name, "seed": 0, "start": {"x": 1.5, "y": 1.5, "heading": 0.0},
-        "objects": [{"name": "object_00", "category": catalogue.objects[model].category, "model": model,
-                     "point": [1, 1], "position": [1, 1, 0], "quaternion": [1, 0, 0, 0]}],
-        "receptacles": list(catalogue.receptacles),
-        "targets": {"object_00": catalogue.receptacle_of(model).key},
-    }  # fmt: skip
-    return Episode.from_json(json.dumps(raw))
+def _on_the_floor(catalogue: Catalogue, *models: str) -> Episode:
+    objects = tuple(
+        PlacedObject(
+            m, catalogue.objects[m].category, m, (1.0 + i, 1.0), (1.0 + i, 1.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+        )
+        for i, m in enumerate(models)
+    )
+    targets = {m: catalogue.receptacle_of(m).key for m in models}
+    return Episode(
+        catalogue.name, 0, StartPose(1.5, 2.5, 0.0), objects, tuple(catalogue.receptacles), targets
+    )

@@ -10,7 +10,7 @@ import pytest
 from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import AssetError, EpisodeError
-from mjsim.receptacles import receptacle_geometries
+from mjsim.receptacles import ReceptacleGeometry, receptacle_geometries
 from mjsim.rooms import RoomMap
 from mjsim.scene import Scene, SceneIndex, compile_house, compose, compose_house
 
@@ -219,6 +219,19 @@ def test_turned_rooms() -> None:
     assert rooms.label("b") == "b"
 
 
+def test_room_turned_by_an_odd_angle() -> None:
+    """A long room along the direction of 30 degrees, known by points on its axis and beside it."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><site name="room:a" type="box" size="3 0.5 1" euler="0 0 30"/></worldbody></mujoco>'
+    )
+    rooms = RoomMap.from_model(model)
+    along, beside = np.array([np.cos(np.pi / 6), 0.5]), np.array([-0.5, np.cos(np.pi / 6)])
+    assert rooms.contains(2.9 * along)
+    assert not rooms.contains(2.9 * beside)
+    np.testing.assert_allclose(rooms.distances(5 * along), [2.0])
+    np.testing.assert_allclose(rooms.distances(-2 * beside), [1.5])
+
+
 def test_receptacles_are_in_the_rooms_that_the_catalogue_says(scene: Scene) -> None:
     for key, receptacle in scene.catalogue.receptacles.items():
         geometry = scene.receptacles[key]
@@ -238,6 +251,16 @@ def test_receptacle_contains_its_volume_only(scene: Scene) -> None:
             point = site.xpos + site.xmat.reshape(3, 3) @ (share * half)
             inside = bool((np.abs(share * half) <= half + 0.005).all())
             assert geometry.contains(point) == inside
+
+
+def test_turned_receptacle() -> None:
+    turn = np.array([[np.cos(0.5), -np.sin(0.5), 0], [np.sin(0.5), np.cos(0.5), 0], [0, 0, 1]])
+    shelf = ReceptacleGeometry(
+        "shelf", np.array([1.0, 2.0, 0.5]), np.array([0.4, 0.1, 0.2]), turn, np.zeros(2)
+    )
+    assert shelf.contains(shelf.center + 0.39 * turn[:, 0])
+    assert not shelf.contains(shelf.center + 0.39 * turn[:, 1])
+    assert not shelf.contains(shelf.center + 0.39 * turn[0])
 
 
 def test_receptacle_margin(small_catalogue: Catalogue) -> None:
