@@ -1,7 +1,8 @@
 """The apartment's textures, all procedural: surfaces that repeat and decals.
 
 Every texture has its own generator, seeded by its name, so that adding one leaves the others as they are.
-Grey textures are meant to be tinted by a material's colour. Pictures (views, art, screens) are in
+Grey textures are meant to be tinted by a material's colour; coloured ones marked "tinted" are divided by the colour that
+their material multiplies them with, so that the material looks right without its texture too. Pictures (views, art, screens) are in
 :mod:`mjsim.authoring.artwork`.
 """
 
@@ -54,16 +55,16 @@ def _planks(rng: np.random.Generator, light: Colour, dark: Colour) -> Floats:
         seams[row * height] = 1.0
     mix = np.clip(0.5 + 0.16 * grain + 0.24 * tone, 0.0, 1.0)
     wood = ramp(mix, [(0.0, dark), (1.0, light)])
-    return np.asarray(wood * (1.0 - 0.32 * seams[..., None]), dtype=np.float64)
+    return np.asarray(wood * (1.0 - 0.32 * seams[..., None]) / np.asarray(light), dtype=np.float64)
 
 
 def oak_planks(rng: np.random.Generator) -> Floats:
-    """Warm oak boards."""
+    """Tinted d3ab7c: warm oak boards."""
     return _planks(rng, rgb("d3ab7c"), rgb("ad8152"))
 
 
 def pine_planks(rng: np.random.Generator) -> Floats:
-    """Pale pine boards."""
+    """Tinted e3cfab: pale pine boards."""
     return _planks(rng, rgb("e3cfab"), rgb("c9ad80"))
 
 
@@ -75,11 +76,11 @@ def wood_grain(rng: np.random.Generator) -> Floats:
 
 
 def kitchen_tiles(rng: np.random.Generator) -> Floats:
-    """Square stone tiles, 4 x 4."""
+    """Tinted cbc4b8: square stone tiles, 4 x 4."""
     shape = (256, 256)
     tone = 0.5 + 0.22 * tile_tones(rng, shape, 4, 4) + 0.1 * noise(rng, shape, roll_off=1.2)
     stone = ramp(np.clip(tone, 0.0, 1.0), [(0.0, rgb("a9a196")), (1.0, rgb("cbc4b8"))])
-    return blend(stone, rgb("8d867c"), joints(shape, 4, 4, 2.4))
+    return blend(stone, rgb("8d867c"), joints(shape, 4, 4, 2.4)) / np.asarray(rgb("cbc4b8"))
 
 
 def bath_tiles(rng: np.random.Generator) -> Floats:
@@ -151,7 +152,7 @@ def brushed_steel(rng: np.random.Generator) -> Floats:
 
 
 def leaves(rng: np.random.Generator) -> Floats:
-    """Foliage of many small leaves."""
+    """Tinted 79ac55: foliage of many small leaves."""
     shape = (256, 256)
     dark, light = np.asarray(rgb("24502a")), np.asarray(rgb("79ac55"))
     image = (flat(shape, rgb("21452a")) * 255).astype(np.uint8)
@@ -163,7 +164,7 @@ def leaves(rng: np.random.Generator) -> Floats:
         for dx in (-256, 0, 256):
             for dy in (-256, 0, 256):
                 cv2.ellipse(image, (x + dx, y + dy), axes, angle, 0, 360, colour.tolist(), -1, cv2.LINE_AA)
-    return image / 255.0
+    return image / 255.0 / light
 
 
 def stripes(rng: np.random.Generator) -> Floats:
