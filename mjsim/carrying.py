@@ -24,7 +24,17 @@ _MARGIN = 0.03  # m
 _HORIZONS = (0.0, 0.15, 0.3)  # s, how far ahead a hand looks
 _ROUNDS = 3
 _MOST_SHIFT = 0.2  # m
-_EXTENSIONS = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.1, 0.0)
+_EXTENSIONS = (
+    0.0,
+    0.15,
+    0.3,
+    0.45,
+    0.6,
+    0.7,
+    0.8,
+    0.9,
+    1.0,
+)  # of the way from the body's axis to the posture
 _OVER_GAP = 0.04  # m, between two held things one above the other
 _PASSING = 0.10  # m of approach over which one is raised above the other
 _PUSH_BACK = 0.25  # m/s beyond the speed of approach
@@ -104,18 +114,21 @@ class Carrying:
     def _drawn_in(self, forward: float, left: float, radius: float) -> tuple[float, float]:
         """Place nearest to a posture (forward, left) where a load is clear of the house, now and shortly.
 
-        Sideways first, as past a door frame; then towards the body's axis, which is always clear.
+        Sideways first, as past a door frame; then as far out from the body's axis as nothing is in between: the
+        far side of a wall is clear, but out of the question.
         """
         shift_f, shift_l = self._sideways(forward, left, radius + _MARGIN)
         forward, left = forward + shift_f, left + shift_l
-        best, best_room = (forward, left), -math.inf
+        best, best_room, before = (0.0, 0.0), -math.inf, -math.inf
         for share in _EXTENSIONS:
             place = (share * forward, share * left)
             room = min(self._room(*place, horizon)[0] for horizon in _HORIZONS) - radius
-            if room >= 0.5 * _MARGIN:
-                return place
-            if room > best_room:
+            clear = room >= 0.5 * _MARGIN
+            if not clear and room < before:
+                break
+            if clear or room > best_room:
                 best, best_room = place, room
+            before = room
         return best
 
     def _sideways(self, forward: float, left: float, needed: float) -> tuple[float, float]:

@@ -12,9 +12,10 @@ from mjsim.inventory import Inventory
 from mjsim.observation import ObjectStatus
 from mjsim.person import Person
 from mjsim.receptacles import ReceptacleGeometry
-from mjsim.sight import sees
+from mjsim.sight import first_hit, sees
 
 _CHEST_HEIGHT = 1.2
+_RIM = 0.06  # m, from a receptacle's volume to the outside of its walls
 
 
 def resolve_pick(
@@ -112,17 +113,22 @@ def _object_in_sight(person: Person, item: int) -> bool:
 
 
 def _receptacle_in_sight(person: Person, key: str) -> bool:
-    """Whether the volume's top shows, at its middle or the point nearest to the person."""
+    """Whether the volume's top shows, at its middle or the point nearest to the person.
+
+    Its own rim does not hide it: what the line of sight meets within the container's outline belongs to it.
+    """
     receptacle = person.scene.receptacles[key]
     eye = np.array([*person.rig.position, avatar.EYE_HEIGHT])
-    local = receptacle.rotation.T @ (eye - receptacle.center)
-    top = receptacle.half_size[2]
-    nearest = np.clip(local[:2], -0.8 * receptacle.half_size[:2], 0.8 * receptacle.half_size[:2])
-    model, data = person.scene.model, person.data
-    own = _bodies_of(person, key)
-    points = [receptacle.center + receptacle.rotation @ np.array([*at, top]) for at in (np.zeros(2), nearest)]
-    return any(sees(model, data, eye, point, through=own) for point in points)
-
-
-def _bodies_of(person: Person, key: str) -> frozenset[int]:
-    return frozenset({int(person.scene.model.body(f"{key}/receptacle").id)})
+    half = receptacle.half_size
+    nearest = np.clip(
+        (receptacle.rotation.T @ (eye - receptacle.center))[:2], -0.8 * half[:2], 0.8 * half[:2]
+    )
+    for at in (np.zeros(2), nearest):
+        towards = receptacle.center + receptacle.rotation @ np.array([*at, half[2]]) - eye
+        distance, _ = first_hit(person.scene.model, person.data, eye, towards, static_only=True)
+        if distance >= 1.0:
+            return True
+        local = receptacle.rotation.T @ (eye + distance * towards - receptacle.center)
+        if np.all(np.abs(local[:2]) <= half[:2] + _RIM):
+            return True
+    return False

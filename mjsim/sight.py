@@ -50,13 +50,8 @@ def first_hit(
 
 
 def sees(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    eye: NDArray[np.float64],
-    point: NDArray[np.float64],
-    *,
-    through: Collection[int] = (),
+    model: mujoco.MjModel, data: mujoco.MjData, eye: NDArray[np.float64], point: NDArray[np.float64]
 ) -> bool:
-    """Whether nothing static, but the bodies in `through`, lies between two points (3,), m."""
-    distance, _ = first_hit(model, data, eye, point - eye, ignore=through, static_only=True)
+    """Whether nothing static lies between two points (3,), m."""
+    distance, _ = first_hit(model, data, eye, point - eye, static_only=True)
     return distance >= 1.0
