@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mjsim.authoring import __main__ as authoring
 from mjsim.authoring import textures
 from mjsim.authoring.patterns import noise
 from mjsim.errors import AssetError
@@ -210,6 +211,13 @@ def test_building_writes_every_texture_and_no_other(tmp_path: Path) -> None:
     assert {path.stem for path in paths} == set(textures.TEXTURES)
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in paths}
     assert sum(path.stat().st_size for path in paths) < 4_000_000
+
+
+def test_authoring_refuses_a_missing_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        authoring.main([str(tmp_path / "nowhere")])
+    assert "nowhere" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_unknown_texture_is_named_in_the_error() -> None:

@@ -1,9 +1,9 @@
 """The apartment's textures, all procedural: surfaces that repeat and decals.
 
 Every texture has its own generator, seeded by its name, so that adding one leaves the others as they are.
-Grey textures are meant to be tinted by a material's colour; coloured ones marked "tinted" are divided by the colour that
-their material multiplies them with, so that the material looks right without its texture too. Pictures (views, art, screens) are in
-:mod:`mjsim.authoring.artwork`.
+Grey textures are meant to be tinted by a material's colour. Coloured ones marked "tinted" are divided by the colour
+that their material multiplies them with, so that the material looks right without its texture too. Pictures (views,
+art, screens) are in :mod:`mjsim.authoring.artwork`.
 """
 
 import zlib
