@@ -80,7 +80,8 @@ def kitchen_tiles(rng: np.random.Generator) -> Floats:
     shape = (256, 256)
     tone = 0.5 + 0.22 * tile_tones(rng, shape, 4, 4) + 0.1 * noise(rng, shape, roll_off=1.2)
     stone = ramp(np.clip(tone, 0.0, 1.0), [(0.0, rgb("a9a196")), (1.0, rgb("cbc4b8"))])
-    return blend(stone, rgb("8d867c"), joints(shape, 4, 4, 2.4)) / np.asarray(rgb("cbc4b8"))
+    tiles = blend(stone, rgb("8d867c"), joints(shape, 4, 4, 2.4))
+    return np.asarray(tiles / np.asarray(rgb("cbc4b8")), dtype=np.float64)
 
 
 def bath_tiles(rng: np.random.Generator) -> Floats:
@@ -164,7 +165,7 @@ def leaves(rng: np.random.Generator) -> Floats:
         for dx in (-256, 0, 256):
             for dy in (-256, 0, 256):
                 cv2.ellipse(image, (x + dx, y + dy), axes, angle, 0, 360, colour.tolist(), -1, cv2.LINE_AA)
-    return image / 255.0 / light
+    return np.asarray(image / 255.0 / light, dtype=np.float64)
 
 
 def stripes(rng: np.random.Generator) -> Floats:
