@@ -141,17 +141,30 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
     body.add_joint(name=PREFIX + "yaw", type=hinge, axis=[0, 0, 1], ref=_angle(spec, heading))
     for name, kv, force in (("x", 7000.0, 600.0), ("y", 7000.0, 600.0), ("yaw", 300.0, 150.0)):
         _add_actuator(spec, name, kp=0.0, kv=kv, force=force)
-    cylinder = mujoco.mjtGeom.mjGEOM_CYLINDER
+    cylinder: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "group": 4, "contype": 0, "mass": 0.0}
     body.add_geom(
-        name=TRUNK, type=cylinder, size=[TRUNK_RADIUS, 0.84, 0], pos=[0, 0, 0.88], group=4, contype=0,
-        conaffinity=STATIC_BIT, condim=1, priority=2, solref=[0.008, 1], rgba=[0.4, 0.5, 0.6, 1], mass=0,
-    )  # fmt: skip
+        name=TRUNK,
+        size=[TRUNK_RADIUS, 0.84, 0],
+        pos=[0, 0, 0.88],
+        conaffinity=STATIC_BIT,
+        condim=1,  # no friction: the person slides along walls
+        priority=2,
+        solref=[0.008, 1],
+        solimp=[0.98, 0.995, 0.001, 0.5, 2],
+        **cylinder,
+    )
     # Soft, and lower than any carried object: light things are pushed along the floor, never launched.
     body.add_geom(
-        name=FOOT, type=cylinder, size=[TRUNK_RADIUS, 0.32, 0], pos=[0, 0, 0.34], group=4, contype=0,
-        conaffinity=OBJECT_BIT, condim=3, priority=1, solref=[0.07, 1], friction=[0.3, 0.005, 0.0001],
-        rgba=[0.3, 0.4, 0.5, 1], mass=0,
-    )  # fmt: skip
+        name=FOOT,
+        size=[TRUNK_RADIUS, 0.32, 0],
+        pos=[0, 0, 0.34],
+        conaffinity=OBJECT_BIT,
+        condim=3,
+        priority=1,
+        solref=[0.07, 1],
+        friction=[0.3, 0.005, 0.0001],
+        **cylinder,
+    )
     return body
 
 

@@ -13,8 +13,9 @@ class Health:
     """Extremes since the last reset.
 
     Attributes:
-        max_penetration_m: Deepest overlap of any two geoms, m, sampled once per control step. Contacts of the
-            person's foot are left out: it is soft on purpose, so that it pushes and never launches.
+        max_penetration_m: Deepest overlap of an object with anything but the person, m, sampled once per control
+            step. The person's foot is left out because it is soft on purpose: it pushes and never launches.
+        max_trunk_penetration_m: Deepest overlap of the person's trunk with the house, m.
         max_weld_error_m: Largest distance between a hand and the grip it carries, m, alignment after a grip
             left out.
         settle_times: Seconds from each release to rest, in order.
@@ -23,6 +24,7 @@ class Health:
     """
 
     max_penetration_m: float = 0.0
+    max_trunk_penetration_m: float = 0.0
     max_weld_error_m: float = 0.0
     settle_times: tuple[float, ...] = ()
     warnings: int = 0
@@ -38,7 +40,9 @@ class HealthMonitor:
     """Accumulates `Health` over control steps."""
 
     foot: int
+    trunk: int
     max_penetration: float = 0.0
+    max_trunk_penetration: float = 0.0
     max_weld_error: float = 0.0
     settle_times: list[float] = field(default_factory=list)
 
@@ -53,14 +57,18 @@ class HealthMonitor:
         if not np.isfinite(np.dot(data.qvel, data.qvel) + np.dot(data.qpos, data.qpos)):
             raise PhysicsError(_not_finite_text(model, data))
         if data.ncon:
-            contact = data.contact
-            depth = np.where((contact.geom == self.foot).any(axis=1), 0.0, -contact.dist)
-            self.max_penetration = max(self.max_penetration, float(depth.max()))
+            geoms, depth = data.contact.geom, -data.contact.dist
+            trunk = (geoms == self.trunk).any(axis=1)
+            person = trunk | (geoms == self.foot).any(axis=1)
+            self.max_penetration = max(self.max_penetration, float(depth.max(where=~person, initial=0.0)))
+            deepest = float(depth.max(where=trunk, initial=0.0))
+            self.max_trunk_penetration = max(self.max_trunk_penetration, deepest)
 
     def snapshot(self, data: mujoco.MjData) -> Health:
         """The extremes as a value."""
         return Health(
             max_penetration_m=self.max_penetration,
+            max_trunk_penetration_m=self.max_trunk_penetration,
             max_weld_error_m=self.max_weld_error,
             settle_times=tuple(self.settle_times),
             warnings=int(data.warning.number.sum()),

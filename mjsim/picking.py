@@ -9,7 +9,7 @@ from mjsim.person import Motion, Person, Steps, minimum_jerk
 _REACH_TIME = 0.44
 _APPROACH_TIME = 0.4  # longest wait for the hand to arrive after the reach
 _ALIGN_TIME = 0.12
-_LIFT_TIME = 0.56
+_LIFT_TIME = 0.64
 _SHIFT = 0.2  # share of a movement by which one of its two parts leads the other
 _CLOSE_ENOUGH = 0.012
 

@@ -76,7 +76,7 @@ class World:
         self.data = mujoco.MjData(scene.model)
         rig = Rig(scene, self.data, self.options.control_timestep)
         grips = Grips(scene, self.data, rig)
-        self._person = Person(scene, self.options, self.data, rig, grips, HealthMonitor(rig.foot))
+        self._person = Person(scene, self.options, self.data, rig, grips, HealthMonitor(rig.foot, rig.trunk))
         self._carrying = Carrying(self._person)
         self._motion: _Motion | None = None
         self.reset()
@@ -106,7 +106,7 @@ class World:
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_forward(self.model, self.data)
         person = self._person
-        person.monitor = HealthMonitor(person.rig.foot)
+        person.monitor = HealthMonitor(person.rig.foot, person.rig.trunk)
         person.rig.reset()
         person.grips.reset()
         person.hand_velocities = np.zeros((2, 3))
