@@ -161,7 +161,7 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
         conaffinity=OBJECT_BIT,
         condim=3,
         priority=1,
-        solref=[0.07, 1],
+        solref=[0.04, 1],  # softer, and a rolling ball gets inside and is flung; harder, and things wedge
         friction=[0.3, 0.005, 0.0001],
         **cylinder,
     )

@@ -67,17 +67,28 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry) 
 
 
 def object_corners(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Vector:
-    """Corners of the bounding boxes of an object's colliding geoms in its body frame, m, shape (8 k, 3)."""
-    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-    corners = []
+    """Points (k, 3) of an object's body frame, m, whose bounding box encloses its colliding geoms.
+
+    Mesh geoms give their vertices, others the corners of their bounding boxes.
+    """
+    points = []
     for geom in geoms:
         if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
             continue
-        box = model.geom_aabb[geom]
         rotation = np.zeros(9)
         mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-        corners.append((box[:3] + signs * box[3:]) @ rotation.reshape(3, 3).T + model.geom_pos[geom])
-    return np.concatenate(corners)
+        points.append(_geom_points(model, int(geom)) @ rotation.reshape(3, 3).T + model.geom_pos[geom])
+    return np.concatenate(points)
+
+
+def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[geom])
+        first = int(model.mesh_vertadr[mesh])
+        return np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], np.float64)
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    box = model.geom_aabb[geom]
+    return np.asarray(box[:3] + signs * box[3:])
 
 
 def _square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:

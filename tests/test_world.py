@@ -1,0 +1,401 @@
+"""The world: rules, determinism, walking, carrying."""
+
+import hashlib
+import math
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mjsim import avatar
+from mjsim.actions import IDLE, Action, EventKind, Move, Pick, Place, Refusal, WorldEvent
+from mjsim.catalogue import Catalogue
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.errors import ActionError, AssetError, PhysicsError
+from mjsim.observation import ObjectStatus
+from mjsim.options import WorldOptions
+from mjsim.scene import compose
+from mjsim.world import World
+
+CATEGORY = {"cube": "solids", "wedge": "solids", "ball": "rounds"}
+Make = Callable[..., World]
+
+
+def build(
+    catalogue: Catalogue, start: tuple[float, float, float], *placed: tuple[str, float, float]
+) -> World:
+    """A world in the small house: rooms west (x < 3) and east, a doorway at y 1.5 to 2.5 between them."""
+    objects, targets = [], {}
+    for number, (model, x, y) in enumerate(placed):
+        name, category = f"o{number}", CATEGORY[model]
+        objects.append(PlacedObject(name, category, model, (x, y), (x, y, 0.0), (1.0, 0.0, 0.0, 0.0)))
+        targets[name] = catalogue.categories[category].receptacle
+    keys = tuple(catalogue.receptacles)
+    return World(
+        compose(Episode(catalogue.name, 0, StartPose(*start), tuple(objects), keys, targets), catalogue)
+    )
+
+
+@pytest.fixture
+def make(small_catalogue: Catalogue) -> Make:
+    return lambda start, *placed: build(small_catalogue, start, *placed)
+
+
+def state(world: World) -> bytes:
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION
+    values = np.zeros(mujoco.mj_stateSize(world.model, kind))
+    mujoco.mj_getState(world.model, world.data, values, kind)
+    return values.tobytes()
+
+
+def run(world: World, actions: Sequence[Action]) -> list[WorldEvent]:
+    return [event for action in actions for event in world.step(action).events]
+
+
+def finish(world: World, limit: int = 250) -> list[WorldEvent]:
+    """Idle until the motion under way has ended."""
+    events: list[WorldEvent] = []
+    for _ in range(limit):
+        if not world.busy:
+            return events
+        events += world.step(IDLE).events
+    raise AssertionError("the motion does not end")
+
+
+def do(world: World, action: Pick | Place) -> list[WorldEvent]:
+    step = world.step(action)
+    assert step.result is not None
+    assert step.result.applied, step.result
+    return [*step.events, *finish(world)]
+
+
+def walk_to(world: World, x: float, y: float, *, heading: float | None = None) -> list[WorldEvent]:
+    """Walk straight to a point, turning into the way, then to a heading."""
+    events: list[WorldEvent] = []
+    for _ in range(500):
+        o = world.observation()
+        offset = np.array([x, y]) - o.position
+        distance = float(np.hypot(*offset))
+        wanted = math.atan2(offset[1], offset[0]) if distance > 0.3 else heading
+        error = 0.0 if wanted is None else math.remainder(wanted - o.heading, math.tau)
+        if distance < 0.03 and abs(error) < 0.05:
+            return events
+        speed = min(1.4, 2.0 * distance) / max(distance, 1e-9)
+        c, s = math.cos(o.heading), math.sin(o.heading)
+        forward, left = c * offset[0] + s * offset[1], c * offset[1] - s * offset[0]
+        events += world.step(Move(forward * speed, left * speed, 4.0 * error)).events
+    raise AssertionError(f"did not arrive at {x}, {y}: {world.observation().position}")
+
+
+# --- determinism ---------------------------------------------------------------------------------------------
+
+SCRIPT: list[Action] = [
+    *[Move(0.8, 0.2, 0.5)] * 20, *[Move(look=-0.5)] * 5, *[Move(-0.5, 0.0, -0.8)] * 15, Pick(),
+    *[Move(1.0, 0.0, 0.3)] * 60, Place(), Pick(), *[Move(1.0, 0.0, 1.0)] * 60,
+]  # fmt: skip
+
+
+def digest(world: World) -> str:
+    run(world, SCRIPT)
+    return hashlib.sha256(state(world)).hexdigest()
+
+
+def test_reset_and_the_same_actions_lead_to_the_same_bits(make: Make) -> None:
+    world = make((1.0, 1.0, 0.0), ("cube", 1.7, 1.2), ("ball", 1.2, 1.9))
+    first = digest(world)
+    world.reset()
+    assert digest(world) == first
+    run(world, [*SCRIPT, Move(1.0)])
+    assert hashlib.sha256(state(world)).hexdigest() != first
+    assert world.health.max_penetration_m > 0
+    world.reset()
+    assert (world.health.max_penetration_m, world.health.settle_times) == (0.0, ())
+
+
+def test_another_process_finds_the_same_bits(make: Make, small_house: Path) -> None:
+    placed = ("cube", 1.7, 1.2), ("ball", 1.2, 1.9)
+    program = (
+        "import importlib.util, sys\n"
+        f"spec = importlib.util.spec_from_file_location('t', {str(Path(__file__))!r})\n"
+        "t = importlib.util.module_from_spec(spec); spec.loader.exec_module(t)\n"
+        f"catalogue = t.Catalogue.load({str(small_house / 'catalogue.toml')!r})\n"
+        f"print(t.digest(t.build(catalogue, (1.0, 1.0, 0.0), *{placed!r})))\n"
+    )
+    other = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert other.stdout.strip() == digest(make((1.0, 1.0, 0.0), *placed))
+
+
+# --- refusals ------------------------------------------------------------------------------------------------
+
+
+def carrying_two(make: Make) -> World:
+    world = make((1.0, 1.0, 0.0), ("cube", 1.6, 1.3), ("ball", 1.6, 0.7), ("cube", 1.8, 1.0))
+    assert [e.kind for e in do(world, Pick("o0")) + do(world, Pick("o1"))] == [EventKind.PICKED] * 2
+    return world
+
+
+def start_only(make: Make) -> World:
+    """Loose objects near, far, and near but behind the partition."""
+    return make((2.6, 0.7, 0.0), ("cube", 2.2, 1.0), ("ball", 1.2, 0.7), ("cube", 3.4, 0.7))
+
+
+def behind_the_wall(make: Make) -> World:
+    return make((2.6, 0.7, 0.0), ("cube", 3.4, 0.7))
+
+
+def mid_pick(make: Make) -> World:
+    world = start_only(make)
+    run(world, [Pick("o0"), *[IDLE] * 12])
+    assert world.busy
+    return world
+
+
+def with_ball_at_the_crate(make: Make) -> World:
+    world = make((0.9, 3.0, 2.0), ("ball", 0.9, 2.5))
+    do(world, Pick())
+    return world
+
+
+def delivered(make: Make) -> World:
+    world = make((0.9, 3.0, 2.0), ("cube", 0.9, 2.5))
+    assert [e.kind for e in do(world, Pick()) + do(world, Place())] == [EventKind.PICKED, EventKind.PLACED]
+    return world
+
+
+@pytest.mark.parametrize(
+    ("situation", "action", "refusal", "object_name", "receptacle"),
+    [
+        (start_only, Pick("nobody"), Refusal.UNKNOWN_OBJECT, "nobody", None),
+        (start_only, Pick("o1"), Refusal.OUT_OF_REACH, "o1", "tray"),
+        (start_only, Pick("o2"), Refusal.OUT_OF_REACH, "o2", "crate"),
+        (behind_the_wall, Pick(), Refusal.NOTHING_IN_REACH, None, None),
+        (start_only, Place(), Refusal.HANDS_EMPTY, None, None),
+        (mid_pick, Pick("o1"), Refusal.BUSY, "o1", None),
+        (mid_pick, Place(), Refusal.BUSY, None, None),
+        (carrying_two, Pick(), Refusal.HANDS_FULL, None, None),
+        (carrying_two, Pick("o2"), Refusal.HANDS_FULL, "o2", "crate"),
+        (carrying_two, Pick("o0"), Refusal.ALREADY_CARRIED, "o0", "crate"),
+        (carrying_two, Place("o2"), Refusal.NOT_CARRIED, "o2", None),
+        (carrying_two, Place("nobody"), Refusal.UNKNOWN_OBJECT, "nobody", None),
+        (carrying_two, Place(), Refusal.RECEPTACLE_OUT_OF_REACH, "o0", "crate"),
+        (with_ball_at_the_crate, Place(), Refusal.NOT_THE_RECEPTACLE, "o0", "crate"),
+        (delivered, Pick("o0"), Refusal.ALREADY_DELIVERED, "o0", "crate"),
+        (delivered, Pick(), Refusal.NOTHING_IN_REACH, None, None),
+    ],
+)
+def test_a_refusal_changes_nothing(
+    make: Make,
+    situation: Callable[[Make], World],
+    action: Pick | Place,
+    refusal: Refusal,
+    object_name: str | None,
+    receptacle: str | None,
+) -> None:
+    asked, idle = situation(make), situation(make)
+    step = asked.step(action)
+    assert step.result is not None
+    assert (step.result.refusal, step.result.object, step.result.receptacle) == (
+        refusal, object_name, receptacle,
+    )  # fmt: skip
+    idle.step(IDLE)
+    assert state(asked) == state(idle)
+    run(asked, [IDLE] * 10)
+    run(idle, [IDLE] * 10)
+    assert state(asked) == state(idle)
+
+
+def test_a_move_while_busy_is_ignored(make: Make) -> None:
+    asked, idle = mid_pick(make), mid_pick(make)
+    asked.step(Move(1.4, 0.3, 2.0, 1.0))
+    idle.step(IDLE)
+    assert state(asked) == state(idle)
+
+
+# --- pick and carry ------------------------------------------------------------------------------------------
+
+
+def test_the_nearest_object_is_picked_by_the_hand_on_its_side(make: Make) -> None:
+    world = make((1.0, 1.0, 0.0), ("cube", 1.5, 1.45), ("cube", 1.6, 0.75))
+    result = world.step(Pick()).result
+    assert result is not None and result.object == "o1"  # 0.65 m away, the other 0.67 m
+    assert [(e.kind, e.object) for e in finish(world)] == [(EventKind.PICKED, "o1")]
+    o = world.observation()
+    assert o.hands == (None, "o1")
+    assert o.object_status == (ObjectStatus.LOOSE, ObjectStatus.CARRIED)
+    assert o.object_positions[1, 2] > 0.9
+    do(world, Pick())
+    assert world.observation().hands == ("o0", "o1")
+
+
+@pytest.mark.parametrize("bearing", [0.0, 1.5, 3.1, -2.2])
+def test_an_object_anywhere_around_the_person_can_be_picked(make: Make, bearing: float) -> None:
+    world = make((1.5, 2.0, 0.6), ("wedge", 1.5 + 0.95 * math.cos(bearing), 2 + 0.95 * math.sin(bearing)))
+    assert [e.kind for e in do(world, Pick())] == [EventKind.PICKED]
+    assert np.hypot(*(world.observation().position - (1.5, 2.0))) < 0.05
+
+
+def test_a_fallen_object_is_picked_and_righted(make: Make) -> None:
+    world = make((1.5, 2.0, 0.0), ("wedge", 2.1, 2.0))
+    address = int(world.scene.index.qpos[0])
+    world.data.qpos[address : address + 7] = (2.1, 2.0, 0.1, math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+    run(world, [IDLE] * 25)
+    assert [e.kind for e in do(world, Pick())] == [EventKind.PICKED]
+    run(world, [IDLE] * 10)
+    assert world.data.xmat[world.scene.index.bodies[0], 8] > 0.99
+
+
+@pytest.mark.parametrize("doorway", [1.78, 2.0, 2.22])
+def test_two_objects_are_carried_through_a_doorway(make: Make, doorway: float) -> None:
+    """At 0.28 m from the frame, where the navmesh allows to walk, the hands have to draw in."""
+    world = carrying_two(make)
+    events = walk_to(world, 2.2, doorway) + walk_to(world, 3.9, doorway) + walk_to(world, 4.5, 1.0)
+    assert events == []
+    assert world.observation().carried == ("o0", "o1")
+    assert world.health.max_weld_error_m < 0.009
+    assert world.health.max_penetration_m < 0.01
+
+
+def test_walking_into_a_wall_with_full_hands_keeps_them_full(make: Make) -> None:
+    world = carrying_two(make)
+    for heading in (0.0, math.pi / 2, math.pi, -math.pi / 2):
+        walk_to(world, 1.5, 2.0, heading=heading)
+        assert run(world, [Move(forward=1.4)] * 70) == []
+    assert len(world.observation().carried) == 2
+
+
+def test_a_pulled_object_slips_out_of_the_hand(make: Make) -> None:
+    world = make((1.5, 2.0, 0.0), ("cube", 2.1, 2.0))
+    do(world, Pick())
+    body = int(world.scene.index.bodies[0])
+    world.data.xfrc_applied[body, :3] = (0.0, 0.0, -300.0)
+    events = run(world, [IDLE] * 15)
+    world.data.xfrc_applied[:] = 0.0
+    assert [(e.kind, e.object) for e in events] == [(EventKind.GRIP_LOST, "o0")]
+    run(world, [IDLE] * 40)
+    o = world.observation()
+    assert o.hands == (None, None)
+    assert o.object_status == (ObjectStatus.LOOSE,)
+    assert o.object_positions[0, 2] < 0.2
+
+
+# --- walking -------------------------------------------------------------------------------------------------
+
+
+def test_walking_follows_the_commands(make: Make) -> None:
+    world = make((0.8, 2.0, 0.5))
+    speeds = []
+    for _ in range(25):
+        speeds.append(float(np.hypot(*world.step(Move(forward=9.0)).observation.velocity)))
+    rises = np.diff([0.0, *speeds]) / world.control_timestep
+    assert max(rises) <= 3.2  # 3 m/s^2 commanded; the servo lags and catches up
+    assert speeds[-1] == pytest.approx(1.4, abs=0.01)
+    o = world.observation()
+    assert math.atan2(o.velocity[1], o.velocity[0]) == pytest.approx(0.5, abs=1e-3)
+    run(world, [IDLE] * 25)
+    before = world.observation().heading
+    run(world, [Move(turn=9.0)] * 50)
+    assert world.observation().heading - before == pytest.approx(2.5 * 2.0, abs=0.3)
+    run(world, [Move(look=1.0)] * 100)
+    assert world.observation().pitch == pytest.approx(avatar.PITCH_RANGE[1], abs=0.01)
+    assert world.observation().eye == pytest.approx(world.data.cam(avatar.EYE).xpos, abs=0.02)
+
+
+@pytest.mark.parametrize("heading", np.linspace(-math.pi, math.pi, 9)[:-1])
+def test_walls_stop_and_let_slide_but_never_let_through(make: Make, heading: float) -> None:
+    world = make((1.5, 1.0, float(heading)))
+    trail = [world.step(Move(forward=1.4)).observation.position for _ in range(100)]
+    margin = avatar.TRUNK_RADIUS - 0.04
+    for x, y in trail:
+        assert margin < y < 4.0 - margin
+        assert margin < x
+        assert x < 3.0 - 0.05 - margin or 1.5 < y < 2.5 or x > 3.05 + margin
+
+
+def test_the_person_slides_along_a_wall(make: Make) -> None:
+    world = make((0.6, 0.4, -math.pi / 4))
+    run(world, [Move(forward=1.4)] * 20)
+    before = world.observation().position
+    run(world, [Move(forward=1.4)] * 25)
+    gone = world.observation().position - before
+    assert gone[0] == pytest.approx(1.4 * math.sqrt(0.5), abs=0.05)  # a second along the wall, unbraked
+    assert abs(gone[1]) < 0.01
+
+
+def test_light_things_are_pushed_not_launched(make: Make) -> None:
+    world = make((0.6, 2.0, 0.0), ("cube", 1.4, 2.02), ("ball", 1.9, 1.95), ("wedge", 1.6, 2.1))
+    fastest, highest = 0.0, 0.0
+    for _ in range(60):
+        o = world.step(Move(forward=1.4)).observation
+        linear = world.data.qvel[world.scene.index.dofs[:, None] + np.arange(3)]
+        fastest = max(fastest, float(np.linalg.norm(linear, axis=1).max()))
+        highest = max(highest, float(o.object_positions[:, 2].max()))
+    assert world.observation().position[0] > 3.0  # it did not stop the person
+    assert 1.0 < fastest < 4.0  # a ball is kicked ahead
+    assert highest < 0.2
+
+
+# --- the world's own errors ----------------------------------------------------------------------------------
+
+
+def test_an_object_knocked_out_of_its_receptacle_is_loose_again(make: Make) -> None:
+    world = delivered(make)
+    address = int(world.scene.index.qpos[0])
+    world.data.qpos[address : address + 3] = (1.5, 2.0, 0.3)
+    events = run(world, [IDLE] * 25)
+    assert [(e.kind, e.object, e.receptacle) for e in events] == [(EventKind.DISLODGED, "o0", "crate")]
+    assert world.observation().object_status == (ObjectStatus.LOOSE,)
+
+
+def test_a_state_that_is_not_finite_is_an_error(make: Make) -> None:
+    world = make((1.5, 2.0, 0.0), ("cube", 2.1, 2.0))
+    world.data.qvel[world.scene.index.dofs[0]] = np.nan
+    with pytest.raises(PhysicsError, match=r"at t = .* reset the world"):
+        world.step(IDLE)
+    world.reset()
+    assert np.isfinite(world.step(IDLE).observation.object_positions).all()
+
+
+def test_unusable_arguments_are_named(make: Make, small_catalogue: Catalogue) -> None:
+    world = make((1.5, 2.0, 0.0))
+    with pytest.raises(ActionError, match="'jump'"):
+        world.step("jump")  # type: ignore[arg-type]
+    with pytest.raises(PhysicsError, match=r"0\.03 s is not a whole multiple"):
+        World(world.scene, WorldOptions(control_timestep=0.03))
+    with pytest.raises(ActionError, match=r"WorldOptions\.max_speed must be a positive number, got 0"):
+        WorldOptions(max_speed=0)
+    bare = compose(world.scene.episode, small_catalogue, avatar=False)
+    with pytest.raises(AssetError, match="avatar=True"):
+        World(bare)
+
+
+MOVES = st.builds(Move, *(st.floats(-b, b) for b in (2.0, 1.0, 3.0, 1.0)))
+ACTIONS = st.one_of(MOVES, MOVES, MOVES, st.just(Pick()), st.just(Place()))
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(ACTIONS, st.integers(1, 25)), min_size=4, max_size=12))
+def test_whatever_is_done_the_books_agree_with_the_physics(
+    small_catalogue: Catalogue, script: list[tuple[Action, int]]
+) -> None:
+    placed = ("cube", 1.6, 1.8), ("ball", 1.0, 2.4), ("wedge", 1.2, 3.2)
+    world = build(small_catalogue, (1.0, 2.8, 1.5), *placed)
+    for action, repeats in script:
+        for _ in range(repeats):
+            o = world.step(action).observation
+            action = action if isinstance(action, Move) else IDLE
+            assert set(o.carried) == set(o.names_with(ObjectStatus.CARRIED))
+            assert 0.1 < o.position[0] < 5.9 and 0.1 < o.position[1] < 3.9
+            assert o.object_positions[:, 2].min() > -0.05
+    if not world.busy:
+        run(world, [IDLE] * 5)
+        for hand, name in enumerate(world.observation().hands):
+            if name is not None:
+                grip = world.data.site(f"{name}/grip_0").xpos
+                hand_point = world.data.site(f"avatar/{avatar.HANDS[hand]}_grip").xpos
+                assert np.linalg.norm(grip - hand_point) < 0.01
