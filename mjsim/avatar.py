@@ -43,7 +43,7 @@ START_PITCH = math.radians(-12.0)
 PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
 # Postures of a hand in the body frame: forward, to its own side, up; m.
 REST = (0.34, 0.27, 1.00)
-CARRY = (0.48, 0.24, 1.20)
+CARRY = (0.50, 0.24, 1.25)
 TUCKED = (0.27, 0.19, 1.22)
 ASIDE = (0.30, 0.42, 1.26)
 HAND_KP = 2000.0

@@ -175,6 +175,8 @@ def compile_spec(spec: mujoco.MjSpec, what: str) -> mujoco.MjModel:
     """
     # Attaching copies a model's assets for every instance.
     spec.dedup_assets()
+    # The broad phase visits every body of the house in every step; as one body it steps four times as fast.
+    spec.compiler.fusestatic = True
     try:
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
