@@ -8,6 +8,7 @@ the contact. What still gets caught, by a blow or from above, slips out of the h
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,15 @@ class Carrying:
         """Forget all contacts."""
         self._yield[:] = 0.0
         self._strained = [0, 0]
+
+    def memory(self) -> dict[str, Any]:
+        """How far the hands have given way and for how long they are strained, JSON-ready."""
+        return {"yield": self._yield.tolist(), "strained": list(self._strained)}
+
+    def recall(self, memory: dict[str, Any]) -> None:
+        """Take over what `memory` gave."""
+        self._yield = np.array(memory["yield"])
+        self._strained = list(memory["strained"])
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
         """Set the targets of the hands that no motion moves, and guard the walking command.

@@ -6,6 +6,7 @@
     ├── SamplingError     no disorganized house satisfies the constraints
     ├── ActionError       an action's numbers are unusable (a refusal is not an error)
     ├── PhysicsError      MuJoCo warned, or a state is not finite
+    ├── StateError        a saved state does not fit the world, or the world is in the middle of a motion
     └── RenderError       no GL context, or a frame cannot be drawn
 
 Every message names the offending value and what to do about it.
@@ -34,6 +35,10 @@ class ActionError(MjsimError):
 
 class PhysicsError(MjsimError):
     """MuJoCo warned, or a state is not finite."""
+
+
+class StateError(MjsimError):
+    """A saved state does not fit the world, or the world is in the middle of a motion."""
 
 
 class RenderError(MjsimError):

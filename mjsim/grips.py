@@ -71,6 +71,14 @@ class Grips:
         closed = self._closed[hand]
         return 0.0 if closed is None else self.gap(hand, *closed)
 
+    def memory(self) -> list[list[int] | None]:
+        """Object and grip that each hand holds, JSON-ready; the welds themselves are part of the physics."""
+        return [None if closed is None else list(closed) for closed in self._closed]
+
+    def recall(self, memory: list[list[int] | None]) -> None:
+        """Take over what `memory` gave."""
+        self._closed = [None if closed is None else (closed[0], closed[1]) for closed in memory]
+
     def reset(self) -> None:
         """Forget what was held; the state's welds are reset with the state."""
         self._closed = [None, None]

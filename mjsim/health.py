@@ -1,6 +1,8 @@
 """Whether the physics is well: warnings, penetration, weld errors and settling times."""
 
+import dataclasses
 from dataclasses import dataclass, field
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -63,6 +65,10 @@ class HealthMonitor:
             self.max_penetration = max(self.max_penetration, float(depth.max(where=~person, initial=0.0)))
             deepest = float(depth.max(where=trunk, initial=0.0))
             self.max_trunk_penetration = max(self.max_trunk_penetration, deepest)
+
+    def memory(self) -> dict[str, Any]:
+        """Everything accumulated, JSON-ready."""
+        return dataclasses.asdict(self)
 
     def snapshot(self, data: mujoco.MjData) -> Health:
         """The extremes as a value."""

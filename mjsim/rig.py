@@ -1,6 +1,7 @@
 """The person as servos: where the body is, where it is told to go, and the physics steps in between."""
 
 import math
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -57,6 +58,26 @@ class Rig:
         self._hand_targets_before = self.hand_targets.copy()
         self._command = np.concatenate(([0.0, 0.0, 0.0, q[3]], q[4:]))
         self.data.ctrl[self._actuators] = self._command
+
+    def memory(self) -> dict[str, Any]:
+        """The commands, JSON-ready."""
+        return {
+            "velocity": [float(v) for v in self.velocity],
+            "turn": float(self.turn),
+            "pitch_target": float(self.pitch_target),
+            "hand_targets": self.hand_targets.tolist(),
+            "hand_targets_before": self._hand_targets_before.tolist(),
+            "command": self._command.tolist(),
+        }
+
+    def recall(self, memory: dict[str, Any]) -> None:
+        """Take the commands from what `memory` gave."""
+        self.velocity = np.array(memory["velocity"])
+        self.turn = float(memory["turn"])
+        self.pitch_target = float(memory["pitch_target"])
+        self.hand_targets = np.array(memory["hand_targets"])
+        self._hand_targets_before = np.array(memory["hand_targets_before"])
+        self._command = np.array(memory["command"])
 
     @property
     def position(self) -> Vector:

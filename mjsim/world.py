@@ -1,6 +1,7 @@
 """The world: one person, one house, stepped at a fixed control rate with contact physics."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from mjsim import avatar
 from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick, Place, WorldEvent
 from mjsim.carrying import Carrying
-from mjsim.errors import ActionError, PhysicsError
+from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.grips import Grips
 from mjsim.health import Health, HealthMonitor
 from mjsim.inventory import LEFT, RIGHT, Inventory
@@ -17,6 +18,7 @@ from mjsim.options import WorldOptions
 from mjsim.person import Motion, Person
 from mjsim.picking import pick
 from mjsim.placing import place
+from mjsim.recording import StateHash, WorldState, set_physics, take_physics
 from mjsim.rig import Rig
 from mjsim.rules import resolve_pick, resolve_place
 from mjsim.scene import Scene
@@ -79,6 +81,7 @@ class World:
         self._person = Person(scene, self.options, self.data, rig, grips, HealthMonitor(rig.foot, rig.trunk))
         self._carrying = Carrying(self._person)
         self._motion: _Motion | None = None
+        self._hash = StateHash(scene.model)
         self.reset()
 
     @property
@@ -115,6 +118,57 @@ class World:
         self._events: list[WorldEvent] = []
         self._set_inventory(Inventory())
         self._status = [ObjectStatus.LOOSE] * len(self.scene.index.names)
+        return self.observation()
+
+    def state_hash(self) -> int:
+        """64 bits that differ whenever the state of the physics differs (up to chance)."""
+        return self._hash.of(self.data)
+
+    def state(self) -> WorldState:
+        """Everything from which `restore` goes on, as a value.
+
+        Raises:
+            StateError: A pick or place is under way.
+        """
+        if self.busy:
+            raise StateError(
+                f"the world is busy at t = {self.data.time:.2f} s; take its state between motions"
+            )
+        person = self._person
+        memory: dict[str, Any] = {
+            "rig": person.rig.memory(),
+            "grips": person.grips.memory(),
+            "carrying": self._carrying.memory(),
+            "health": person.monitor.memory(),
+            "hand_velocities": person.hand_velocities.tolist(),
+            "hands": list(self._inventory.hands),
+            "status": [status.value for status in self._status],
+        }
+        return WorldState(take_physics(self.model, self.data), memory)
+
+    def restore(self, state: WorldState) -> Observation:
+        """Go on from a state, of this world or of another one of the same scene and options.
+
+        The physics is reset on the way, so the world that the state was taken from goes on in the very same
+        way only if it is restored, too (`mjsim.recording`).
+
+        Raises:
+            StateError: The state does not fit the scene.
+        """
+        person, memory = self._person, state.memory
+        set_physics(self.model, self.data, state.physics)
+        self._end_motion()
+        self._events = []
+        try:
+            person.monitor = HealthMonitor(**memory["health"])
+            person.rig.recall(memory["rig"])
+            person.grips.recall(memory["grips"])
+            person.hand_velocities = np.array(memory["hand_velocities"])
+            self._carrying.recall(memory["carrying"])
+            self._set_inventory(Inventory(*memory["hands"]))
+            self._status = [ObjectStatus(value) for value in memory["status"]]
+        except (KeyError, TypeError, ValueError) as error:
+            raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
         return self.observation()
 
     def step(self, action: Action) -> StepResult:
