@@ -53,7 +53,9 @@ class OrToolsSolver:
             visits, bound = best_of_all(problem, metric)
         else:
             bound = spanning_bound(problem, metric)
-            visits = _search(problem, metric, limit or SolveLimit(work=DEFAULT_SOLUTIONS))
+            if limit is None or limit == SolveLimit():
+                limit = SolveLimit(work=DEFAULT_SOLUTIONS)
+            visits = _search(problem, metric, limit)
         return make_plan(problem, metric, visits, bound, started)
 
 

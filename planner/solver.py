@@ -10,9 +10,11 @@ from planner.problem import RoutingProblem
 
 # Name -> module and class. A new planner is its own module and a line here.
 SOLVERS = {
+    "exact": ("planner.exact.solver", "ExactSolver"),
     "ortools": ("planner.ortools_solver", "OrToolsSolver"),
     "greedy": ("planner.greedy_solver", "GreedySolver"),
 }
+DEFAULT_SOLVER = "exact"
 
 
 @dataclass(frozen=True)

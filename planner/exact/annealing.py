@@ -1,0 +1,217 @@
+"""A good tour quickly: simulated annealing over the order of picks, with drops decoded optimally."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.exact.instance import Instance
+from planner.exact.relaxation import INFINITE
+from planner.kernels import kernel
+
+HOT, COLD = 0.5, 0.01  # temperature at both ends, in mean legs
+
+
+@kernel
+def uniform(state: NDArray[np.uint64]) -> float:
+    """Next number in [0, 1) of SplitMix64 (Steele, Lea and Flood 2014); the state is (1,)."""
+    state[0] += np.uint64(0x9E3779B97F4A7C15)
+    z = state[0]
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    z = z ^ (z >> np.uint64(31))
+    return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+
+
+@kernel
+def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
+    """What may be dropped before the next pick: up to four (bin, then bin, still held), m for none.
+
+    Args:
+        m: Number of bins.
+        held: Bin of the object in hand, m for none.
+        other: Bin of the other object in hand, m for none.
+    """
+    never = (m, m, -1)
+    if held == m:
+        return (m, m, m), never, never, never
+    if other == held:
+        return (held, m, m), never, never, never
+    if other == m:
+        return (m, m, held), (held, m, m), never, never
+    return (other, m, held), (held, m, other), (other, held, m), (held, other, m)
+
+
+@kernel
+def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
+    """From object i (-1: the root) over up to two bins (m: none) to object x (-1: the end)."""
+    m = inst.bins.shape[0]
+    if b == m:
+        if x < 0:
+            return 0
+        return int(inst.root[x] if i < 0 else inst.between[i, x])
+    total = int(inst.root_bin[b] if i < 0 else inst.to_bin[i, b])
+    if then < m:
+        total += inst.bins[b, then]
+        b = then
+    return total + (int(inst.to_bin[x, b]) if x >= 0 else 0)
+
+
+@kernel
+def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[np.int32]) -> int:
+    """Least length of a tour that picks in a given order.
+
+    Args:
+        inst: The instance.
+        order: Objects in order, (n,).
+        start: Rows of `costs` before this one are valid already.
+        costs: Row t, entry d: at pick t with another object for bin d in hand (m: none), (n + 1, m + 1); row n
+            is the end.
+    """
+    n, m = inst.to_bin.shape
+    if start == 0:
+        x = order[0] if n else -1
+        costs[0] = INFINITE
+        held = inst.carried[0] if inst.carried.size > 0 else m
+        other = inst.carried[1] if inst.carried.size > 1 else m
+        for b, then, rest in drops(m, held, other):
+            if rest >= 0:
+                costs[0, rest] = min(costs[0, rest], length(inst, -1, b, then, x))
+        start = 1
+    for t in range(start, n):
+        _advance(inst, order[t - 1], order[t], costs[t - 1], costs[t])
+    if n:
+        costs[n] = INFINITE
+        costs[n, m] = _finish(inst, order[n - 1], costs[n - 1])
+    return int(costs[n, m])
+
+
+@kernel
+def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int32], after: NDArray[np.int32]) -> None:
+    """From pick i to pick x: row `after` from row `before`."""
+    m = inst.bins.shape[0]
+    c = inst.home[i]
+    from_i, from_x, between = inst.to_bin[i], inst.to_bin[x], inst.bins[c]
+    over_c = from_i[c] + from_x[c]
+    keep_own = before[m] + inst.between[i, x]
+    nothing = before[m] + over_c
+    for d in range(m):
+        after[d] = before[d] + over_c
+        if d != c:  # the other object is for another bin: at bin c both would be left
+            keep_own = min(keep_own, before[d] + from_i[d] + from_x[d])
+        both = between[d] + min(from_i[d] + from_x[c], from_i[c] + from_x[d])
+        nothing = min(nothing, before[d] + both)
+    after[c] = keep_own
+    after[m] = nothing
+
+
+@kernel
+def _finish(inst: Instance, i: int, before: NDArray[np.int32]) -> int:
+    """Least length of a tour whose last pick is i."""
+    m = inst.bins.shape[0]
+    c = inst.home[i]
+    best = before[m] + inst.to_bin[i, c]
+    for d in range(m):
+        best = min(best, before[d] + inst.bins[c, d] + min(inst.to_bin[i, d], inst.to_bin[i, c]))
+    return int(best)
+
+
+@kernel
+def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Actions of a shortest tour that picks in a given order; k >= 0 picks object k, -1 - b goes to bin b."""
+    n, m = inst.to_bin.shape
+    costs = np.empty((n + 1, m + 1), np.int32)
+    decode(inst, order, 0, costs)
+    backwards = np.empty(3 * n + 2, np.int64)
+    count, state = 0, m
+    for t in range(n, -1, -1):
+        x = order[t] if t < n else -1
+        if t < n:
+            backwards[count] = x
+            count += 1
+        i = order[t - 1] if t else -1
+        found = False
+        for d in range(m + 1 if t else 1):
+            if t and costs[t - 1, d] >= INFINITE:
+                continue
+            if t:
+                before, held, other = costs[t - 1, d], inst.home[i], d
+            else:
+                before = 0
+                held = inst.carried[0] if inst.carried.size > 0 else m
+                other = inst.carried[1] if inst.carried.size > 1 else m
+            for b, then, rest in drops(m, held, other):
+                if not found and rest == state and before + length(inst, i, b, then, x) == costs[t, state]:
+                    found = True
+                    if then < m:
+                        backwards[count] = -1 - then
+                        count += 1
+                    if b < m:
+                        backwards[count] = -1 - b
+                        count += 1
+                    next_state = d
+        state = next_state
+    return backwards[:count][::-1].copy()
+
+
+@kernel
+def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArray[np.uint64]) -> int:
+    """Write a neighbour of an order: two swapped, a stretch reversed or one moved; the first place changed."""
+    n = order.size
+    i = int(uniform(state) * n)
+    j = int(uniform(state) * (n - 1))
+    if j >= i:
+        j += 1
+    kind = uniform(state)
+    low, high = min(i, j), max(i, j)
+    candidate[:] = order
+    if kind < 0.25:
+        candidate[i], candidate[j] = order[j], order[i]
+    elif kind < 0.5:
+        for k in range(low, high + 1):
+            candidate[k] = order[low + high - k]
+    elif i < j:
+        candidate[i:j] = order[i + 1 : j + 1]
+        candidate[j] = order[i]
+    else:
+        candidate[j + 1 : i + 1] = order[j:i]
+        candidate[j] = order[i]
+    return low
+
+
+@kernel
+def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64]]:
+    """Simulated annealing from the order of the indices.
+
+    Args:
+        inst: The instance.
+        seed: Of the random moves.
+        moves: How many to try.
+
+    Returns:
+        Length of the best tour, and its order of picks (n,).
+    """
+    n, m = inst.to_bin.shape
+    state = np.array([seed], np.uint64)
+    order = np.arange(n)
+    costs = np.empty((n + 1, m + 1), np.int32)
+    trial_costs = np.empty((n + 1, m + 1), np.int32)
+    cost = decode(inst, order, 0, costs)
+    best, best_order = cost, order.copy()
+    if n < 2:
+        return best, best_order
+    candidate = order.copy()
+    legs = cost / (2.0 * n)
+    temperature = HOT * legs
+    cooling = (COLD / HOT) ** (1.0 / moves)
+    for _ in range(moves):
+        temperature *= cooling
+        low = propose(order, candidate, state)
+        trial_costs[:low] = costs[:low]
+        trial = decode(inst, candidate, low, trial_costs)
+        if trial <= cost or uniform(state) < np.exp((cost - trial) / temperature):
+            cost = trial
+            order, candidate = candidate, order
+            costs, trial_costs = trial_costs, costs
+            if cost < best:
+                best = cost
+                best_order[:] = order
+    return best, best_order

@@ -1,0 +1,93 @@
+"""One pass of the layered search: all layers, some states of each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.exact.deadline import Deadline
+from planner.exact.multipliers import Bound
+from planner.exact.relaxation import INFINITE
+from planner.exact.search import NO_PARENT, PLACE_BITS, expand, keep_best, new_nodes, offer_roots
+
+FIRST_ROOM = 1 << 12
+
+
+@dataclass(frozen=True)
+class Pass:
+    """What one pass found.
+
+    Attributes:
+        upper: Length of the best tour known, units.
+        actions: Actions of that tour in the problem's numbering, or None if the pass found none shorter.
+        lower: No tour is shorter than this, units.
+        expanded: How many states were expanded.
+    """
+
+    upper: int
+    actions: list[int] | None
+    lower: int
+    expanded: int
+
+
+def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadline) -> Pass:
+    """Search all layers, keeping so many states of each.
+
+    Args:
+        bound: Bound of the cost-to-go.
+        upper: Length of the best tour known; only shorter ones are looked for.
+        width: States to keep of each layer.
+        most: Give up when so many states were expanded.
+        deadline: Give up when it is over.
+
+    Returns:
+        The result; its lower bound is that of the root if the pass was given up.
+    """
+    n = len(bound.order)
+    prices = int(bound.table.multipliers.sum())
+    limit = upper + prices
+    history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
+    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
+    offer_roots(bound.instance, bound.table, here, after, limit)
+    dropped, expanded, actions = INFINITE, 0, None
+    for layer in range(n + 1):
+        if expanded > most or deadline.over():
+            return Pass(upper, None, bound.root, expanded)
+        dropped = min(dropped, keep_best(here, width))
+        here, after, count, end = expand(bound.instance, bound.table, here, after, limit)
+        expanded += count
+        size = here.size[0]
+        history.append((here.key[:size].copy(), here.parent[:size].copy()))
+        if end >= 0:
+            upper = int(here.cost[end]) - prices
+            actions = _actions(bound, history, layer, end)
+        here, after = after, new_nodes(FIRST_ROOM)
+    lower = max(bound.root, min(upper, dropped - prices))
+    return Pass(upper, actions, lower, expanded)
+
+
+def _actions(
+    bound: Bound, history: list[tuple[NDArray[np.int64], NDArray[np.int64]]], layer: int, end: int
+) -> list[int]:
+    """Follow the parents back from the end of a tour; actions in the problem's numbering."""
+    keys = []
+    k = end
+    while True:
+        key, parent = history[layer][0][k], int(history[layer][1][k])
+        keys.append(int(key))
+        if parent == NO_PARENT:
+            break
+        layer -= 0 if parent & 1 else 1
+        k = parent >> 1
+    m = len(bound.instance.bins)
+    left = (1 << len(bound.order)) - 1
+    actions = []
+    for key in reversed(keys):
+        place = key & ((1 << PLACE_BITS) - 1)
+        picked = left ^ (key >> PLACE_BITS)
+        left ^= picked
+        if picked:
+            actions.append(bound.order[picked.bit_length() - 1])
+        if place < m * m:
+            actions.append(-1 - place // m)
+    return actions

@@ -1,0 +1,89 @@
+"""A routing problem for capacity two as the flat arrays that the exact kernels work on."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.plan import Visit
+from planner.problem import RoutingProblem
+from planner.tour import pick, place, place_onboard
+
+FAR = 1 << 28
+
+
+class Instance(NamedTuple):
+    """n objects, m bins and the root (where the person is), distances in integer units.
+
+    Attributes:
+        between: Object to object, (n, n) int32; `FAR` from an object to itself.
+        to_bin: Object to bin, (n, m) int32.
+        from_bin: Bin to object, (m, n) int32.
+        bins: Bin to bin, (m, m) int32.
+        home: Bin of each object, (n,) int64.
+        root: Root to object, (n,) int32.
+        root_bin: Root to bin, (m,) int32.
+        carried: Bins of the objects carried at the root, (0..2,) int64.
+    """
+
+    between: NDArray[np.int32]
+    to_bin: NDArray[np.int32]
+    from_bin: NDArray[np.int32]
+    bins: NDArray[np.int32]
+    home: NDArray[np.int64]
+    root: NDArray[np.int32]
+    root_bin: NDArray[np.int32]
+    carried: NDArray[np.int64]
+
+    def permuted(self, order: Sequence[int]) -> "Instance":
+        """The same instance with object `order[k]` renamed k."""
+        o = np.asarray(order, dtype=np.int64)
+        return self._replace(
+            between=np.ascontiguousarray(self.between[np.ix_(o, o)]),
+            to_bin=np.ascontiguousarray(self.to_bin[o]),
+            from_bin=np.ascontiguousarray(self.from_bin[:, o]),
+            home=np.ascontiguousarray(self.home[o]),
+            root=np.ascontiguousarray(self.root[o]),
+        )
+
+
+def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instance:
+    """Flatten a problem; objects are its shipments, bins its delivery locations in ascending order."""
+    pickups = [s.pickup for s in problem.shipments]
+    places = sorted({s.delivery for s in problem.shipments} | set(problem.onboard))
+    index = {location: k for k, location in enumerate(places)}
+
+    n, m = len(pickups), len(places)
+
+    def block(rows: list[int], columns: list[int], height: int, width: int) -> NDArray[np.int32]:
+        result = np.full((height, width), FAR, dtype=np.int32)
+        result[: len(rows), : len(columns)] = metric[np.ix_(rows, columns)]
+        return result
+
+    between = block(pickups, pickups, n, n)
+    np.fill_diagonal(between, FAR)
+    return Instance(
+        between=between,
+        to_bin=block(pickups, places, n, m),
+        from_bin=block(places, pickups, m, n),
+        bins=block(places, places, m, m),
+        home=np.array([index[s.delivery] for s in problem.shipments], dtype=np.int64),
+        root=block([problem.start], pickups, 1, n)[0],
+        root_bin=block([problem.start], places, 1, m)[0],
+        carried=np.array([index[j] for j in problem.onboard], dtype=np.int64),
+    )
+
+
+def to_visits(problem: RoutingProblem, instance: Instance, actions: Sequence[int]) -> list[Visit]:
+    """Turn actions into visits: k >= 0 picks object k, -1 - b goes to bin b and leaves all that belongs there."""
+    held = [(int(b), place_onboard(problem, k)) for k, b in enumerate(instance.carried)]
+    visits: list[Visit] = []
+    for action in actions:
+        if action >= 0:
+            visits.append(pick(problem, action))
+            held.append((int(instance.home[action]), place(problem, action)))
+        else:
+            visits += [visit for b, visit in held if b == -1 - action]
+            held = [(b, visit) for b, visit in held if b != -1 - action]
+    return visits

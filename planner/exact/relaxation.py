@@ -1,0 +1,210 @@
+"""Cost-to-go tables over subsets: exact ones, and relaxed ones that bound it from below.
+
+States, with U the objects not yet picked and c_j the bin of j: E(U, b) at bin b with empty hands; V(U, b, d) at
+bin b carrying one object for d, with V(U, d, d) = E(U, d); Y(U, i) at object i holding only it; W(U, j, d) at
+object j holding it and one for d. Leaving what belongs here is free and always right in a metric.
+
+    W(U, j, d) = min( D(j, d) + V(U, d, c_j),  D(j, c_j) + V(U, c_j, d) )
+    V(U, b, d) = min( D(b, d) + E(U, d),       min_{j in U} D(b, j) + W(U - j, j, d) )
+    Y(U, i)    = min( D(i, c_i) + E(U, c_i),   min_{j in U} D(i, j) + W(U - j, j, c_i) )
+    E(U, b)    = min_{i in U} D(b, i) + Y(U - i, i);    E({}, b) = 0
+
+The relaxation (Christofides, Mingozzi and Toth 1981) keeps the first s objects exactly and of the others only
+how many are left; those may be picked repeatedly, though not twice in a row. Each pick of j costs a multiplier
+more; subtracting the multipliers of U gives a lower bound of the cost-to-go from every U, for any multipliers.
+With s = n and no multipliers the table is exact.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.exact.instance import Instance
+from planner.kernels import kernel
+
+INFINITE = 1 << 29
+
+
+class Table(NamedTuple):
+    """Cost-to-go of the relaxed problem, multipliers of picks included; row k 2^s + M for k others, subset M.
+
+    Attributes:
+        s: How many objects (the first ones) are kept exactly.
+        bin: E and V, (rows, m, m) int32, entry [b, d].
+        object: Y, (rows, n) int32; only where object i is not in the row's subset.
+        multipliers: Price of a pick, (n,) int32.
+    """
+
+    s: int
+    bin: NDArray[np.int32]
+    object: NDArray[np.int32]
+    multipliers: NDArray[np.int32]
+
+
+@kernel
+def add(a: Any, b: Any) -> Any:
+    """Sum in 32 bits; numba would widen it to 64, which halves the speed of vectorised loops."""
+    return np.int32(a + b)
+
+
+@kernel
+def new_table(inst: Instance, s: int) -> Table:
+    """An unfilled table."""
+    n, m = inst.to_bin.shape
+    rows = (n - s + 1) << s
+    return Table(s, np.empty((rows, m, m), np.int32), np.empty((rows, n), np.int32), np.zeros(n, np.int32))
+
+
+@kernel
+def row_without(row: int, j: int, s: int) -> int:
+    """Row after picking j, or -1 where it is not there to be picked."""
+    if j < s:
+        return row ^ (1 << j) if (row >> j) & 1 else -1
+    return row - (1 << s) if row >> s else -1
+
+
+@kernel
+def after_pick(inst: Instance, table: Table, row: int, j: int, d: int) -> int:
+    """W with its pick: at j with it and one object for d, where `row` no longer has j."""
+    c = inst.home[j]
+    first = inst.to_bin[j, d] + table.bin[row, d, c]
+    second = inst.to_bin[j, c] + table.bin[row, c, d]
+    return int(table.multipliers[j] + min(first, second))
+
+
+@kernel
+def fill(inst: Instance, table: Table) -> None:
+    """Compute all rows, smaller subsets first."""
+    n, m = inst.to_bin.shape
+    w = np.empty((m, n), np.int32)  # W with its pick, [d, j]; infinite where j cannot be picked
+    stay = np.empty(n, np.int32)  # Y with its pick; the same
+    for row in range(table.bin.shape[0]):
+        e = table.bin[row]
+        for j in range(n):
+            left = row_without(row, j, table.s)
+            if left < 0:
+                stay[j] = INFINITE
+                for d in range(m):
+                    w[d, j] = INFINITE
+                continue
+            stay[j] = add(table.object[left, j], table.multipliers[j])
+            _picked(inst, table, left, j, w)
+        for b in range(m):
+            e[b, b] = _least(inst.from_bin[b], stay) if row else 0
+        for d in range(m):
+            for b in range(m):
+                if b != d:
+                    e[b, d] = min(add(inst.bins[b, d], e[d, d]), _least(inst.from_bin[b], w[d]))
+        for i in range(n):  # no object follows itself, as `between` is infinite there
+            if i >= table.s or not (row >> i) & 1:
+                c = inst.home[i]
+                drop = add(inst.to_bin[i, c], e[c, c])
+                table.object[row, i] = min(drop, _least(inst.between[i], w[c]))
+
+
+@kernel
+def _least(a: NDArray[np.int32], b: NDArray[np.int32]) -> Any:
+    """Least sum of two rows, entry by entry."""
+    best: Any = np.int32(INFINITE)
+    for k in range(a.size):
+        best = min(best, add(a[k], b[k]))
+    return best
+
+
+@kernel
+def _picked(inst: Instance, table: Table, left: int, j: int, w: NDArray[np.int32]) -> None:
+    """W with its pick for object j and every d."""
+    c = inst.home[j]
+    e = table.bin[left]
+    last, price = inst.to_bin[j, c], table.multipliers[j]
+    for d in range(w.shape[0]):
+        w[d, j] = add(price, min(add(inst.to_bin[j, d], e[d, c]), add(last, e[c, d])))
+
+
+@kernel
+def choose(
+    inst: Instance,
+    table: Table,
+    row: int,
+    at: int,
+    to_object: NDArray[np.int32],
+    to_bin: NDArray[np.int32],
+    first: int,
+    second: int,
+) -> tuple[int, int]:
+    """The best next action and the cost-to-go with it; `INFINITE` when nothing is left.
+
+    Args:
+        inst: The instance.
+        table: A filled table.
+        row: Row of the objects left.
+        at: Object that was just picked, -1 if it was not a pick.
+        to_object: Distances from here to objects.
+        to_bin: Distances from here to bins.
+        first: Bin of an object in hand, -1 for none.
+        second: Bin of another object in hand, -1 for none.
+    """
+    best, action = INFINITE, 0
+    for b in (first, second):
+        if b >= 0:
+            other = second if b == first else first
+            cost = to_bin[b] + (table.bin[row, b, other] if other >= 0 else table.bin[row, b, b])
+            if cost < best:
+                best, action = cost, -1 - b
+    if second >= 0:
+        return best, action
+    for j in range(inst.home.size):
+        left = row_without(row, j, table.s)
+        if left < 0 or j == at:
+            continue
+        if first >= 0:
+            cost = to_object[j] + after_pick(inst, table, left, j, first)
+        else:
+            cost = to_object[j] + table.object[left, j] + table.multipliers[j]
+        if cost < best:
+            best, action = cost, j
+    return best, action
+
+
+@kernel
+def walk(inst: Instance, table: Table, actions: NDArray[np.int64]) -> tuple[int, int]:
+    """Follow a best relaxed tour from the root.
+
+    Args:
+        inst: The instance.
+        table: A filled table.
+        actions: Receives the actions, at least (2 n + 2,): k >= 0 picks object k, -1 - b goes to bin b.
+
+    Returns:
+        Length of the tour with multipliers, and the number of actions.
+    """
+    row = table.bin.shape[0] - 1
+    to_object, to_bin, at = inst.root, inst.root_bin, -1
+    first = inst.carried[0] if inst.carried.size > 0 else -1
+    second = inst.carried[1] if inst.carried.size > 1 else -1
+    total, count = 0, 0
+    while True:
+        best, action = choose(inst, table, row, at, to_object, to_bin, first, second)
+        if best == INFINITE:
+            return total, count
+        if count == 0:
+            total = best
+        actions[count] = action
+        count += 1
+        if action >= 0:
+            row = row_without(row, action, table.s)
+            to_object, to_bin, at = inst.between[action], inst.to_bin[action], action
+            if first >= 0:
+                second = inst.home[action]
+            else:
+                first = inst.home[action]
+        else:
+            b = -1 - action
+            to_object, to_bin, at = inst.from_bin[b], inst.bins[b], -1
+            if first == b:
+                first, second = second, -1
+            if first == b:
+                first = -1
+            if second == b:
+                second = -1
