@@ -18,6 +18,8 @@ from mjsim.render.cameras import View
 _MARGIN = 0.01
 # The rasteriser draws nothing for it.
 _NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)
+# Comparing with the enumeration itself takes ten times as long.
+_GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
 
 
 def outside(
@@ -51,15 +53,14 @@ def outside(
 def without(scene: Any, hidden: NDArray[np.bool_]) -> Iterator[None]:
     """Draw a scene without the model geoms whose ids `hidden` (ngeom,) marks."""
     geoms = scene.geoms[: scene.ngeom]
-    kind = mujoco.mjtObj.mjOBJ_GEOM
     # Geoms of other origin index the extra entry at the end.
-    owners = [geom.objid if geom.objtype == kind else -1 for geom in geoms]
-    chosen = np.flatnonzero(np.append(hidden, False)[owners]) if owners else ()
-    types = [geoms[index].type for index in chosen]
+    owners = [geom.objid if geom.objtype == _GEOM else -1 for geom in geoms]
+    chosen = [geoms[index] for index in np.flatnonzero(np.append(hidden, False)[owners])] if owners else []
+    types = [geom.type for geom in chosen]
     try:
-        for index in chosen:
-            geoms[index].type = _NOTHING
+        for geom in chosen:
+            geom.type = _NOTHING
         yield
     finally:
-        for index, kept in zip(chosen, types, strict=True):
-            geoms[index].type = kept
+        for geom, kept in zip(chosen, types, strict=True):
+            geom.type = kept

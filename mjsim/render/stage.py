@@ -15,6 +15,7 @@ from mjsim.render import context
 from mjsim.render.cameras import View
 from mjsim.render.culling import outside, without
 from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers
+from mjsim.render.occlusion import Occluders
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.xray import blend_hidden, screen_rectangle
 
@@ -68,7 +69,8 @@ class Stage:
         self._xray_scene.flags[:] = 0
         self._camera = mujoco.MjvCamera()
         self._model = model
-        self._centres = np.zeros((model.ngeom, 3))
+        self._occluders = Occluders(model, np.isin(model.geom_group, list(groups)))
+        self._positions, self._rotations = np.zeros((model.ngeom, 3)), np.zeros((model.ngeom, 3, 3))
         self._colour = np.empty((self._drawn[1], self._drawn[0], 3), np.uint8)
         self._ids = np.empty((height, width, 3), np.uint8)
         self._depth = np.empty((height, width), np.float32)
@@ -106,7 +108,7 @@ class Stage:
                 f"data has {len(data.geom_xpos)} geoms and {len(data.qpos)} coordinates, the renderer's model "
                 f"{self._model.ngeom} and {self._model.nq}; make a renderer for the model of this data"
             )
-        self._centres = data.geom_xpos.copy()
+        self._positions, self._rotations = data.geom_xpos.copy(), data.geom_xmat.reshape(-1, 3, 3).copy()
         category = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(self._model, data, self._option, None, self._camera, category, self._scene)
         if self._lights is not None:
@@ -124,10 +126,7 @@ class Stage:
                 self._add_x_ray(view, [m for m in markers if m.x_ray], rectangle)
         finally:
             scene.ngeom = model_geoms
-        frame = cv2.flip(self._colour, 0)
-        if self._drawn != self._size:
-            frame = cv2.resize(frame, self._size, interpolation=cv2.INTER_AREA)
-        return np.asarray(frame, dtype=np.uint8)
+        return reduced(self._colour, self._size)
 
     def geometry(
         self, view: View, markers: Sequence[MarkerLike] = ()
@@ -160,7 +159,8 @@ class Stage:
         if profile is not None and (profile.shadow_size or profile.reflections):
             return np.zeros(self._model.ngeom, dtype=bool)
         aspect = max(width / height for width, height in (self._size, self._drawn))
-        return outside(view, aspect, self._centres, self._model.geom_rbound)
+        unseen = outside(view, aspect, self._positions, self._model.geom_rbound)
+        return unseen | self._occluders.hidden(view, aspect, self._positions, self._rotations, ~unseen)
 
     def _draw(
         self,
@@ -193,6 +193,16 @@ class Stage:
         mujoco.mjr_readPixels(colour, behind, part, self._gl)
         target = self._colour[bottom : bottom + height, left : left + width]
         blend_hidden(target, colour, before, behind)
+
+
+def reduced(drawn: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """A drawing with rows from the bottom as a frame of `size` (width, height) with rows from the top."""
+    if drawn.shape[1::-1] == size:
+        return np.asarray(cv2.flip(drawn, 0), dtype=np.uint8)
+    # For a slight reduction, interpolation costs a third of averaging over areas and comes within 0.3 dB of it.
+    slight = drawn.shape[1] < 1.5 * size[0]
+    method = cv2.INTER_LINEAR_EXACT if slight else cv2.INTER_AREA
+    return np.asarray(cv2.flip(cv2.resize(drawn, size, interpolation=method), 0), dtype=np.uint8)
 
 
 def checked_size(pixels: int) -> int:

@@ -1,0 +1,151 @@
+"""Leaving out geoms that stand wholly behind one wall: in a house of rooms, most of what the view points at.
+
+Each large opaque box in view is taken for the rectangle through its middle. What lies wholly in the shadow that
+this rectangle throws from the eye cannot leave a trace in the frame, because the box covers it.
+"""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.render.cameras import View
+
+# Both in-plane half-sizes of a box that is worth testing against, m.
+_LARGE = 0.4
+# How many boxes are tested, those that look largest first: more cost more than they hide.
+_TESTED = 12
+# Metres; far above rounding in single precision.
+_MARGIN = 0.01
+
+
+class Occluders:
+    """The large boxes of a model.
+
+    Args:
+        model: Compiled model.
+        shown: Which geoms are drawn, shape (ngeom,).
+    """
+
+    def __init__(self, model: Any, shown: NDArray[np.bool_]) -> None:
+        size = model.geom_size
+        box = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (np.sort(size, axis=1)[:, 1] > _LARGE)
+        self._model = model
+        self._shown = shown
+        self._ids = np.flatnonzero(box & shown & ~_see_through_texture(model))
+        self._thin = np.argmin(size[self._ids], axis=1)
+
+    def hidden(
+        self,
+        view: View,
+        aspect: float,
+        positions: NDArray[np.float64],
+        rotations: NDArray[np.float64],
+        seen: NDArray[np.bool_],
+    ) -> NDArray[np.bool_]:
+        """Which geoms stand wholly behind one of the boxes.
+
+        Args:
+            view: Perspective; parallel views hide nothing here.
+            aspect: Width over height of the image.
+            positions: Of the geoms, shape (ngeom, 3), m.
+            rotations: Of the geoms, shape (ngeom, 3, 3).
+            seen: Geoms that are in the view, shape (ngeom,).
+
+        Returns:
+            Mask, shape (ngeom,).
+        """
+        result = np.zeros(len(seen), dtype=bool)
+        if view.orthographic or not len(self._ids):
+            return result
+        planes, offsets = self._shadows(view, aspect, positions[self._ids], rotations[self._ids])
+        tested = np.flatnonzero(seen & self._shown & (self._model.geom_rbound > 0.0))
+        if not len(planes) or not len(tested):
+            return result
+        bounds = self._model.geom_aabb[tested]
+        away = positions[tested] - view.position
+        result[tested[_inside(planes, offsets, away, rotations[tested], bounds)]] = True
+        return result
+
+    def _shadows(
+        self, view: View, aspect: float, positions: NDArray[np.float64], rotations: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Inward normals (k, 5, 3) and distances from the eye (k, 5) of the planes around each shadow."""
+        ids, rows = self._ids, np.arange(len(self._ids))
+        rotation = rotations.transpose(0, 2, 1)  # rows are the box's axes
+        size = self._model.geom_size[ids]
+        one, two = (self._thin + 1) % 3, (self._thin + 2) % 3
+        centre = positions - view.position
+        normal = rotation[rows, self._thin]
+        across, along = (
+            rotation[rows, one] * size[rows, one, None],
+            rotation[rows, two] * size[rows, two, None],
+        )
+        ahead = np.einsum("ij,ij->i", normal, centre)
+        # Nearer than this, the near plane could cut a hole into the box.
+        clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
+        usable = (np.abs(ahead) - size[rows, self._thin] > clear) & _opaque(self._model, ids)
+        looks = size[rows, one] * size[rows, two] * np.abs(ahead) / np.linalg.norm(centre, axis=1) ** 3
+        chosen = np.argsort(-np.where(usable, looks, 0.0), kind="stable")[:_TESTED]
+        chosen = chosen[usable[chosen]]
+        centre, across, along = centre[chosen], across[chosen], along[chosen]
+        corners = np.stack(
+            [
+                centre + across + along,
+                centre - across + along,
+                centre - across - along,
+                centre + across - along,
+            ],
+            axis=1,
+        )
+        sides = np.cross(corners, np.roll(corners, -1, axis=1))
+        sides /= np.linalg.norm(sides, axis=2, keepdims=True)
+        sides *= np.sign(np.einsum("kij,kj->ki", sides, centre))[..., None]
+        away = normal[chosen] * np.sign(ahead[chosen])[:, None]
+        planes = np.concatenate([sides, away[:, None]], axis=1)
+        offsets = np.zeros(planes.shape[:2])
+        offsets[:, 4] = np.abs(ahead[chosen])
+        return planes, offsets
+
+
+def _inside(
+    planes: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    away: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    bounds: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Which boxes lie inside all planes of one shadow, shape (c,).
+
+    Args:
+        planes: Inward normals, shape (k, 5, 3).
+        offsets: Distances of the planes from the eye, shape (k, 5), m.
+        away: Origins of the boxes' frames seen from the eye, shape (c, 3), m.
+        rotations: Of the boxes' frames, shape (c, 3, 3).
+        bounds: Centres and half-sizes in those frames, shape (c, 6), m.
+    """
+    centres = away + np.einsum("cij,cj->ci", rotations, bounds[:, :3])
+    half_edges = (rotations * bounds[:, None, 3:]).transpose(1, 0, 2).reshape(3, -1)
+    flat = planes.reshape(-1, 3)
+    reach = np.abs(flat @ half_edges).reshape(len(flat), len(away), 3).sum(axis=2)
+    depth = flat @ centres.T - reach - offsets.reshape(-1, 1)
+    within = (depth > _MARGIN).reshape(len(planes), -1, len(away)).all(axis=1)
+    return np.asarray(within.any(axis=0))
+
+
+def _opaque(model: Any, ids: NDArray[np.int_]) -> NDArray[np.bool_]:
+    own = model.geom_rgba[ids, 3] >= 1.0
+    material = model.geom_matid[ids]
+    if not model.nmat:
+        return np.asarray(own)
+    return np.asarray(own & ((material < 0) | (model.mat_rgba[material, 3] >= 1.0)))
+
+
+def _see_through_texture(model: Any) -> NDArray[np.bool_]:
+    """Geoms whose material has a texture with an alpha channel, shape (ngeom,)."""
+    if not model.nmat or not model.ntex:
+        return np.zeros(model.ngeom, dtype=bool)
+    textures = model.mat_texid.reshape(model.nmat, -1)
+    alpha = ((textures >= 0) & (model.tex_nchannel[textures] == 4)).any(axis=1)
+    return np.asarray((model.geom_matid >= 0) & alpha[model.geom_matid])
