@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.instance import Instance
-from planner.exact.relaxation import INFINITE, Table
+from planner.exact.relaxation import INFINITE, Table, row_without
 from planner.kernels import kernel
 
 PLACE_BITS = 12
@@ -113,10 +113,19 @@ def row_of(left: int, s: int) -> int:
 
 @kernel
 def offer_bin(
-    inst: Instance, table: Table, nodes: Nodes, left: int, b: int, d: int, cost: int, limit: int, parent: int
+    inst: Instance,
+    table: Table,
+    nodes: Nodes,
+    left: int,
+    row: int,
+    b: int,
+    d: int,
+    cost: int,
+    limit: int,
+    parent: int,
 ) -> None:
     """Offer the state at bin b carrying one for d (d = b: nothing), unless its total reaches the limit."""
-    total = cost + table.bin[row_of(left, table.s), b, d]
+    total = cost + table.bin[row, b, d]
     if total < limit:
         m = inst.bins.shape[0]
         offer(nodes, (left << PLACE_BITS) | (b * m + d), cost, total, parent)
@@ -124,45 +133,63 @@ def offer_bin(
 
 @kernel
 def offer_second(
-    inst: Instance, table: Table, nodes: Nodes, left: int, j: int, d: int, cost: int, limit: int, parent: int
+    inst: Instance,
+    table: Table,
+    nodes: Nodes,
+    left: int,
+    row: int,
+    j: int,
+    d: int,
+    cost: int,
+    limit: int,
+    parent: int,
 ) -> None:
-    """Offer both ways on from object j, reached at a cost (pick not included) with one for d in hand."""
+    """Pick j, reached at a cost with one for d in hand, and offer both ways on; `left` and `row` have j."""
     c = inst.home[j]
+    left, row = left ^ (1 << j), row_without(row, j, table.s)
     cost += table.multipliers[j]
-    offer_bin(inst, table, nodes, left, d, c, cost + inst.to_bin[j, d], limit, parent)
+    offer_bin(inst, table, nodes, left, row, d, c, cost + inst.to_bin[j, d], limit, parent)
     if c != d:
-        offer_bin(inst, table, nodes, left, c, d, cost + inst.to_bin[j, c], limit, parent)
+        offer_bin(inst, table, nodes, left, row, c, d, cost + inst.to_bin[j, c], limit, parent)
 
 
 @kernel
 def offer_only(
-    inst: Instance, table: Table, nodes: Nodes, left: int, i: int, cost: int, limit: int, parent: int
+    inst: Instance,
+    table: Table,
+    nodes: Nodes,
+    left: int,
+    row: int,
+    i: int,
+    cost: int,
+    limit: int,
+    parent: int,
 ) -> None:
-    """Offer the state at object i with only that in hand, reached at a cost (pick not included)."""
+    """Pick i, reached at a cost with empty hands, and offer the state there; `left` and `row` have i."""
     m = inst.bins.shape[0]
     cost += table.multipliers[i]
-    total = cost + table.object[row_of(left, table.s), i]
+    total = cost + table.object[row_without(row, i, table.s), i]
     if total < limit:
-        offer(nodes, (left << PLACE_BITS) | (m * m + i), cost, total, parent)
+        offer(nodes, ((left ^ (1 << i)) << PLACE_BITS) | (m * m + i), cost, total, parent)
 
 
 @kernel
 def offer_roots(inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int) -> None:
     """Put the states that can follow the root into the first two layers."""
     n = inst.home.size
-    everything = (1 << n) - 1
+    everything, row = (1 << n) - 1, table.bin.shape[0] - 1
     if inst.carried.size == 0:
         for i in range(n):
-            offer_only(inst, table, after, everything ^ (1 << i), i, inst.root[i], limit, NO_PARENT)
+            offer_only(inst, table, after, everything, row, i, inst.root[i], limit, NO_PARENT)
         return
     d = inst.carried[0]
     other = inst.carried[inst.carried.size - 1]
-    offer_bin(inst, table, here, everything, d, other, inst.root_bin[d], limit, NO_PARENT)
+    offer_bin(inst, table, here, everything, row, d, other, inst.root_bin[d], limit, NO_PARENT)
     if inst.carried.size == 2:
-        offer_bin(inst, table, here, everything, other, d, inst.root_bin[other], limit, NO_PARENT)
+        offer_bin(inst, table, here, everything, row, other, d, inst.root_bin[other], limit, NO_PARENT)
         return
     for j in range(n):
-        offer_second(inst, table, after, everything ^ (1 << j), j, d, inst.root[j], limit, NO_PARENT)
+        offer_second(inst, table, after, everything, row, j, d, inst.root[j], limit, NO_PARENT)
 
 
 @kernel
@@ -211,11 +238,12 @@ def expand(
         else:
             legs, home_leg = inst.from_bin[b], inst.bins[b, d]
         left = here.key[k] >> PLACE_BITS
-        offer_bin(inst, table, here, left, d, d, here.cost[k] + home_leg, limit, 2 * k + 1)
+        row = row_of(left, table.s)
+        offer_bin(inst, table, here, left, row, d, d, here.cost[k] + home_leg, limit, 2 * k + 1)
         after = with_room(after, 2 * n)
         for j in range(n):
             if (left >> j) & 1:
-                offer_second(inst, table, after, left ^ (1 << j), j, d, here.cost[k] + legs[j], limit, 2 * k)
+                offer_second(inst, table, after, left, row, j, d, here.cost[k] + legs[j], limit, 2 * k)
     for k in range(here.size[0]):
         place = here.key[k] & ((1 << PLACE_BITS) - 1)
         b = place // m
@@ -225,10 +253,9 @@ def expand(
         left = here.key[k] >> PLACE_BITS
         if left == 0 and (end < 0 or here.cost[k] < here.cost[end]):
             end = k
+        row = row_of(left, table.s)
         after = with_room(after, n)
         for i in range(n):
             if (left >> i) & 1:
-                offer_only(
-                    inst, table, after, left ^ (1 << i), i, here.cost[k] + inst.from_bin[b, i], limit, 2 * k
-                )
+                offer_only(inst, table, after, left, row, i, here.cost[k] + inst.from_bin[b, i], limit, 2 * k)
     return here, after, expanded, end
