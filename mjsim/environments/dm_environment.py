@@ -1,0 +1,93 @@
+"""The dm_env interface, and `mjsim.make`."""
+
+from typing import Any
+
+import dm_env
+import numpy as np
+from dm_env import specs
+
+from mjsim.environments.core import Rearrangement
+from mjsim.environments.options import build, parse_options
+
+
+def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment":
+    """Make an environment with the dm_env interface.
+
+        env = mjsim.make(objects=6, seed=0, observations=("state", "rgb"), actions="discrete")
+
+    Args:
+        seed: Seed of the first episode and of the draws of all later ones; None for one that differs every time.
+        **options: Fields of `mjsim.environments.options.EnvironmentOptions`.
+
+    Raises:
+        EnvironmentConfigError: An option is unknown or unusable.
+        AssetError: The house is malformed.
+    """
+    return RearrangeDmEnvironment(build(parse_options(options)), seed=seed)
+
+
+class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_env has no types
+    """The task behind dm_env's interface.
+
+    An episode that ends because everything is delivered has discount 0 in its last step; one that the time limit
+    cuts off has discount 1, so that what would have followed still counts.
+
+    Args:
+        core: The task.
+        seed: Seed of the first episode and of the draws of all later ones.
+    """
+
+    def __init__(self, core: Rearrangement, *, seed: int | None = None) -> None:
+        self.core = core
+        self._next_seed = seed
+        self._rng = np.random.default_rng(seed)
+        self._running = False
+
+    @property
+    def physics(self) -> Any:
+        """The running episode as a `dm_control.mujoco.Physics` that shares its state.
+
+        With it, `dm_control.viewer.launch(env)` shows the environment.
+
+        Raises:
+            EnvironmentStateError: Before the first reset.
+        """
+        return self.core.stage.physics
+
+    def reset(self) -> dm_env.TimeStep:
+        """Begin the next episode."""
+        seed, self._next_seed = self._next_seed, None
+        observation, _ = self.core.reset_drawn(self._rng) if seed is None else self.core.reset(seed)
+        self._running = True
+        return dm_env.restart(observation)
+
+    def step(self, action: Any) -> dm_env.TimeStep:
+        """Carry out an action; after a last step, or before the first reset, begin the next episode instead.
+
+        Raises:
+            ActionError: The action does not conform to its spec.
+            PhysicsError: MuJoCo warned; the episode is over.
+        """
+        if not self._running:
+            return self.reset()
+        self._running = False  # stays so if the physics fails
+        taken = self.core.step(action)
+        self._running = not (taken.terminated or taken.truncated)
+        if taken.terminated:
+            return dm_env.termination(taken.reward, taken.observation)
+        if taken.truncated:
+            return dm_env.truncation(taken.reward, taken.observation)
+        return dm_env.transition(taken.reward, taken.observation)
+
+    def observation_spec(self) -> dict[str, specs.Array]:
+        """Sensor name -> what it gives."""
+        return self.core.observation_spec
+
+    def action_spec(self) -> specs.BoundedArray:
+        """What an action is."""
+        return self.core.action_spec
+
+    def close(self) -> None:
+        """Free what was compiled."""
+        self._running = False
+        self.core.close()

@@ -1,0 +1,130 @@
+"""The Gymnasium interface."""
+
+from typing import Any, cast
+
+import gymnasium
+import numpy as np
+from dm_env import specs
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from mjsim.environments.control import Continuous
+from mjsim.environments.core import ObservationDict
+from mjsim.environments.errors import EnvironmentConfigError
+from mjsim.environments.options import build, parse_options
+from mjsim.environments.viewer import Viewer, open_viewer
+
+RENDER_SIZE = (640, 480)
+
+
+class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
+    """The task behind Gymnasium's interface; `gymnasium.make("mjsim/Rearrange-v0", objects=6, ...)`.
+
+    `reset(seed=s)` begins the episode of seed s, the house that `mjsim house --seed s` writes; later resets draw
+    their seeds from it.
+
+    Args:
+        render_mode: None, `rgb_array` for what the eye sees, or `human` for dm_control's viewer.
+        **options: Fields of `mjsim.environments.options.EnvironmentOptions`.
+
+    Raises:
+        EnvironmentConfigError: An option is unknown or unusable.
+        AssetError: The house is malformed.
+    """
+
+    metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own name
+
+    def __init__(self, render_mode: str | None = None, **options: Any) -> None:
+        modes = self.metadata["render_modes"]
+        if render_mode is not None and render_mode not in modes:
+            raise EnvironmentConfigError(f"no render mode {render_mode!r}; choose from {modes} or None")
+        parsed = parse_options(options)
+        self.core = build(parsed)
+        self.render_mode = render_mode
+        repeat = self.core.control.repeat if isinstance(self.core.control, Continuous) else 1
+        self.metadata = {
+            **self.metadata,
+            "render_fps": max(1, round(1 / (parsed.world.control_timestep * repeat))),
+        }
+        arrays = {k: to_space(s) for k, s in self.core.observation_spec.items()}
+        self.observation_space = cast("spaces.Space[ObservationDict]", spaces.Dict(arrays))
+        self.action_space = to_space(self.core.action_spec)
+        self._viewer: Viewer | None = None
+        if render_mode == "human":
+            self.core.on_control_step = lambda world: self._window().show(world)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[ObservationDict, dict[str, Any]]:
+        """Begin an episode.
+
+        Args:
+            seed: The episode's, and that of the draws of later ones; None to draw one.
+            options: None are known.
+
+        Raises:
+            EnvironmentConfigError: `options` is not empty.
+            ViewerError: Render mode `human`, and no window can be opened.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise EnvironmentConfigError(f"reset has no option {sorted(options)[0]!r}; it has none")
+        began = self.core.reset_drawn(self.np_random) if seed is None else self.core.reset(seed)
+        if self.render_mode == "human":
+            self._window().show(self.core.world)
+        return began
+
+    def step(self, action: Any) -> tuple[ObservationDict, float, bool, bool, dict[str, Any]]:
+        """Carry out an action.
+
+        Raises:
+            EnvironmentStateError: The episode is over, or none was begun.
+            ActionError: The action does not conform to its space.
+            PhysicsError: MuJoCo warned; the episode is over.
+        """
+        taken = self.core.step(action)
+        return taken.observation, taken.reward, taken.terminated, taken.truncated, taken.info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """What the eye sees, (480, 640, 3) uint8, in mode `rgb_array`; in mode `human` the window is up to date.
+
+        Raises:
+            RenderError: No OpenGL context could be made.
+            ViewerError: No window can be opened.
+        """
+        if self.render_mode == "human":
+            self._window().show(self.core.world)
+            return None
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                "render needs a render mode; make the environment with render_mode='rgb_array'"
+            )
+            return None
+        return self.core.rgb(*RENDER_SIZE, self.core.layout.camera.profile)
+
+    def close(self) -> None:
+        """Close the window and free what was compiled."""
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None
+        self.core.close()
+
+    def _window(self) -> Viewer:
+        if self._viewer is None:
+            self._viewer = open_viewer(realtime=True)
+        return self._viewer
+
+
+def to_space(spec: specs.Array) -> spaces.Space[Any]:
+    """The Gymnasium space of what a dm_env spec declares.
+
+    Raises:
+        EnvironmentConfigError: The spec has no bounds.
+    """
+    if isinstance(spec, specs.DiscreteArray):
+        return spaces.Discrete(spec.num_values)
+    if isinstance(spec, specs.BoundedArray):
+        low = np.broadcast_to(spec.minimum, spec.shape).astype(spec.dtype)
+        high = np.broadcast_to(spec.maximum, spec.shape).astype(spec.dtype)
+        return spaces.Box(low, high, spec.shape, spec.dtype.type)
+    raise EnvironmentConfigError(f"sensor {spec.name!r} declares no bounds; give it a BoundedArray")

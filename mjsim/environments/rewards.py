@@ -1,0 +1,93 @@
+"""What an agent is paid: less for every second, and if wanted an advance on getting nearer to the end."""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mjsim.environments.errors import EnvironmentConfigError
+from mjsim.episode import CAPACITY
+from mjsim.observation import ObjectStatus, Observation
+from mjsim.scene import Scene
+
+WALKING_SPEED = 1.3  # m/s
+HANDLING_TIME = 2.0  # s, about what a pick or a place takes
+
+
+class RewardFunction(Protocol):
+    """Reward of one step of the environment."""
+
+    def __call__(self, scene: Scene, before: Observation, after: Observation) -> float:
+        """What the change from `before` to `after` is worth."""
+        ...
+
+
+@dataclass(frozen=True)
+class TimeReward:
+    """Minus the time that passed, with potential-based shaping on top where it is switched on.
+
+    The shaping is `shaping * (discount * potential(after) - potential(before))` with the potential minus the
+    estimated time to the end. Whatever the estimate, such a term leaves the optimal policy as it is, provided
+    that the agent discounts by the same factor (Ng, Harada and Russell 1999).
+
+    Attributes:
+        per_second: Cost of a second.
+        shaping: Weight of the shaping; 0 switches it off, 1 weighs an estimated second like a real one.
+        discount: The agent's discount factor per environment step.
+    """
+
+    per_second: float = 1.0
+    shaping: float = 0.0
+    discount: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.discount <= 1.0:
+            raise EnvironmentConfigError(f"discount must be 0 to 1, got {self.discount}")
+        if not (math.isfinite(self.per_second) and math.isfinite(self.shaping)):
+            raise EnvironmentConfigError(
+                f"per_second and shaping must be finite, got {self.per_second} and {self.shaping}"
+            )
+
+    def __call__(self, scene: Scene, before: Observation, after: Observation) -> float:
+        """The reward of one step."""
+        reward = -self.per_second * (after.time - before.time)
+        if self.shaping:
+            gain = self.discount * potential(scene, after) - potential(scene, before)
+            reward += self.shaping * gain
+        return reward
+
+
+def potential(scene: Scene, observation: Observation) -> float:
+    """Minus a rough estimate of the time to the end, s: straight lines, one object at a time; 0 when all is done."""
+    status = observation.object_status
+    bins = np.array(
+        [scene.receptacles[scene.episode.targets[n]].center[:2] for n in observation.object_names]
+    )
+    loose = np.array([s is ObjectStatus.LOOSE for s in status])
+    carried = np.array([s is ObjectStatus.CARRIED for s in status])
+    things = observation.object_positions[:, :2]
+    walk = np.linalg.norm(bins - things, axis=1)[loose].sum()
+    walk += np.linalg.norm(bins - observation.position, axis=1)[carried].sum()
+    if loose.any() and carried.sum() < CAPACITY:
+        walk += np.linalg.norm(things - observation.position, axis=1)[loose].min()
+    handling = HANDLING_TIME * (2 * loose.sum() + carried.sum())
+    return -float(walk / WALKING_SPEED + handling)
+
+
+REWARDS = {"time": TimeReward(), "shaped": TimeReward(shaping=1.0)}
+
+
+def resolve_reward(reward: str | RewardFunction) -> RewardFunction:
+    """The reward function itself, or the one of that name: `time` or `shaped`.
+
+    Raises:
+        EnvironmentConfigError: No reward has that name.
+    """
+    if not isinstance(reward, str):
+        return reward
+    if reward not in REWARDS:
+        raise EnvironmentConfigError(
+            f"no reward {reward!r}; choose from {sorted(REWARDS)}, or pass a function"
+        )
+    return REWARDS[reward]

@@ -1,0 +1,63 @@
+"""Sensors: small declared arrays of which an observation is put together."""
+
+from collections.abc import Sequence
+
+from mjsim.environments.errors import EnvironmentConfigError
+from mjsim.environments.sensors import house, person, sight, task
+from mjsim.environments.sensors.base import IMAGES, Moment, Sensor, unit_spec
+
+__all__ = ["BUNDLES", "IMAGES", "SENSORS", "Moment", "Sensor", "resolve_sensors", "unit_spec"]
+
+_VECTORS = (
+    person.GPS,
+    person.COMPASS,
+    person.POSE,
+    person.MOTION,
+    person.INVENTORY,
+    house.RANGEFINDER,
+    house.RECEPTACLES,
+    task.OBJECT_MASK,
+    task.OBJECT_POSITIONS,
+    task.OBJECT_ROTATIONS,
+    task.OBJECT_STATUS,
+    task.OBJECT_CATEGORIES,
+    task.GOALS,
+    task.REMAINING,
+    task.TIME_LEFT,
+)
+_OTHERS = (house.MAP, sight.IN_VIEW, sight.RGB, sight.DEPTH, sight.SEGMENTATION, sight.VISIBLE_PIXELS)
+
+SENSORS = {sensor.name: sensor for sensor in (*_VECTORS, *_OTHERS)}
+BUNDLES = {"state": _VECTORS}
+
+
+def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:
+    """Sensors by name, by the name of a bundle, or as they are; each once, in order.
+
+    Raises:
+        EnvironmentConfigError: A name is unknown, none is given, or two different sensors share a name.
+    """
+    if isinstance(observations, str):
+        observations = (observations,)
+    chosen: dict[str, Sensor] = {}
+    for choice in observations:
+        for sensor in _resolve(choice):
+            if chosen.setdefault(sensor.name, sensor) is not sensor:
+                raise EnvironmentConfigError(f"two different sensors are named {sensor.name!r}; rename one")
+    if not chosen:
+        raise EnvironmentConfigError(f"observations is empty; choose from {_names()}")
+    return tuple(chosen.values())
+
+
+def _resolve(choice: str | Sensor) -> Sequence[Sensor]:
+    if isinstance(choice, Sensor):
+        return (choice,)
+    if choice in BUNDLES:
+        return BUNDLES[choice]
+    if choice in SENSORS:
+        return (SENSORS[choice],)
+    raise EnvironmentConfigError(f"no sensor {choice!r}; choose from {_names()}, or pass a Sensor")
+
+
+def _names() -> list[str]:
+    return [*BUNDLES, *SENSORS]

@@ -1,0 +1,114 @@
+"""What the person sees: images from the eye, and which objects are in them."""
+
+import mujoco
+import numpy as np
+from dm_env import specs
+from numpy.typing import NDArray
+
+from mjsim.environments.errors import EnvironmentConfigError
+from mjsim.environments.layout import Layout
+from mjsim.environments.sensors.base import Moment, Sensor, unit_spec
+from mjsim.scene import Scene
+from mjsim.visibility import visible_objects
+
+BACKGROUND = 0
+
+
+def labels_of_geoms(scene: Scene, layout: Layout) -> NDArray[np.int32]:
+    """What each geom belongs to, the same numbers in every episode.
+
+    Returns:
+        Shape (ngeom + 1,): `BACKGROUND` for house and person and for geom -1, i + 1 for the object in slot i, and
+        `layout.slots` + 1 + k for receptacle k.
+    """
+    model = scene.model
+    labels = np.full(model.ngeom + 1, BACKGROUND, np.int32)
+    owner = scene.index.geom_owner
+    labels[:-1][owner >= 0] = owner[owner >= 0] + 1
+    for k, key in enumerate(layout.receptacles):
+        root = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{key}/receptacle")
+        inside = _descendants(model, root)
+        labels[:-1][inside[model.geom_bodyid]] = layout.slots + 1 + k
+    return labels
+
+
+def _descendants(model: mujoco.MjModel, root: int) -> NDArray[np.bool_]:
+    """Which bodies are `root` or hang from it, shape (nbody,)."""
+    inside = np.zeros(model.nbody, bool)
+    inside[root] = True
+    for body in range(root + 1, model.nbody):  # parents come before their children
+        inside[body] = inside[model.body_parentid[body]]
+    return inside
+
+
+def visible_pixels(moment: Moment) -> dict[str, int]:
+    """Instance name -> how many pixels of it the eye sees, in the episode's order; hidden ones are left out."""
+    counts = _pixels(moment)
+    return {n: int(c) for n, c in zip(moment.observation.object_names, counts, strict=False) if c}
+
+
+def _image_spec(layout: Layout, dtype: type, low: float, high: float, *depth: int) -> specs.BoundedArray:
+    return specs.BoundedArray((layout.camera.height, layout.camera.width, *depth), dtype, low, high)
+
+
+def _rgb(moment: Moment) -> NDArray[np.uint8]:
+    image = moment.frame().rgb
+    if image is None:
+        raise _undrawn("rgb")
+    return image.copy()
+
+
+def _depth(moment: Moment) -> NDArray[np.float32]:
+    image = moment.frame().depth
+    if image is None:
+        raise _undrawn("depth")
+    return np.minimum(image, np.float32(moment.layout.camera.far))
+
+
+def _segmentation(moment: Moment) -> NDArray[np.int32]:
+    ids = moment.frame().segmentation
+    if ids is None:
+        raise _undrawn("segmentation")
+    return labels_of_geoms(moment.world.scene, moment.layout)[ids]
+
+
+def _undrawn(channel: str) -> EnvironmentConfigError:
+    return EnvironmentConfigError(f"{channel!r} was not drawn; name it in the sensor's images")
+
+
+def _pixels(moment: Moment) -> NDArray[np.int32]:
+    slots = moment.layout.slots
+    counts = np.bincount(_segmentation(moment).ravel(), minlength=slots + 1)
+    return counts[1 : slots + 1].astype(np.int32)
+
+
+def _in_view(moment: Moment) -> NDArray[np.float32]:
+    seen, world = moment.observation, moment.world
+    names = visible_objects(world.scene, world.data, seen.eye, seen.heading, seen.pitch)
+    flags = np.zeros(moment.layout.slots, np.float32)
+    flags[[seen.object_names.index(n) for n in names]] = 1.0
+    return flags
+
+
+RGB = Sensor("rgb", lambda layout: _image_spec(layout, np.uint8, 0, 255, 3), _rgb, frozenset({"rgb"}))
+DEPTH = Sensor(
+    "depth",
+    lambda layout: _image_spec(layout, np.float32, 0.0, layout.camera.far),
+    _depth,
+    frozenset({"depth"}),
+)
+SEGMENTATION = Sensor(
+    "segmentation",
+    lambda layout: _image_spec(layout, np.int32, 0, layout.slots + len(layout.receptacles)),
+    _segmentation,
+    frozenset({"segmentation"}),
+)
+VISIBLE_PIXELS = Sensor(
+    "visible_pixels",
+    lambda layout: specs.BoundedArray(
+        (layout.slots,), np.int32, 0, layout.camera.width * layout.camera.height
+    ),
+    _pixels,
+    frozenset({"segmentation"}),
+)
+IN_VIEW = Sensor("in_view", lambda layout: unit_spec(layout.slots, low=0.0), _in_view)
