@@ -134,6 +134,7 @@ _NEAR = 0.002  # m
 _NEAR_ANGLE = math.radians(0.1)
 _STILL = 0.01  # m/s
 _PATIENCE = 4  # control steps without headway before a walk counts as blocked
+_LONGEST = 2.0  # s for a walk that slides along something
 
 
 def _walk(observation: Observation, stride: float, options: WorldOptions) -> Steps:
@@ -141,7 +142,9 @@ def _walk(observation: Observation, stride: float, options: WorldOptions) -> Ste
     start, heading = observation.position, observation.heading
     ahead = np.array([math.cos(heading), math.sin(heading)])
     walked, waited = 0.0, 0
-    while waited < _PATIENCE and stride - walked > _NEAR:
+    for _ in range(math.ceil((_LONGEST + stride) / options.control_timestep)):
+        if waited == _PATIENCE or stride - walked <= _NEAR:
+            break
         left = stride - walked
         pace = min(options.max_speed, math.sqrt(2 * _BRAKING * left), _GAIN * left)
         step = yield Move(forward=pace)

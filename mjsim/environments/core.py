@@ -89,6 +89,11 @@ class Rearrangement:
         return self.control.spec()
 
     @property
+    def begun(self) -> bool:
+        """Whether there is an episode to look at."""
+        return self._stage is not None
+
+    @property
     def stage(self) -> Stage:
         """The compiled episode that runs.
 
@@ -109,6 +114,14 @@ class Rearrangement:
         """Everything about the present moment; raises `EnvironmentStateError` before the first reset."""
         return self.world.observation()
 
+    def prepare(self, seed: int) -> None:
+        """Compile the episode of a seed ahead of its reset.
+
+        Raises:
+            SamplingError, AssetError: As for `reset`.
+        """
+        self._stage, self._over = self._episodes.stage(seed), True
+
     def reset(self, seed: int) -> tuple[ObservationDict, dict[str, Any]]:
         """Begin the episode of a seed.
 
@@ -119,9 +132,9 @@ class Rearrangement:
             SamplingError: The house has no room for this seed's objects.
             AssetError, RenderError: A model is malformed; images were asked for and cannot be drawn.
         """
-        self._stage = self._episodes.stage(seed)
+        self.prepare(seed)
         self._seed, self._over = seed, False
-        moment = self._moment(self._stage.world.reset())
+        moment = self._moment(self.world.reset())
         return self._observe(moment), self._info(moment, ())
 
     def reset_drawn(self, rng: np.random.Generator) -> tuple[ObservationDict, dict[str, Any]]:

@@ -6,7 +6,7 @@ import dm_env
 import numpy as np
 from dm_env import specs
 
-from mjsim.environments.core import Rearrangement
+from mjsim.environments.core import MAX_SEED, Rearrangement
 from mjsim.environments.options import build, parse_options
 
 
@@ -47,11 +47,13 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
     def physics(self) -> Any:
         """The running episode as a `dm_control.mujoco.Physics` that shares its state.
 
-        With it, `dm_control.viewer.launch(env)` shows the environment.
-
-        Raises:
-            EnvironmentStateError: Before the first reset.
+        With it, `dm_control.viewer.launch(env)` shows the environment. Before the first reset it is that of the
+        episode to come.
         """
+        if not self.core.begun:
+            if self._next_seed is None:
+                self._next_seed = int(self._rng.integers(MAX_SEED))
+            self.core.prepare(self._next_seed)
         return self.core.stage.physics
 
     def reset(self) -> dm_env.TimeStep:

@@ -30,6 +30,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
     Raises:
         EnvironmentConfigError: An option is unknown or unusable.
         AssetError: The house is malformed.
+        ViewerError: Render mode `human`, and no window can be opened.
     """
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own name
@@ -49,9 +50,9 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         arrays = {k: to_space(s) for k, s in self.core.observation_spec.items()}
         self.observation_space = cast("spaces.Space[ObservationDict]", spaces.Dict(arrays))
         self.action_space = to_space(self.core.action_spec)
-        self._viewer: Viewer | None = None
-        if render_mode == "human":
-            self.core.on_control_step = lambda world: self._window().show(world)
+        self._viewer: Viewer | None = open_viewer() if render_mode == "human" else None
+        if self._viewer is not None:
+            self.core.on_control_step = self._viewer.show
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -64,14 +65,14 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
 
         Raises:
             EnvironmentConfigError: `options` is not empty.
-            ViewerError: Render mode `human`, and no window can be opened.
+            ViewerError: The window was closed by `close`.
         """
         super().reset(seed=seed)
         if options:
             raise EnvironmentConfigError(f"reset has no option {sorted(options)[0]!r}; it has none")
         began = self.core.reset_drawn(self.np_random) if seed is None else self.core.reset(seed)
-        if self.render_mode == "human":
-            self._window().show(self.core.world)
+        if self._viewer is not None:
+            self._viewer.show(self.core.world)
         return began
 
     def step(self, action: Any) -> tuple[ObservationDict, float, bool, bool, dict[str, Any]]:
@@ -90,10 +91,10 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
 
         Raises:
             RenderError: No OpenGL context could be made.
-            ViewerError: No window can be opened.
+            ViewerError: The window was closed by `close`.
         """
-        if self.render_mode == "human":
-            self._window().show(self.core.world)
+        if self._viewer is not None:
+            self._viewer.show(self.core.world)
             return None
         if self.render_mode is None:
             gymnasium.logger.warn(
@@ -106,13 +107,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         """Close the window and free what was compiled."""
         if self._viewer is not None:
             self._viewer.close()
-            self._viewer = None
         self.core.close()
-
-    def _window(self) -> Viewer:
-        if self._viewer is None:
-            self._viewer = open_viewer(realtime=True)
-        return self._viewer
 
 
 def to_space(spec: specs.Array) -> spaces.Space[Any]:

@@ -2,8 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+import warnings
 from typing import Any, Protocol
 
 from mjsim.environments.errors import ViewerError
@@ -43,9 +42,10 @@ class _DmControlViewer:
     """dm_control's viewer has a loop of its own; a window for Gymnasium has to be driven from outside."""
 
     def __init__(self, width: int, height: int, realtime: bool) -> None:
+        self._window: Any = None
         gui, self._render, self._viewer_module, self._renderer_module = _load()
         try:
-            self._window: Any = gui.RenderWindow(width, height, "mjsim")
+            self._window = gui.RenderWindow(width, height, "mjsim")
         except Exception as error:  # GLFW and the window system raise many unrelated types here
             raise ViewerError(f"no window could be opened ({error}); {_REMEDY}") from error
         self._viewport = self._renderer_module.Viewport(width, height)
@@ -103,34 +103,37 @@ class _DmControlViewer:
 
 
 def _load() -> tuple[Any, Any, Any, Any]:
-    """dm_control's modules of the viewer, with GLFW as its backend.
+    """dm_control's modules of the viewer, with GLFW as the OpenGL backend of this process.
+
+    A process has one backend, for windows and off screen alike; a window made first settles it.
 
     Raises:
-        ViewerError: dm_control was imported before with another backend, or GLFW cannot be loaded.
+        ViewerError: Another backend is in use, or GLFW cannot be loaded.
     """
-    try:
-        with _glfw_chosen():
-            from dm_control import _render
-            from dm_control.viewer import gui, renderer, viewer
-    except Exception as error:  # a missing library surfaces as ImportError, AttributeError or OSError
-        raise ViewerError(f"dm_control's viewer cannot be loaded ({error}); {_REMEDY}") from error
-    if _render.BACKEND != "glfw":
+    if os.environ.get(_BACKEND, "glfw") != "glfw":
         raise ViewerError(
-            f"dm_control was imported with {_BACKEND}={_render.BACKEND}, and its viewer needs glfw; "
-            f"start the program with {_BACKEND}=glfw"
+            f"a window needs the OpenGL backend glfw, and this process uses {_BACKEND}={os.environ[_BACKEND]}; "
+            f"start the program with {_BACKEND}=glfw, or {_REMEDY}"
         )
+    _check_display()
+    os.environ[_BACKEND] = "glfw"
+    try:
+        from dm_control import _render
+        from dm_control.viewer import gui, renderer, viewer
+    except Exception as error:  # a missing library surfaces as ImportError, AttributeError or OSError
+        raise ViewerError(f"dm_control's viewer cannot be loaded ({error!r}); {_REMEDY}") from error
     return gui, _render, viewer, renderer
 
 
-@contextmanager
-def _glfw_chosen() -> Iterator[None]:
-    """dm_control chooses its backend when it is imported, by a variable that rendering sets to egl."""
-    before = os.environ.get(_BACKEND)
-    os.environ[_BACKEND] = "glfw"
+def _check_display() -> None:
+    """Ask GLFW alone first: dm_control would settle the process's backend before it fails."""
     try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[_BACKEND]
-        else:
-            os.environ[_BACKEND] = before
+        with warnings.catch_warnings(record=True) as reasons:
+            import glfw
+
+            ready = glfw.init()
+    except ImportError as error:
+        raise ViewerError(f"GLFW cannot be loaded ({error}); {_REMEDY}") from error
+    if not ready:
+        said = "; ".join(str(r.message) for r in reasons) or "GLFW gives no reason"
+        raise ViewerError(f"no display ({said}); {_REMEDY}")
