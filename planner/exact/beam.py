@@ -53,8 +53,9 @@ def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadlin
     for layer in range(n + 1):
         if expanded > most or deadline.over():
             return Pass(upper, None, bound.root, expanded)
-        dropped = min(dropped, keep_best(here, width))
-        here, after, count, end = expand(bound.instance, bound.table, here, after, limit)
+        here, worse = keep_best(here, width)
+        here, after, early, count, end = expand(bound.instance, bound.table, here, after, limit, width)
+        dropped = min(dropped, worse, early)
         expanded += count
         size = here.size[0]
         history.append((here.key[:size].copy(), here.parent[:size].copy()))

@@ -26,7 +26,7 @@ class Nodes(NamedTuple):
         size: Number of states, (1,) int64.
         key: Code of each state, int64.
         cost: Length of the shortest known way, int32.
-        total: Cost plus bound of the cost-to-go, int32; `INFINITE` for a state that was dropped.
+        total: Cost plus bound of the cost-to-go, int32.
         parent: 2 x index of the state before + (1 if that is in the same layer), or `NO_PARENT`, int64.
         slots: Hash table of indices, -1 where empty, a power of two long, int32.
     """
@@ -193,38 +193,55 @@ def offer_roots(inst: Instance, table: Table, here: Nodes, after: Nodes, limit: 
 
 
 @kernel
-def keep_best(nodes: Nodes, width: int) -> int:
-    """Drop all but the most promising states; the smallest total dropped, `INFINITE` if none was."""
+def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
+    """Only the most promising states, and the smallest total dropped (`INFINITE` if none was)."""
     size = nodes.size[0]
     if size <= width:
-        return INFINITE
+        return nodes, INFINITE
     bar = np.partition(nodes.total[:size].copy(), width - 1)[width - 1]
     ties = width
     for k in range(size):
         if nodes.total[k] < bar:
             ties -= 1
-    smallest = INFINITE
+    room = 1
+    while room < 2 * width:
+        room *= 2
+    kept, smallest = new_nodes(room), INFINITE
     for k in range(size):
         if nodes.total[k] == bar and ties > 0:
             ties -= 1
         elif nodes.total[k] >= bar:
             smallest = min(smallest, nodes.total[k])
-            nodes.total[k] = INFINITE
-    return smallest
+            continue
+        offer(kept, nodes.key[k], nodes.cost[k], nodes.total[k], nodes.parent[k])
+    return kept, smallest
+
+
+@kernel
+def with_room_among(nodes: Nodes, more: int, width: int) -> tuple[Nodes, int]:
+    """Make room by dropping states that are not among the best 2 `width` when there are twice as many.
+
+    They would not be among the best `width` later either.
+    """
+    smallest = INFINITE
+    if nodes.size[0] + more > nodes.key.size and nodes.size[0] > 4 * width:
+        nodes, smallest = keep_best(nodes, 2 * width)
+    return with_room(nodes, more), smallest
 
 
 @kernel
 def expand(
-    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int
-) -> tuple[Nodes, Nodes, int, int]:
+    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int
+) -> tuple[Nodes, Nodes, int, int, int]:
     """Offer all successors of a layer's states.
 
     Returns:
-        This layer with states reached by dropping, the next layer, how many states were expanded, and the index
-        of the end of the shortest complete tour, -1 if there is none.
+        This layer with states reached by dropping, the next layer, the smallest total dropped from it to save
+        memory, how many states were expanded, and the index of the end of the shortest complete tour (-1 if
+        there is none).
     """
     n, m = inst.to_bin.shape
-    size, expanded, end = here.size[0], 0, -1
+    size, smallest, expanded, end = here.size[0], INFINITE, 0, -1
     here = with_room(here, size)
     for k in range(size):
         place = here.key[k] & ((1 << PLACE_BITS) - 1)
@@ -240,7 +257,8 @@ def expand(
         left = here.key[k] >> PLACE_BITS
         row = row_of(left, table.s)
         offer_bin(inst, table, here, left, row, d, d, here.cost[k] + home_leg, limit, 2 * k + 1)
-        after = with_room(after, 2 * n)
+        after, dropped = with_room_among(after, 2 * n, width)
+        smallest = min(smallest, dropped)
         for j in range(n):
             if (left >> j) & 1:
                 offer_second(inst, table, after, left, row, j, d, here.cost[k] + legs[j], limit, 2 * k)
@@ -254,8 +272,9 @@ def expand(
         if left == 0 and (end < 0 or here.cost[k] < here.cost[end]):
             end = k
         row = row_of(left, table.s)
-        after = with_room(after, n)
+        after, dropped = with_room_among(after, n, width)
+        smallest = min(smallest, dropped)
         for i in range(n):
             if (left >> i) & 1:
                 offer_only(inst, table, after, left, row, i, here.cost[k] + inst.from_bin[b, i], limit, 2 * k)
-    return here, after, expanded, end
+    return here, after, smallest, expanded, end
