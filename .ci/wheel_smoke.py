@@ -11,7 +11,9 @@ def main() -> None:
     root = models_root()
     if "site-packages" not in str(root) or "site-packages" not in str(mjsim.__file__):
         raise SystemExit(f"models come from {root}, not from the installed wheel")
-    paths = sorted([*root.glob("houses/*/house.xml"), *root.glob("receptacles/*.xml"), *root.glob("objects/*.xml")])
+    paths = sorted(
+        [*root.glob("houses/*/house.xml"), *root.glob("receptacles/*.xml"), *root.glob("objects/*.xml")]
+    )
     for path in paths:
         mujoco.MjModel.from_xml_path(str(path))
     if len(paths) < 31:

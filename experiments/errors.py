@@ -3,7 +3,8 @@
 ExperimentError
 ├── ConfigError     an option of a run or batch is unusable
 ├── SessionError    a session cannot go on
-└── RecordError     a run directory is missing, incomplete or in the way
+├── RecordError     a run directory is missing, incomplete or in the way
+└── ReplayError     a recorded run cannot be replayed, or does not go as recorded
 """
 
 
@@ -21,3 +22,15 @@ class SessionError(ExperimentError):
 
 class RecordError(ExperimentError):
     """A run directory is missing, incomplete or in the way."""
+
+
+class ReplayError(ExperimentError):
+    """A recorded run cannot be replayed, or does not go as recorded.
+
+    Attributes:
+        step: First bad control step, or None where no step can be named.
+    """
+
+    def __init__(self, message: str, step: int | None = None) -> None:
+        super().__init__(message)
+        self.step = step

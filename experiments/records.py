@@ -1,8 +1,11 @@
 """The record of one trial: an append-only event log, a trajectory, and the folder that holds them."""
 
+import hashlib
 import json
 import shutil
 import tempfile
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,15 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from mjsim.actions import Action, Move, Pick
+from mjsim.actions import Action, Move, Pick, Place
+from mjsim.errors import ActionError
 from mjsim.files import replacing, write_text_atomically
 from mjsim.observation import ObjectStatus, Observation
 
-LOG_FORMAT = 1
-EPISODE, EVENTS, TRAJECTORY, METRICS, PLAN, TOPDOWN, VIDEO = (
+LOG_FORMAT = 2  # 1 had neither state hashes nor checkpoints
+EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
     "events.jsonl",
     "trajectory.npz",
+    "recording.npz",
     "metrics.json",
     "plan.json",
     "topdown.png",
@@ -37,18 +42,30 @@ class EventLog:
 
     Args:
         path: File to create, or None to keep the events in memory only.
+
+    Attributes:
+        events: Everything logged so far.
+        size: Length of the file so far, bytes.
+        hash: First 64 bits of the SHA-1 of the file so far.
     """
 
     def __init__(self, path: Path | None = None) -> None:
         self._file: TextIO | None = path.open("x", encoding="utf-8") if path else None
         self.events: list[dict[str, Any]] = []
+        self.size = 0
+        self._digest = LogDigest()
+        self.hash = self._digest.hash
 
     def append(self, time: float, event: str, **fields: Any) -> None:
         """Log `event` at simulated `time` s, with JSON-ready fields."""
         line = {"t": round(time, 6), "event": event, **fields}
         self.events.append(line)
+        text = json.dumps(line) + "\n"
+        self.size += len(text)  # JSON is written as ASCII
+        self._digest.update(text.encode())
+        self.hash = self._digest.hash
         if self._file:
-            self._file.write(json.dumps(line) + "\n")
+            self._file.write(text)
             self._file.flush()
 
     def __enter__(self) -> "EventLog":
@@ -61,17 +78,35 @@ class EventLog:
             self._file.close()
 
 
+class LogDigest:
+    """A running hash of an event log."""
+
+    def __init__(self) -> None:
+        self._sha = hashlib.sha1(usedforsecurity=False)
+
+    def update(self, content: bytes) -> None:
+        """Take in what the log is longer by."""
+        self._sha.update(content)
+
+    @property
+    def hash(self) -> int:
+        """First 64 bits of the SHA-1 of everything so far."""
+        return int.from_bytes(self._sha.digest()[:8], "little")
+
+
 class Trajectory:
     """Poses and actions of every control step.
 
     Arrays (T steps, n objects): `time` (T,) s; `position` (T, 2) m; `heading`, `pitch` (T,) rad; `hands` (T, 2)
     object index or -1; `object_position` (T, n, 3) m; `object_quaternion` (T, n, 4) wxyz; `object_status` (T, n)
     0 loose, 1 carried, 2 delivered; `action` (T, 6): kind (0 move, 1 pick, 2 place), object index or -1, then
-    forward, left (m/s), turn, look (rad/s). Row t is the state before action t.
+    forward, left (m/s), turn, look (rad/s). Row t is the state before action t. An object index of n + i means the
+    i-th of `unknown_objects`: names that were asked for and that the house does not have.
     """
 
     def __init__(self, object_names: Sequence[str]) -> None:
         self._index = {name: i for i, name in enumerate(object_names)}
+        self._unknown: list[str] = []
         self._rows: list[tuple[Any, ...]] = []
 
     def append(self, observation: Observation, action: Action) -> None:
@@ -108,7 +143,10 @@ class Trajectory:
         )
         kinds: dict[str, type] = {"hands": np.int16, "object_status": np.int8}
         columns: list[Sequence[Any]] = list(zip(*self._rows, strict=True)) or [()] * len(names)
-        return {n: np.asarray(c, dtype=kinds.get(n, np.float64)) for n, c in zip(names, columns, strict=True)}
+        arrays: dict[str, NDArray[Any]] = {
+            n: np.asarray(c, dtype=kinds.get(n, np.float64)) for n, c in zip(names, columns, strict=True)
+        }
+        return {**arrays, "unknown_objects": np.array(self._unknown, dtype=np.str_)}
 
     def save(self, path: Path) -> None:
         """Write a compressed NPZ, whole or not at all."""
@@ -118,8 +156,45 @@ class Trajectory:
     def _encode(self, action: Action) -> list[float]:
         if isinstance(action, Move):
             return [0.0, -1.0, action.forward, action.left, action.turn, action.look]
-        index = -1 if action.object is None else self._index.get(action.object, -1)
-        return [1.0 if isinstance(action, Pick) else 2.0, float(index), 0.0, 0.0, 0.0, 0.0]
+        return [
+            1.0 if isinstance(action, Pick) else 2.0,
+            float(self._number(action.object)),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ]
+
+    def _number(self, name: str | None) -> int:
+        if name is None:
+            return -1
+        if name in self._index:
+            return self._index[name]
+        if name not in self._unknown:
+            self._unknown.append(name)
+        return len(self._index) + self._unknown.index(name)
+
+
+def decode_action(row: NDArray[np.float64], names: Sequence[str]) -> Action:
+    """The action of a row (6,) of a trajectory.
+
+    Args:
+        row: kind, object index, forward, left, turn, look.
+        names: Names of the objects, then the `unknown_objects`.
+
+    Raises:
+        RecordError: The row describes no action.
+    """
+    kind, number = float(row[0]), float(row[1])
+    if kind == 0.0:
+        try:
+            return Move(*(float(v) for v in row[2:]))
+        except ActionError as error:
+            raise RecordError(f"an action is unusable: {error}") from error
+    if kind not in (1.0, 2.0) or not number.is_integer() or not -1 <= number < len(names):
+        raise RecordError(f"{row.tolist()} describes no action of an episode with {len(names)} object names")
+    name = None if number < 0 else names[int(number)]
+    return Pick(name) if kind == 1.0 else Place(name)
 
 
 def is_run(directory: Path) -> bool:
@@ -149,6 +224,40 @@ def run_directory(path: Path) -> Iterator[Path]:
     finally:
         if working.exists():
             shutil.rmtree(working)
+
+
+def keep_failed(folder: Path, out: Path) -> Path:
+    """Keep the working folder of a run that failed, beside where the run was to be, as `<out>.failed`.
+
+    An earlier one is replaced; anything else of that name is left alone, and the folder gets a number.
+
+    Returns:
+        Where it is now.
+    """
+    kept, number = out.with_name(f"{out.name}.failed"), 1
+    while kept.exists() and not is_run(kept):
+        number += 1
+        kept = out.with_name(f"{out.name}.failed-{number}")
+    if kept.exists():
+        shutil.rmtree(kept)
+    folder.chmod(0o755)
+    folder.replace(kept)
+    return kept
+
+
+def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Read every array of an NPZ.
+
+    Raises:
+        RecordError: The file is missing, cut short or damaged; the message names it.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except FileNotFoundError as error:
+        raise RecordError(f"cannot read {path}: {error.strerror}") from error
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        raise RecordError(f"{path} is cut short or damaged: {error}") from error
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from experiments.assistant import Assistant
 from experiments.errors import SessionError
-from experiments.participants.base import Participant, Percept
+from experiments.participants.base import NEARBY, Participant, Percept
 from experiments.records import EventLog, Trajectory
 from hud.state import HudState
 from mjsim.actions import IDLE, ActionResult
@@ -170,8 +170,17 @@ class Session:
             flagpoles=self._flagpoles(observation),
             targets=self._targets,
             answer=answer,
+            nearby=self._nearby(observation),
             look=look,
         )
+
+    def _nearby(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
+        gaps = np.linalg.norm(observation.object_positions[:, :2] - observation.position, axis=1)
+        return {
+            observation.object_names[i]: observation.object_positions[i, :2]
+            for i in np.flatnonzero(gaps < NEARBY)
+            if observation.object_status[i] is ObjectStatus.LOOSE
+        }
 
     def _flagpoles(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
         if "flagpole" not in self._shown:

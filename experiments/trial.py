@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,11 @@ from experiments.glasses import FilmConfig, Filming, Glasses
 from experiments.house import House
 from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
+from experiments.recording import provenance
 from experiments.records import EventLog
 from experiments.session import Progress, Session, Viewer
 from experiments.video import VideoWriter
+from mjsim.errors import PhysicsError
 from mjsim.scene import Scene, compose
 from mjsim.world import World
 from planner.replanner import Replanner
@@ -92,44 +95,76 @@ def run_trial(
         What `metrics.json` holds.
 
     Raises:
-        ExperimentError, MjsimError, PlannerError, HudError: The configuration or the run directory is unusable, or the
-            physics failed.
+        ExperimentError, MjsimError, PlannerError, HudError: The configuration or the run directory is unusable.
+        PhysicsError: The physics failed. What led there is kept beside `out`, and the message says where.
     """
     started = time.perf_counter()
     house = house or House.load(config.house)
     episode = house.sample_episode(objects=config.objects, seed=config.seed)
     with records.run_directory(out) as folder:
         scene = compose(episode, house.catalogue)
-        with EventLog(folder / records.EVENTS) as log:
-            if film is None:
-                shown: dict[str, Any] = {"frames_sha256": None, "renderer": None}
-                session, world = prepare_session(config, house, scene, log)
-                reason = session.run(on_progress)
-            else:
-                with (
-                    Glasses(scene, house, film) as glasses,
-                    VideoWriter(folder / records.VIDEO, width=film.width, height=film.height) as video,
-                ):
-                    session, world = prepare_session(config, house, scene, log, Filming(glasses, video))
-                    reason = session.run(on_progress)
-                shown = {"frames_sha256": video.frames_sha256, "renderer": glasses.renderer_name}
-        arrays = session.trajectory.arrays()
+        ran = _simulate(config, house, scene, folder, film, on_progress)
+        arrays = ran.session.trajectory.arrays()
         episode.save(folder / records.EPISODE)
-        session.trajectory.save(folder / records.TRAJECTORY)
-        plans = [e for e in log.events if e["event"] == "plan"]
+        ran.session.trajectory.save(folder / records.TRAJECTORY)
+        ran.session.recording.save(folder / records.RECORDING, arrays["action"])
+        plans = [e for e in ran.log.events if e["event"] == "plan"]
         records.write_json(folder / records.PLAN, plans)
+        if isinstance(ran.ended, PhysicsError):
+            kept = records.keep_failed(folder, out)
+            raise PhysicsError(f"{ran.ended} (kept for `mjsim replay {kept}`)") from ran.ended
         if topdown:
             draw_topdown(folder / records.TOPDOWN, house, scene, plans[0], arrays)
         metrics = {
             **_settings(config),
-            "ended": reason,
-            **dataclasses.asdict(compute_metrics(log.events, arrays["position"])),
-            **_health(world, arrays),
-            **shown,
+            "ended": ran.ended,
+            **dataclasses.asdict(compute_metrics(ran.log.events, arrays["position"])),
+            **_health(ran.world, arrays),
+            **ran.shown,
             "wall_s": round(time.perf_counter() - started, 3),
         }
         records.write_json(folder / records.METRICS, metrics)
     return metrics
+
+
+@dataclass(frozen=True, eq=False)
+class _Ran:
+    """A session that is over: why it ended, or how the physics failed, and what the film was."""
+
+    session: Session
+    world: World
+    log: EventLog
+    ended: str | PhysicsError
+    shown: dict[str, Any]
+
+
+def _simulate(
+    config: TrialConfig,
+    house: House,
+    scene: Scene,
+    folder: Path,
+    film: FilmConfig | None,
+    on_progress: Callable[[Progress], None],
+) -> _Ran:
+    """Run the session of a trial; log and video are complete in `folder` afterwards."""
+    with ExitStack() as stack:
+        log = stack.enter_context(EventLog(folder / records.EVENTS))
+        glasses = video = viewer = None
+        if film is not None:
+            glasses = stack.enter_context(Glasses(scene, house, film))
+            target = folder / records.VIDEO
+            video = stack.enter_context(VideoWriter(target, width=film.width, height=film.height))
+            viewer = Filming(glasses, video)
+        session, world = prepare_session(config, house, scene, log, viewer)
+        try:
+            ended: str | PhysicsError = session.run(on_progress)
+        except PhysicsError as error:
+            ended = error
+    shown = {
+        "frames_sha256": video.frames_sha256 if video else None,
+        "renderer": glasses.renderer_name if glasses else None,
+    }
+    return _Ran(session, world, log, ended, shown)
 
 
 def prepare_session(
@@ -150,10 +185,12 @@ def prepare_session(
     )
     names = [o.name for o in episode.objects]
     order = [names[i] for i in order_rng.permutation(len(names))]
+    world = World(scene)
     log.append(
         0.0,
         "start",
         format=records.LOG_FORMAT,
+        **provenance(world),
         **_settings(config),
         episode_sha256=hashlib.sha256(episode.to_json().encode()).hexdigest(),
         order=order,
@@ -166,7 +203,6 @@ def prepare_session(
         order=order,
         log=log,
     )
-    world = World(scene)
     session = Session(
         world,
         assistant,

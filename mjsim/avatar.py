@@ -153,11 +153,12 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
         solimp=[0.98, 0.995, 0.001, 0.5, 2],
         **cylinder,
     )
-    # Soft, and lower than any carried object: light things are pushed along the floor, never launched.
+    # Soft, and lower than any carried object: light things are pushed along the floor, never launched. It reaches
+    # below the floor, so that it meets flat things with its side and never treads on them.
     body.add_geom(
         name=FOOT,
-        size=[TRUNK_RADIUS, 0.32, 0],
-        pos=[0, 0, 0.34],
+        size=[TRUNK_RADIUS, 0.48, 0],
+        pos=[0, 0, 0.18],
         conaffinity=OBJECT_BIT,
         condim=3,
         priority=1,

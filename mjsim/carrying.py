@@ -93,15 +93,21 @@ class Carrying:
                 continue
             for normal in self._obstacle_normals(item):
                 self._give_way(hand, normal)
-            load = self._loads[item]
-            forward, side, up = avatar.posture(hand, held_posture)
-            goals[hand] = np.array([forward, side, max(up, _LOWEST + load.height)])
-            goals[hand][:2] = self._yield[hand] + self._drawn_in(forward, side, load.radius)
+            goals[hand] = self.place_for(hand, item, held_posture)
+            goals[hand][:2] += self._yield[hand]
         if None not in person.held and person.moving_hand is None:
             self._raise_right(goals)
         for hand, goal in enumerate(goals):
             if hand != person.moving_hand:
                 person.move_hand(hand, goal)
+
+    def place_for(
+        self, hand: int, item: int, held_posture: tuple[float, float, float] = avatar.CARRY
+    ) -> NDArray[np.float64]:
+        """Where a hand best holds object `item` now, clear of the house: body frame, m, (3,)."""
+        load = self._loads[item]
+        forward, side, up = avatar.posture(hand, held_posture)
+        return np.array([*self._drawn_in(forward, side, load.radius), max(up, _LOWEST + load.height)])
 
     def _raise_right(self, goals: list[NDArray[np.float64]]) -> None:
         """Where two held things would meet, pass the right one over the left one."""

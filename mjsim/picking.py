@@ -1,9 +1,10 @@
 """Picking as a motion: stand, turn, reach, weld, lift into the carrying posture."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim import avatar
 from mjsim.person import Motion, Person, Steps, minimum_jerk
 
 _REACH_TIME = 0.44
@@ -14,8 +15,16 @@ _SHIFT = 0.2  # share of a movement by which one of its two parts leads the othe
 _CLOSE_ENOUGH = 0.012
 
 
-def pick(person: Person, hand: int, item: int) -> Motion:
+def pick(
+    person: Person, hand: int, item: int, place_for: Callable[[int, int], NDArray[np.float64]]
+) -> Motion:
     """Reach for object `item` and lift it.
+
+    Args:
+        person: Who picks.
+        hand: Hand that reaches.
+        item: Object.
+        place_for: Where a hand holds an object clear of the house, body frame, m, (3,).
 
     Returns:
         Whether the hand holds the object in the carrying posture. If not, the hand is open.
@@ -34,7 +43,7 @@ def pick(person: Person, hand: int, item: int) -> Motion:
     if grips.gap(hand, item, grip) > person.options.grip_distance:
         return False
     grips.close(hand, item, grip)
-    yield from _lift(person, hand, pitch)
+    yield from _lift(person, hand, place_for(hand, item), pitch)
     if grips.error(hand) > person.options.grip_error:
         grips.open(hand)
         return False
@@ -53,11 +62,10 @@ def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
         yield
 
 
-def _lift(person: Person, hand: int, pitch: float) -> Steps:
+def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) -> Steps:
     """Straight up first, so that nothing low is brushed, then back to the body."""
     rig = person.rig
     start = rig.hand_targets[hand].copy()
-    goal = np.array(avatar.posture(hand, avatar.CARRY))
     for _ in range(person.steps(_ALIGN_TIME)):
         yield
     count = person.steps(_LIFT_TIME)

@@ -9,7 +9,6 @@ while the world is not busy.
 
 import functools
 import hashlib
-import json
 import platform
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -41,7 +40,7 @@ _LOOKS = (
     "name_",
 )
 _LOOKS_ANYWHERE = ("rgba", "matid", "facetexcoord", "texcoord", "path", "names_map", "signature")
-_NO_PHYSICS = ("render", "authoring")  # folders of this package that no state depends on
+_NO_PHYSICS = ("render", "authoring", "environments")  # folders of this package that no state depends on
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,20 +49,17 @@ class WorldState:
 
     Attributes:
         physics: MuJoCo's integration state, shape (n,).
-        memory: What the world remembers beside the physics (commands, hands, statuses), JSON-ready.
+        memory: What the world remembers beside the physics (commands, hands, statuses), as JSON, in which numbers
+            keep their full precision.
     """
 
     physics: NDArray[np.float64]
-    memory: dict[str, Any]
+    memory: str
 
     @property
-    def memory_json(self) -> str:
-        """The memory as text; numbers keep their full precision."""
-        return json.dumps(self.memory)
-
-    def equals(self, other: "WorldState") -> bool:
-        """Whether two states agree to the last bit."""
-        return self.physics.tobytes() == other.physics.tobytes() and self.memory_json == other.memory_json
+    def hash(self) -> int:
+        """64 bits that differ whenever two states do (up to chance)."""
+        return hash64(self.physics.tobytes() + self.memory.encode())
 
 
 class StateHash:

@@ -1,5 +1,6 @@
 """The world: one person, one house, stepped at a fixed control rate with contact physics."""
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -144,7 +145,7 @@ class World:
             "hands": list(self._inventory.hands),
             "status": [status.value for status in self._status],
         }
-        return WorldState(take_physics(self.model, self.data), memory)
+        return WorldState(take_physics(self.model, self.data), json.dumps(memory))
 
     def restore(self, state: WorldState) -> Observation:
         """Go on from a state, of this world or of another one of the same scene and options.
@@ -155,11 +156,12 @@ class World:
         Raises:
             StateError: The state does not fit the scene.
         """
-        person, memory = self._person, state.memory
+        person = self._person
         set_physics(self.model, self.data, state.physics)
         self._end_motion()
         self._events = []
         try:
+            memory = json.loads(state.memory)
             person.monitor = HealthMonitor(**memory["health"])
             person.rig.recall(memory["rig"])
             person.grips.recall(memory["grips"])
@@ -231,7 +233,7 @@ class World:
         person = self._person
         if isinstance(action, Pick):
             hand = self._hand_for(item)
-            return _Motion(pick(person, hand, item), action, hand, item, result.receptacle)
+            return _Motion(pick(person, hand, item, self._carrying.place_for), action, hand, item, result.receptacle)
         hand = person.held.index(item)
         receptacle = self.scene.receptacles[str(result.receptacle)]
         return _Motion(place(person, hand, item, receptacle), action, hand, item, receptacle.key)

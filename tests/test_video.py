@@ -11,7 +11,10 @@ from experiments.video import VideoWriter
 def frames(count=30):
     rng = np.random.default_rng(0)
     base = rng.integers(0, 255, (12, 16, 3), np.uint8)
-    return [np.ascontiguousarray(np.kron(np.roll(base, k, axis=1), np.ones((10, 10, 1), np.uint8))) for k in range(count)]
+    return [
+        np.ascontiguousarray(np.kron(np.roll(base, k, axis=1), np.ones((10, 10, 1), np.uint8)))
+        for k in range(count)
+    ]
 
 
 def write(path, images):

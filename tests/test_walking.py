@@ -11,6 +11,7 @@ from experiments.participants.walking import (
     path_length,
     point_along,
     project,
+    sidestep,
     turn_towards,
     wrap_angle,
 )
@@ -57,7 +58,9 @@ def test_a_point_mass_arrives_and_stays_near_the_path(path):
     for _ in range(1000):
         move = follow(path, position, heading)
         c, s = np.cos(heading), np.sin(heading)
-        position = position + CONTROL_TIMESTEP * np.array([c * move.forward - s * move.left, s * move.forward + c * move.left])
+        position = position + CONTROL_TIMESTEP * np.array(
+            [c * move.forward - s * move.left, s * move.forward + c * move.left]
+        )
         heading += CONTROL_TIMESTEP * move.turn
         strayed = max(strayed, project(path, position)[1])
         if np.linalg.norm(position - path[-1]) < 0.05:
@@ -65,3 +68,36 @@ def test_a_point_mass_arrives_and_stays_near_the_path(path):
     else:
         pytest.fail(f"never arrived, stopped at {position}")
     assert strayed < 0.13
+
+
+def anywhere(_point):
+    return True
+
+
+@pytest.mark.parametrize("across", [-0.3, -0.05, 0.0, 0.1, 0.35])
+def test_things_on_the_way_are_walked_around(across):
+    path, thing = np.array([[0.0, 0.0], [4.0, 0.0]]), np.array([2.0, across])
+    position, heading, nearest = np.zeros(2), 0.0, np.inf
+    for _ in range(400):
+        move = follow(path, position, heading, around=lambda t, p=position: sidestep(p, t, [thing], anywhere))
+        c, s = np.cos(heading), np.sin(heading)
+        position = position + CONTROL_TIMESTEP * np.array(
+            [c * move.forward - s * move.left, s * move.forward + c * move.left]
+        )
+        heading += CONTROL_TIMESTEP * move.turn
+        nearest = min(nearest, float(np.linalg.norm(position - thing)))
+    assert nearest > 0.3
+    assert np.linalg.norm(position - path[-1]) < 0.1
+
+
+def test_a_thing_is_passed_on_its_free_side():
+    thing, target = np.array([0.5, 0.1]), np.array([0.25, 0.0])
+    assert sidestep(np.zeros(2), target, [thing], anywhere)[1] < 0
+    assert sidestep(np.zeros(2), target, [thing], lambda p: p[1] > 0)[1] > 0
+    assert sidestep(np.zeros(2), target, [thing], lambda _: False).tolist() == target.tolist()
+
+
+@pytest.mark.parametrize("thing", [(-0.3, 0.0), (1.5, 0.0), (0.4, 0.6)])
+def test_what_is_not_in_the_way_bends_nothing(thing):
+    target = np.array([0.25, 0.0])
+    assert sidestep(np.zeros(2), target, [np.array(thing)], anywhere).tolist() == target.tolist()

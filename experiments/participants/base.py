@@ -13,6 +13,8 @@ from mjsim.actions import Action, ActionResult
 
 Point = NDArray[np.float64]
 
+NEARBY = 1.3  # m
+
 
 @dataclass(frozen=True)
 class Guidance:
@@ -46,6 +48,7 @@ class Percept:
         flagpoles: Object instance name -> floor position of the flagpole over it, m; empty in conditions without.
         targets: Object instance name -> receptacle key, from the lists in the HUD.
         answer: The world's answer to the previous action, if that was a pick or place.
+        nearby: Misplaced objects within `NEARBY` -> floor position, m: nobody has to look to know what is at the feet.
         look: Misplaced objects in view at this moment -> their floor position, m; computed only when asked.
     """
 
@@ -59,6 +62,7 @@ class Percept:
     flagpoles: Mapping[str, Point]
     targets: Mapping[str, str]
     answer: ActionResult | None
+    nearby: Mapping[str, Point]
     look: Callable[[], Mapping[str, Point]]
 
     @property

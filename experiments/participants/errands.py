@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse
 from experiments.participants.base import Percept, Point
-from experiments.participants.walking import follow, path_length, project, turn_towards
+from experiments.participants.walking import follow, path_length, project, sidestep, turn_towards
 from mjsim.actions import IDLE, Action, Move, Pick, Place
 from planner.errors import PlannerError
 
@@ -111,7 +111,14 @@ class ErrandRunner:
         elif percept.time - self._least_left_time > STUCK_AFTER:
             self._path, self._back_off_until = None, percept.time + BACK_OFF
             self._least_left, self._least_left_time = np.inf, self._back_off_until
-        return follow(way, percept.position, percept.heading)
+        things = [
+            xy for name, xy in percept.nearby.items() if self._errand is None or name != self._errand[1]
+        ]
+
+        def around(target: Point) -> Point:
+            return sidestep(percept.position, target, things, self._house.navmesh.is_navigable)
+
+        return follow(way, percept.position, percept.heading, around=around)
 
     def _begin(self, time: float, errand: Errand) -> None:
         self._errand, self._path, self._stop = errand.key, None, STOP_DISTANCE

@@ -1,5 +1,7 @@
 """Following a polyline on the floor the way a person walks: look ahead, slow down for sharp turns."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,8 @@ from mjsim.actions import Move
 CONTROL_TIMESTEP = 0.04  # s
 CRUISE_SPEED = 1.3  # m/s, an unhurried indoor pace
 LOOK_AHEAD = 0.25  # m; longer cuts corners into the walls, shorter wobbles
+STEP_AROUND_FROM = 0.8  # m ahead
+CLEAR_OF_FEET = 0.40  # m from the body's axis: its radius and half an object
 BRAKING = 1.5  # m/s^2 planned for, half of what the body can do
 TURN_GAIN = 5.0  # 1/s
 MAX_TURN = 2.5  # rad/s
@@ -51,12 +55,54 @@ def turn_towards(
     return float(np.clip(TURN_GAIN * error, -MAX_TURN, MAX_TURN)), error
 
 
+def sidestep(
+    position: NDArray[np.float64],
+    target: NDArray[np.float64],
+    things: Sequence[NDArray[np.float64]],
+    is_free: Callable[[NDArray[np.float64]], bool],
+) -> NDArray[np.float64]:
+    """Where to walk instead of straight to `target` so that things on the floor stay beside the feet, m, (2,).
+
+    Passes the nearest thing ahead on the side it is not on; on the other side if that is blocked; and straight on,
+    over it, if both are.
+
+    Args:
+        position: Where the person is, m, shape (2,).
+        target: Where the person is heading for, m, shape (2,).
+        things: Floor positions of what lies about, m, each (2,).
+        is_free: Whether a person can stand at a point.
+    """
+    offset = target - position
+    distance = float(np.linalg.norm(offset))
+    if distance < 1e-9:
+        return target
+    ahead = offset / distance
+    left = np.array([-ahead[1], ahead[0]])
+    in_the_way = [
+        (along, across)
+        for along, across in ((float(r @ ahead), float(r @ left)) for r in (t - position for t in things))
+        if 0.0 < along < STEP_AROUND_FROM and abs(across) < CLEAR_OF_FEET
+    ]
+    if not in_the_way:
+        return target
+    along, across = min(in_the_way)
+    side = -1.0 if across >= 0 else 1.0
+    for sign in (side, -side):
+        beside = position + along * ahead + (across + sign * CLEAR_OF_FEET) * left
+        step = beside - position
+        aside = position + step * (distance / float(np.linalg.norm(step)))
+        if is_free(beside) and is_free(aside):
+            return aside
+    return target
+
+
 def follow(
     path: NDArray[np.float64],
     position: NDArray[np.float64],
     heading: float,
     *,
     speed: float = CRUISE_SPEED,
+    around: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda target: target,
 ) -> Move:
     """One control step along `path`, stopping at its end.
 
@@ -68,10 +114,11 @@ def follow(
         position: Where the person is, m, shape (2,).
         heading: Where the person faces, rad.
         speed: Pace on a straight, m/s.
+        around: Bends the look-ahead point away from things on the floor.
     """
     arc, gap = project(path, position)
     left = max(path_length(path) - arc, 0.0) + gap
-    target = point_along(path, arc + LOOK_AHEAD)
+    target = around(point_along(path, arc + LOOK_AHEAD))
     turn, error = turn_towards(heading, position, target)
     pace = min(speed, float(np.sqrt(2 * BRAKING * left))) * max(float(np.cos(error)), 0.0) ** 2
     return Move(forward=pace * float(np.cos(error)), left=pace * float(np.sin(error)), turn=turn)

@@ -1,0 +1,117 @@
+"""Looking on from outside: a run seen from above or from around the house, with the person and the guidance drawn."""
+
+import math
+from collections.abc import Callable
+from types import TracebackType
+
+import numpy as np
+
+from experiments.assistant import Assistant
+from experiments.glasses import FilmConfig
+from experiments.video import VideoWriter
+from hud.state import Marker, Rgba, Vec3
+from mjsim.avatar import EYE_HEIGHT, TRUNK_RADIUS
+from mjsim.observation import Observation
+from mjsim.render import CameraPose, Renderer
+from mjsim.render.stage import TOP_DOWN_GROUPS
+from mjsim.scene import Scene
+from mjsim.world import World
+
+FIRST_PERSON, TOP_DOWN, FREE = "first-person", "top-down", "free"
+CAMERAS = (FIRST_PERSON, TOP_DOWN, FREE)
+
+# Simulated time, s -> where the camera is.
+CameraPath = Callable[[float], CameraPose]
+Bounds = tuple[float, float, float, float]
+
+_TELE = math.radians(20.0)  # from far away, so that walls hide little of the floor
+_WIDE = math.radians(50.0)
+_MARGIN = 1.04
+_LAP = 90.0  # s for once around the house
+_ELEVATION = math.radians(52.0)
+_COAT: Rgba = (0.24, 0.34, 0.47, 1.0)
+_SKIN: Rgba = (0.93, 0.74, 0.22, 1.0)
+
+
+def camera_path(
+    camera: str, bounds: Bounds, aspect: float, eye: Vec3 | None = None, target: Vec3 | None = None
+) -> CameraPath:
+    """Where a camera other than the person's eye is over time.
+
+    Args:
+        camera: `top-down`, or `free`.
+        bounds: The floor: x_min, y_min, x_max, y_max, m.
+        aspect: Width of the frames over their height.
+        eye: Where a free camera stands, m; None for one that circles the house.
+        target: What a free camera looks at, m; None for the middle of the floor.
+    """
+    x_min, y_min, x_max, y_max = bounds
+    middle = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0])
+    width, depth = x_max - x_min, y_max - y_min
+    if camera == TOP_DOWN:
+        height = 0.5 * _MARGIN * max(depth, width / aspect) / math.tan(_TELE / 2)
+        pose = CameraPose.looking_at(middle + np.array([0.0, 0.0, height]), middle, _TELE)
+        return lambda _: pose
+    aim = middle if target is None else np.array(target)
+    if eye is not None:
+        fixed = CameraPose.looking_at(eye, aim, _WIDE)
+        return lambda _: fixed
+    distance = 0.62 * math.hypot(width, depth) / math.tan(_WIDE / 2) * max(1.0, 4.0 / 3.0 / aspect)
+
+    def circle(time: float) -> CameraPose:
+        angle = 2.0 * math.pi * time / _LAP - math.pi / 2
+        out = math.cos(_ELEVATION)
+        offset = np.array([out * math.cos(angle), out * math.sin(angle), math.sin(_ELEVATION)])
+        return CameraPose.looking_at(aim + distance * offset, aim, _WIDE)
+
+    return circle
+
+
+class Overview:
+    """A viewer of a session that films it from outside, without ceilings. Use as a context manager.
+
+    Args:
+        scene: The scene to render.
+        film: Frame size and render profile.
+        camera: Where to look on from.
+        video: Takes the frames.
+
+    Raises:
+        RenderError: No off-screen GL context could be made, or the size or profile is unusable.
+    """
+
+    def __init__(self, scene: Scene, film: FilmConfig, camera: CameraPath, video: VideoWriter) -> None:
+        self._renderer = Renderer(
+            scene.model, width=film.width, height=film.height, profile=film.profile, groups=TOP_DOWN_GROUPS
+        )
+        self._camera = camera
+        self._video = video
+
+    def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
+        """Film one frame: house, person, and what the glasses lock to the world."""
+        markers = [*assistant.hud_state(observation).markers, *figure(observation)]
+        self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
+
+    def close(self) -> None:
+        """Free the GL context."""
+        self._renderer.close()
+
+    def __enter__(self) -> "Overview":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def figure(observation: Observation) -> tuple[Marker, ...]:
+    """The person: body, head, and a nose that shows the heading."""
+    x, y = (float(v) for v in observation.position)
+    c, s = math.cos(observation.heading), math.sin(observation.heading)
+    body = EYE_HEIGHT - 0.25
+    return (
+        Marker("cylinder", (x, y, body / 2), (TRUNK_RADIUS, body / 2, 0.0), _COAT, "person"),
+        Marker("sphere", (x, y, EYE_HEIGHT), (0.14, 0.0, 0.0), _SKIN, "person"),
+        Marker("sphere", (x + 0.15 * c, y + 0.15 * s, EYE_HEIGHT), (0.06, 0.0, 0.0), _COAT, "person"),
+    )

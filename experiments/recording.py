@@ -1,0 +1,153 @@
+"""What a replay is verified against: state hashes of every control step, log hashes, and checkpoints to go on from."""
+
+import dataclasses
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import RecordError
+from experiments.records import EventLog, read_arrays
+from mjsim.files import replacing
+from mjsim.observation import Observation
+from mjsim.recording import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint
+from mjsim.world import World
+
+
+class Recording:
+    """Accompanies a session: hashes each control step, and takes the world through checkpoints.
+
+    A live run passes a checkpoint at the first control step at which the world is not busy, `CHECKPOINT_PERIOD` or
+    more after the last one. A replay passes them where the run did.
+
+    Args:
+        world: The physics.
+        log: The session's log.
+        checkpoints: Steps at which to pass a checkpoint, or None to decide as a live run does.
+        first: Control steps that have passed already.
+    """
+
+    def __init__(
+        self, world: World, log: EventLog, *, checkpoints: Collection[int] | None = None, first: int = 0
+    ) -> None:
+        self._world, self._log = world, log
+        self._steps_given = None if checkpoints is None else frozenset(checkpoints)
+        self._period = max(1, round(CHECKPOINT_PERIOD / world.control_timestep))
+        self._first, self._last = first, first
+        self._state_hash: list[int] = []
+        self._log_size: list[int] = []
+        self._log_hash: list[int] = []
+        self.checkpoints: dict[int, WorldState] = {}
+
+    @property
+    def step(self) -> int:
+        """Number of the next control step."""
+        return self._first + len(self._state_hash)
+
+    def pass_checkpoint(self, observation: Observation) -> Observation:
+        """Take the world's state and set the world to it, if that is due; the state as seen from then on."""
+        if not self._due(observation.busy):
+            return observation
+        state = self._world.state()
+        self._last = self.step
+        self.checkpoints[self.step] = state
+        return self._world.restore(state)
+
+    def append(self) -> None:
+        """Record the state before the next action."""
+        self._log_size.append(self._log.size)
+        self._log_hash.append(self._log.hash)
+        self._state_hash.append(self._world.state_hash())
+
+    def save(self, path: Path, actions: NDArray[np.float64]) -> None:
+        """Write a compressed NPZ, whole or not at all.
+
+        Args:
+            path: File to write.
+            actions: The trajectory's, shape (T, 6).
+        """
+        count = len(actions)  # an interruption can fall between recording a step and its action
+        kept = {step: state for step, state in self.checkpoints.items() if step < count}
+        states = [state.physics for state in kept.values()]
+        arrays = {
+            "state_hash": np.array(self._state_hash[:count], np.uint64),
+            "action_hash": action_hashes(actions),
+            "log_size": np.array([*self._log_size[:count], self._log.size], np.int64),
+            "log_hash": np.array([*self._log_hash[:count], self._log.hash], np.uint64),
+            "checkpoint_step": np.array(list(kept), np.int64),
+            "checkpoint_physics": np.array(states) if states else np.zeros((0, 0)),
+            "checkpoint_memory": np.array([state.memory for state in kept.values()], np.str_),
+            "checkpoint_hash": np.array([state.hash for state in kept.values()], np.uint64),
+        }
+        with replacing(path) as temporary:
+            np.savez_compressed(temporary, allow_pickle=False, **arrays)
+
+    def state_hashes(self) -> NDArray[np.uint64]:
+        """Hashes of the states since `first`, in order."""
+        return np.array(self._state_hash, np.uint64)
+
+    def _due(self, busy: bool) -> bool:
+        if self._steps_given is not None:
+            return self.step in self._steps_given
+        return not busy and self.step - self._last >= self._period
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A recording, read back.
+
+    Attributes:
+        state_hash: Hash of the state before each action, shape (T,).
+        action_hash: Hash of each action, shape (T,).
+        log_size: Length of the event log before each action and at the end, bytes, shape (T + 1,).
+        log_hash: Hash of that much of the log, shape (T + 1,).
+        checkpoint_step: Control steps that have a checkpoint, ascending, shape (K,).
+        checkpoint_physics: Their states, shape (K, n).
+        checkpoint_memory: What the world remembered beside the physics, JSON, shape (K,).
+        checkpoint_hash: Hash of each checkpoint, shape (K,).
+    """
+
+    state_hash: NDArray[np.uint64]
+    action_hash: NDArray[np.uint64]
+    log_size: NDArray[np.int64]
+    log_hash: NDArray[np.uint64]
+    checkpoint_step: NDArray[np.int64]
+    checkpoint_physics: NDArray[np.float64]
+    checkpoint_memory: NDArray[np.str_]
+    checkpoint_hash: NDArray[np.uint64]
+
+    @classmethod
+    def load(cls, path: Path) -> "Recorded":
+        """Read a recording.
+
+        Raises:
+            RecordError: It is missing, damaged or incomplete; the message names the file.
+        """
+        arrays = read_arrays(path)
+        names = [field.name for field in dataclasses.fields(cls)]
+        dimensions = {name: 2 if name == "checkpoint_physics" else 1 for name in names}
+        bad = sorted(n for n, d in dimensions.items() if n not in arrays or arrays[n].ndim != d)
+        if bad:
+            raise RecordError(f"{path} lacks {', '.join(bad)}, or has them in another shape")
+        return cls(**{name: arrays[name] for name in names})
+
+    def checkpoint(self, number: int) -> WorldState:
+        """The `number`-th checkpoint."""
+        return WorldState(self.checkpoint_physics[number], str(self.checkpoint_memory[number]))
+
+
+def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """64 bits for each row of actions (T, 6), shape (T,)."""
+    return np.array([hash64(np.ascontiguousarray(row).data) for row in actions], np.uint64)
+
+
+def provenance(world: World) -> dict[str, Any]:
+    """What a run depends on beside its configuration: versions, the compiled model, the rules. JSON-ready."""
+    return {
+        "versions": engine_versions(),
+        "model": model_fingerprint(world.model),
+        "world": dataclasses.asdict(world.options),
+    }
