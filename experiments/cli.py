@@ -4,7 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from experiments.commands import batch, doctor, gallery, house, run
+from experiments.commands import batch, doctor, gallery, house, replay, run
 from experiments.errors import ExperimentError
 from hud.errors import HudError
 from mjsim.errors import MjsimError
@@ -40,7 +40,7 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (run, batch, house, gallery, doctor):
+    for module in (run, replay, batch, house, gallery, doctor):
         module.add_parser(commands)
     return top
 
