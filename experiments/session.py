@@ -10,13 +10,21 @@ from numpy.typing import NDArray
 from experiments.assistant import Assistant
 from experiments.errors import SessionError
 from experiments.participants.base import NEARBY, Participant, Percept
+from experiments.recording import Recording
 from experiments.records import EventLog, Trajectory
 from hud.state import HudState
-from mjsim.actions import IDLE, ActionResult
+from mjsim.actions import IDLE, Action, ActionResult
+from mjsim.errors import PhysicsError
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.visibility import visible_objects
 from mjsim.world import StepResult, World
 
+ALL_DELIVERED, TIME_LIMIT, INTERRUPTED, PHYSICS_ERROR = (
+    "all delivered",
+    "time limit",
+    "interrupted",
+    "physics error",
+)
 AFTERGLOW = 1.6  # s the session goes on after the last delivery, so that the person sees that all is done
 
 
@@ -48,6 +56,11 @@ class Session:
         targets: Object instance name -> receptacle key.
         time_limit: Simulated time after which the session ends, s.
         viewer: Sees every control step, or None.
+        recording: Hashes every control step; None for one that decides on checkpoints by itself.
+
+    Attributes:
+        trajectory: Poses and actions so far.
+        recording: Hashes and checkpoints so far.
     """
 
     def __init__(
@@ -60,6 +73,7 @@ class Session:
         targets: Mapping[str, str],
         time_limit: float,
         viewer: Viewer | None = None,
+        recording: Recording | None = None,
     ) -> None:
         self._world = world
         self._assistant = assistant
@@ -69,16 +83,25 @@ class Session:
         self._time_limit = time_limit
         self._viewer = viewer
         self._shown: frozenset[str] = frozenset()
+        self._recorded_until = 0.0
         self.trajectory = Trajectory(world.scene.index.names)
+        self.recording = recording or Recording(world, log)
 
     def run(self, on_progress: Callable[[Progress], None] = lambda _: None) -> str:
-        """Run to the end; returns why it ended: `all delivered`, `time limit` or `interrupted`.
+        """Run from the start to the end; returns why it ended: `all delivered`, `time limit` or `interrupted`.
 
         Raises:
             SessionError: The participant needs guidance that the assistance condition does not show.
+            PhysicsError: The physics failed; the log says when.
         """
         observation = self._world.reset()
         self._assistant.begin(observation)
+        return self.resume(observation, on_progress)
+
+    def resume(
+        self, observation: Observation, on_progress: Callable[[Progress], None] = lambda _: None
+    ) -> str:
+        """Run to the end from where the world and the assistant are now; returns and raises as `run` does."""
         self._shown = frozenset(m.role for m in self._assistant.hud_state(observation).markers)
         if not self._participant.needs <= self._shown:
             raise SessionError(
@@ -89,7 +112,10 @@ class Session:
             observation, reason = self._until_done(observation, on_progress)
         except KeyboardInterrupt:
             # What has been done so far is kept and measured, as it would be for a person who stops early.
-            observation, reason = self._world.observation(), "interrupted"
+            observation, reason = self._world.observation(), INTERRUPTED
+        except PhysicsError as error:
+            self._log.append(self._recorded_until, "end", reason=PHYSICS_ERROR, error=str(error))
+            raise
         self._log.append(observation.time, "end", reason=reason)
         return reason
 
@@ -99,9 +125,10 @@ class Session:
         answer: ActionResult | None = None
         total = len(observation.object_names)
         while observation.time < self._time_limit - 1e-9:
+            observation = self.recording.pass_checkpoint(observation)
             self._film(observation)
             action = self._participant.act(self._percept(observation, answer))
-            self.trajectory.append(observation, action)
+            self._record(observation, action)
             step = self._world.step(action)
             observation, answer = step.observation, step.result
             self._take_note(step)
@@ -109,11 +136,16 @@ class Session:
             on_progress(Progress(observation.time, delivered, total))
             if delivered == total:
                 self._assistant.say("finished", observation.time)
-                self.trajectory.append(observation, IDLE)
+                self._record(observation, IDLE)
                 self._glow(observation)
-                return observation, "all delivered"
-        self.trajectory.append(observation, IDLE)
-        return observation, "time limit"
+                return observation, ALL_DELIVERED
+        self._record(observation, IDLE)
+        return observation, TIME_LIMIT
+
+    def _record(self, observation: Observation, action: Action) -> None:
+        self._recorded_until = observation.time
+        self.recording.append()
+        self.trajectory.append(observation, action)
 
     def _glow(self, observation: Observation) -> None:
         """Let the viewer see the end for a moment; nothing of it is measured."""
