@@ -79,7 +79,9 @@ def test_things_on_the_way_are_walked_around(across):
     path, thing = np.array([[0.0, 0.0], [4.0, 0.0]]), np.array([2.0, across])
     position, heading, nearest = np.zeros(2), 0.0, np.inf
     for _ in range(400):
-        move = follow(path, position, heading, around=lambda t, p=position: sidestep(p, t, [thing], anywhere))
+        move = follow(
+            path, position, heading, around=lambda t, b, p=position: sidestep(p, t, b, [thing], anywhere)
+        )
         c, s = np.cos(heading), np.sin(heading)
         position = position + CONTROL_TIMESTEP * np.array(
             [c * move.forward - s * move.left, s * move.forward + c * move.left]
@@ -92,12 +94,12 @@ def test_things_on_the_way_are_walked_around(across):
 
 def test_a_thing_is_passed_on_its_free_side():
     thing, target = np.array([0.5, 0.1]), np.array([0.25, 0.0])
-    assert sidestep(np.zeros(2), target, [thing], anywhere)[1] < 0
-    assert sidestep(np.zeros(2), target, [thing], lambda p: p[1] > 0)[1] > 0
-    assert sidestep(np.zeros(2), target, [thing], lambda _: False).tolist() == target.tolist()
+    assert sidestep(np.zeros(2), target, 4 * target, [thing], anywhere)[1] < 0
+    assert sidestep(np.zeros(2), target, 4 * target, [thing], lambda p: p[1] > 0)[1] > 0
+    assert sidestep(np.zeros(2), target, 4 * target, [thing], lambda _: False).tolist() == target.tolist()
 
 
 @pytest.mark.parametrize("thing", [(-0.3, 0.0), (1.5, 0.0), (0.4, 0.6)])
 def test_what_is_not_in_the_way_bends_nothing(thing):
     target = np.array([0.25, 0.0])
-    assert sidestep(np.zeros(2), target, [np.array(thing)], anywhere).tolist() == target.tolist()
+    assert sidestep(np.zeros(2), target, 4 * target, [np.array(thing)], anywhere).tolist() == target.tolist()

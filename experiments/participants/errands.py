@@ -115,8 +115,8 @@ class ErrandRunner:
             xy for name, xy in percept.nearby.items() if self._errand is None or name != self._errand[1]
         ]
 
-        def around(target: Point) -> Point:
-            return sidestep(percept.position, target, things, self._house.navmesh.is_navigable)
+        def around(target: Point, beyond: Point) -> Point:
+            return sidestep(percept.position, target, beyond, things, self._house.navmesh.is_navigable)
 
         return follow(way, percept.position, percept.heading, around=around)
 

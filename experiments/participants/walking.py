@@ -10,6 +10,7 @@ from mjsim.actions import Move
 CONTROL_TIMESTEP = 0.04  # s
 CRUISE_SPEED = 1.3  # m/s, an unhurried indoor pace
 LOOK_AHEAD = 0.25  # m; longer cuts corners into the walls, shorter wobbles
+LOOK_BEYOND = 1.2  # m; farther than `STEP_AROUND_FROM`
 STEP_AROUND_FROM = 0.8  # m ahead
 CLEAR_OF_FEET = 0.40  # m from the body's axis: its radius and half an object
 BRAKING = 1.5  # m/s^2 planned for, half of what the body can do
@@ -58,6 +59,7 @@ def turn_towards(
 def sidestep(
     position: NDArray[np.float64],
     target: NDArray[np.float64],
+    beyond: NDArray[np.float64],
     things: Sequence[NDArray[np.float64]],
     is_free: Callable[[NDArray[np.float64]], bool],
 ) -> NDArray[np.float64]:
@@ -69,14 +71,15 @@ def sidestep(
     Args:
         position: Where the person is, m, shape (2,).
         target: Where the person is heading for, m, shape (2,).
+        beyond: Farther along the way, m, shape (2,): it decides what is in the way and on which side, and keeps the
+            person on that side, because it lies behind the thing.
         things: Floor positions of what lies about, m, each (2,).
         is_free: Whether a person can stand at a point.
     """
-    offset = target - position
-    distance = float(np.linalg.norm(offset))
-    if distance < 1e-9:
+    distance, reach = float(np.linalg.norm(target - position)), float(np.linalg.norm(beyond - position))
+    if reach < 1e-9:
         return target
-    ahead = offset / distance
+    ahead = (beyond - position) / reach
     left = np.array([-ahead[1], ahead[0]])
     in_the_way = [
         (along, across)
@@ -102,7 +105,9 @@ def follow(
     heading: float,
     *,
     speed: float = CRUISE_SPEED,
-    around: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda target: target,
+    around: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]] = lambda target, _: (
+        target
+    ),
 ) -> Move:
     """One control step along `path`, stopping at its end.
 
@@ -114,11 +119,11 @@ def follow(
         position: Where the person is, m, shape (2,).
         heading: Where the person faces, rad.
         speed: Pace on a straight, m/s.
-        around: Bends the look-ahead point away from things on the floor.
+        around: Given the look-ahead point and one farther along, says where to walk; see `sidestep`.
     """
     arc, gap = project(path, position)
     left = max(path_length(path) - arc, 0.0) + gap
-    target = around(point_along(path, arc + LOOK_AHEAD))
+    target = around(point_along(path, arc + LOOK_AHEAD), point_along(path, arc + LOOK_BEYOND))
     turn, error = turn_towards(heading, position, target)
     pace = min(speed, float(np.sqrt(2 * BRAKING * left))) * max(float(np.cos(error)), 0.0) ** 2
     return Move(forward=pace * float(np.cos(error)), left=pace * float(np.sin(error)), turn=turn)
