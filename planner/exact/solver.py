@@ -39,7 +39,13 @@ class ExactSolver:
 
     name: str = "exact"
     table_bytes: int = 1 << 26  # 18 objects and 6 bins: 0.2 s
-    passes: tuple[tuple[int, int], ...] = ((6, 1_000), (10, 10_000), (12, 100_000), (13, 500_000))
+    passes: tuple[tuple[int, int], ...] = (
+        (2, 3_000),
+        (6, 6_000),
+        (8, 30_000),
+        (11, 150_000),
+        (13, 500_000),
+    )
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
         """Plan the rest of a task.
@@ -79,10 +85,10 @@ class ExactSolver:
         bound = first_bound(instance, upper)
         lower = bound.root
         done = 0
-        for size, width in self.passes:
-            # A pass expands about n / 2 times its width; one that is no wider than the last proves nothing new.
-            width = min(width, work // max(1, len(instance.home) // 2))
-            if lower >= upper or width <= done or deadline.over():
+        for size, wanted in self.passes:
+            # A pass expands about n / 2 times its width. Cut below the last one's, it would hardly help.
+            width = min(wanted, work // max(1, len(instance.home) // 2))
+            if lower >= upper or width < min(wanted, done + 1) or deadline.over():
                 break
             bound = grown(bound, upper, size, deadline)
             result = beam_pass(bound, upper, width, work, deadline)
