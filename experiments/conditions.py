@@ -69,6 +69,8 @@ class TaskBoard:
             message=self._message(observation.time),
             clock=observation.time,
             camera=camera,
+            heading=observation.heading,
+            bounds=self._house.bounds,
         )
 
     def _message(self, time: float) -> Message | None:

@@ -143,6 +143,13 @@ class Canvas:
         self._colour[area] += scaled[..., :3] * np.float32(255.0 * opacity) - self._colour[area] * share
         self._alpha[area] += (1.0 - self._alpha[area]) * share
 
+    def image(self, colours: NDArray[np.float32], opacity: NDArray[np.float32], x: int, y: int) -> None:
+        """An image (h, w, 3), 0..255, with an opacity (h, w), 0..1, per pixel; it must lie inside."""
+        area = np.s_[y : y + colours.shape[0], x : x + colours.shape[1]]
+        share = opacity[..., None]
+        self._colour[area] += (colours - self._colour[area]) * share
+        self._alpha[area] += (1.0 - self._alpha[area]) * share
+
     def circle(self, x: float, y: float, radius: float, colour: Rgb, opacity: float = 1.0) -> None:
         """A smooth-edged disc; centre and radius in px of the frame."""
         left, top, side = math.floor(x - radius) - 1, math.floor(y - radius) - 1, math.ceil(2 * radius) + 3

@@ -11,8 +11,10 @@ from hud import panels
 from hud.canvas import Patch, Rect
 from hud.errors import FrameError
 from hud.layout import Layout, arrange, pointer_rect
+from hud.minimap import draw_minimap
+from hud.options.minimap import FLOORPLAN
 from hud.panels import Pen, Pictures
-from hud.state import HudState
+from hud.state import HudState, MiniMap
 from hud.text import Typeface
 
 POINTER_STEPS = 72  # drawn directions of the pointer, 5 degrees apart
@@ -24,7 +26,8 @@ class Compositor:
     The result depends on the arguments alone; the memory (one entry per panel) only saves time.
 
     Args:
-        pictures: RGBA pictures, uint8 (s, s, 4), straight alpha, by the keys of states. Must not change.
+        pictures: RGBA pictures, uint8 (s, s, 4), straight alpha, by the keys of states; the floor plan may be any
+            rectangle. Must not change.
 
     Raises:
         FrameError: A picture has another shape or type.
@@ -32,7 +35,8 @@ class Compositor:
 
     def __init__(self, pictures: Pictures) -> None:
         for key, picture in pictures.items():
-            square = picture.ndim == 3 and picture.shape[0] == picture.shape[1] > 0 and picture.shape[2] == 4
+            sized = picture.ndim == 3 and min(picture.shape) > 0 and picture.shape[2] == 4
+            square = sized and (picture.shape[0] == picture.shape[1] or key == FLOORPLAN)
             if picture.dtype != np.uint8 or not square:
                 raise FrameError(
                     f"picture {key!r} must be uint8 (s, s, 4), got {picture.dtype} {picture.shape}"
@@ -116,6 +120,7 @@ def _without_what_moves(state: HudState) -> HudState:
         if state.message is not None and shown
         else None,
         pointer=None,
+        minimap=None if state.minimap is None else MiniMap("", state.minimap.bounds, (0.0, 0.0), 0.0),
     )
 
 
@@ -138,6 +143,8 @@ def _part(name: str, rect: Rect, state: HudState, layout: Layout) -> tuple[objec
     if name == "progress":
         counts = (state.delivered, state.total)
         return counts, lambda pen: panels.draw_progress(pen, rect, *counts)
+    if name == "minimap" and (minimap := state.minimap) is not None:
+        return minimap, lambda pen: draw_minimap(pen, rect, minimap)
     if name == "clock" and state.clock is not None:
         text = panels.clock_text(state.clock)
         return text, lambda pen: panels.draw_clock(pen, rect, text)

@@ -3,7 +3,7 @@
 progress        message bar         clock
 task list                            bins
   ...             (free view)         ...
-  ...              inventory
+  ...              inventory          mini-map
 """
 
 import math
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from hud import theme
 from hud.canvas import Rect
 from hud.errors import FrameError
-from hud.state import ChecklistItem, HudState, Message
+from hud.state import ChecklistItem, HudState, Message, MiniMap
 from hud.text import Typeface
 from hud.theme import Face
 
@@ -40,6 +40,8 @@ SLOT_HEIGHT = 40
 MESSAGE_LINES = 3
 MESSAGE_ICON = 26
 POINTER = 36
+MAP_INSET = 4
+MAP_HEIGHT = 150  # at most; a narrower map leaves the bins more room
 SMALLEST = (320, 240)
 
 
@@ -91,10 +93,11 @@ class Layout:
     rows: tuple[ListRow, ...]
     message_lines: tuple[str, ...]
     bin_rows: tuple[BinRow, ...]
+    minimap: Rect | None = None
 
     def panels(self) -> dict[str, Rect]:
         """Rectangles of the panels that are shown, by name."""
-        names = ("progress", "clock", "message", "checklist", "bins", "inventory", "pointer")
+        names = ("progress", "clock", "message", "checklist", "bins", "inventory", "minimap", "pointer")
         return {name: rect for name in names if (rect := getattr(self, name)) is not None}
 
 
@@ -152,7 +155,8 @@ def arrange(state: HudState, width: int, height: int, face: Typeface) -> Layout:
     unit = unit_of(width, height)
     bounds = _Bounds(width, height, unit, face)
     checklist, first, rows = bounds.checklist(state)
-    bins, bin_rows = bounds.bins(state)
+    minimap = bounds.minimap(state.minimap)
+    bins, bin_rows = bounds.bins(state, minimap)
     progress = Rect(bounds.margin, bounds.margin, bounds.px(CHIP_WIDTH), bounds.px(CHIP_HEIGHT))
     clock = Rect(
         width - bounds.margin - bounds.px(CHIP_WIDTH), bounds.margin, progress.width, progress.height
@@ -177,6 +181,7 @@ def arrange(state: HudState, width: int, height: int, face: Typeface) -> Layout:
         rows=rows,
         message_lines=lines,
         bin_rows=bin_rows,
+        minimap=minimap,
     )
 
 
@@ -242,10 +247,26 @@ class _Bounds:
         detail = self.face.paragraph(item.detail, size, theme.DETAIL.weight, width, 1 if item.done else 3)
         return ListRow(self.px(ROW + LINE * max(0, len(detail) - 1)), width, detail)
 
-    def bins(self, state: HudState) -> tuple[Rect | None, tuple[BinRow, ...]]:
+    def minimap(self, minimap: MiniMap | None) -> Rect | None:
+        """As wide as the list of bins, in the lower right corner, in the proportions of the house."""
+        if minimap is None:
+            return None
+        inset = 2 * self.px(MAP_INSET)
+        xmin, ymin, xmax, ymax = minimap.bounds
+        inner = round((self.bins_width - inset) * (ymax - ymin) / (xmax - xmin))
+        height = min(max(inner, 1), self.px(MAP_HEIGHT)) + inset
+        return Rect(
+            self.width - self.margin - self.bins_width,
+            self.height - self.margin - height,
+            self.bins_width,
+            height,
+        )
+
+    def bins(self, state: HudState, below: Rect | None) -> tuple[Rect | None, tuple[BinRow, ...]]:
         """Rectangle of the list of bins and its rows; places get fewer lines when many bins must fit."""
         if not state.bins:
             return None, ()
+        room = self.column_height if below is None else below.y - self.px(GAP) - self.top
         text = self.bins_width - self.px(2 * PADDING + TILE + GAP)
         size = max(1, self.px(theme.DETAIL.size))
         fixed = self.px(HEADER) + self.px(PADDING)
@@ -256,9 +277,9 @@ class _Bounds:
                 for b in state.bins
             ]
             rows = tuple(BinRow(self.px(max(TILE, LINE * (1 + len(w))) + GAP), w) for w in wrapped)
-            if fixed + sum(r.height for r in rows) <= self.column_height:
+            if fixed + sum(r.height for r in rows) <= room:
                 break
-        while len(rows) > 1 and fixed + sum(r.height for r in rows) > self.column_height:
+        while len(rows) > 1 and fixed + sum(r.height for r in rows) > room:
             rows = rows[:-1]
         rect = Rect(
             self.width - self.margin - self.bins_width,

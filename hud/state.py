@@ -4,6 +4,7 @@ import enum
 from dataclasses import dataclass
 from typing import Literal
 
+Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
 
@@ -103,6 +104,29 @@ class Pointer:
 
 
 @dataclass(frozen=True)
+class MiniMap:
+    """The house from above with north (+y) up.
+
+    Attributes:
+        picture: Key of the picture that shows the house within `bounds`.
+        bounds: xmin, ymin, xmax, ymax, m.
+        position: Where the person stands, m.
+        heading: Where the person looks, rad, 0 along +x, counter-clockwise.
+        way: Points along the way to the goal, m.
+        things: Places that stand out, m.
+        goal: Where the way ends, m, or None.
+    """
+
+    picture: str
+    bounds: tuple[float, float, float, float]
+    position: Vec2
+    heading: float
+    way: tuple[Vec2, ...] = ()
+    things: tuple[Vec2, ...] = ()
+    goal: Vec2 | None = None
+
+
+@dataclass(frozen=True)
 class HudState:
     """Everything that is shown.
 
@@ -117,6 +141,7 @@ class HudState:
         total: How many there are.
         clock: Elapsed task time to show, s, or None.
         pointer: Arrow towards a goal out of view, or None.
+        minimap: The house from above, or None.
     """
 
     checklist_title: str
@@ -129,3 +154,4 @@ class HudState:
     total: int = 0
     clock: float | None = None
     pointer: Pointer | None = None
+    minimap: MiniMap | None = None

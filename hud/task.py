@@ -76,6 +76,8 @@ class TaskView:
         message: What the message bar shows, or None.
         clock: Elapsed task time to show, s, or None.
         camera: The eye camera; given, the optimal condition points to a goal that is out of view.
+        heading: Where the person looks, rad, 0 along +x, counter-clockwise.
+        bounds: xmin, ymin, xmax, ymax of the house, m, or None where there is no map of it.
 
     Raises:
         TaskViewError: A name is unknown or repeated, `order` is not a permutation of the objects, or `path`
@@ -95,6 +97,8 @@ class TaskView:
     message: Message | None = None
     clock: float | None = None
     camera: CameraView | None = None
+    heading: float = 0.0
+    bounds: tuple[float, float, float, float] | None = None
 
     def __post_init__(self) -> None:
         names = [o.name for o in self.objects]

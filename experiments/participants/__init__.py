@@ -39,4 +39,6 @@ def participant(name: str) -> ParticipantFactory:
 
 def default_participant(assistance: str) -> str:
     """Name of the participant that makes the most of an assistance condition."""
-    return DEFAULT_FOR_ASSISTANCE.get(assistance, "follower")
+    return DEFAULT_FOR_ASSISTANCE.get(
+        assistance.partition("-")[0], "follower"
+    )  # less the condition's options

@@ -3,6 +3,7 @@
 from mjsim.render.cameras import CameraPose
 from mjsim.render.context import GlInfo, gl_info
 from mjsim.render.floorplan import FloorPlan, render_floorplan
+from mjsim.render.labels import Labels
 from mjsim.render.markers import MarkerLike
 from mjsim.render.pictures import render_picture, render_pictures
 from mjsim.render.profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
@@ -17,6 +18,7 @@ __all__ = [
     "FloorPlan",
     "Frame",
     "GlInfo",
+    "Labels",
     "MarkerLike",
     "RenderProfile",
     "Renderer",

@@ -9,6 +9,7 @@ import atexit
 import contextlib
 import importlib
 import os
+import queue
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,7 +23,10 @@ EGL_REMEDY = (
     f"install an EGL driver, on Debian or Ubuntu: apt-get install {' '.join(EGL_PACKAGES)}; "
     "`mjsim doctor` shows what is there"
 )
+TIMEOUT_VARIABLE = "MJSIM_GL_TIMEOUT"
+START_LIMIT = 60.0  # s; the slowest drivers take a few
 _BACKENDS = ("egl", "osmesa", "glfw", "cgl")
+_MAIN_THREAD_ONLY = ("glfw", "cgl")
 _DISABLED = ("disable", "disabled", "off", "false", "0")
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshader")
 
@@ -104,11 +108,7 @@ class _ProcessContext:
 
     def _ensure(self) -> None:
         if self._gl is None:
-            module = _backend()
-            try:
-                self._gl = module.GLContext(1, 1)
-            except Exception as error:  # drivers and PyOpenGL raise many unrelated types here
-                raise RenderError(f"no OpenGL context ({error}); {EGL_REMEDY}") from error
+            module, self._gl = _start()
             self._egl = getattr(module, "EGL", None)
             self._pid = os.getpid()
             atexit.register(self.close)
@@ -136,6 +136,50 @@ class _ProcessContext:
             display = egl.eglGetCurrentDisplay()
             previous = (display, egl.EGL_NO_SURFACE, egl.EGL_NO_SURFACE, egl.EGL_NO_CONTEXT)
         egl.eglMakeCurrent(*previous)
+
+
+def _start() -> tuple[ModuleType, Any]:
+    """The backend and a new context of it, or an error when the driver gives no answer in time.
+
+    A driver that hangs cannot be interrupted, so it is asked in a thread that is left behind when it does.
+    """
+    limit = _time_limit()
+    answers: queue.SimpleQueue[tuple[ModuleType, Any] | RenderError] = queue.SimpleQueue()
+
+    def ask() -> None:
+        try:
+            module = _backend()
+            answers.put((module, module.GLContext(1, 1)))
+        except RenderError as error:
+            answers.put(error)
+        except Exception as error:  # drivers and PyOpenGL raise many unrelated types here
+            answers.put(RenderError(f"no OpenGL context ({error}); {EGL_REMEDY}"))
+
+    if os.environ.get("MUJOCO_GL", "").lower().strip() in _MAIN_THREAD_ONLY:
+        ask()
+    else:
+        threading.Thread(target=ask, name="gl-start", daemon=True).start()
+    try:
+        answer = answers.get(timeout=limit)
+    except queue.Empty:
+        raise RenderError(
+            f"the OpenGL driver did not start within {limit:g} s: the GPU may be lost or held by another process "
+            f"(nvidia-smi tells); choose another with MUJOCO_EGL_DEVICE_ID, or wait longer with {TIMEOUT_VARIABLE}=120"
+        ) from None
+    if isinstance(answer, RenderError):
+        raise answer
+    return answer
+
+
+def _time_limit() -> float:
+    text = os.environ.get(TIMEOUT_VARIABLE, "")
+    try:
+        limit = float(text) if text else START_LIMIT
+    except ValueError:
+        limit = 0.0
+    if not 0.0 < limit < float("inf"):
+        raise RenderError(f"{TIMEOUT_VARIABLE} must be a positive number of seconds, got {text!r}")
+    return limit
 
 
 def _backend() -> ModuleType:

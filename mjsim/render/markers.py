@@ -51,7 +51,7 @@ def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False
     Raises:
         RenderError: There are too many markers, or one has an unknown shape or unusable numbers.
     """
-    if scene.ngeom + len(markers) > scene.maxgeom:
+    if len(markers) > MAX_MARKERS:
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
     for marker in markers:
         geom = scene.geoms[scene.ngeom]

@@ -1,6 +1,6 @@
 """First-person frames of a model: colour, depth and segmentation."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
@@ -137,11 +137,35 @@ class Renderer:
         Raises:
             RenderError: As for `rgb`.
         """
-        pose = camera_pose(self._model, data, camera)
+        (frame,) = self.frames(data, (camera,), markers, rgb=rgb, depth=depth, segmentation=segmentation)
+        return frame
+
+    def frames(
+        self,
+        data: Any,
+        cameras: Iterable[str | CameraPose],
+        markers: Sequence[MarkerLike] = (),
+        *,
+        rgb: bool = True,
+        depth: bool = False,
+        segmentation: bool = False,
+    ) -> tuple[Frame, ...]:
+        """The same moment from any number of cameras, with one scene update for all.
+
+        Raises:
+            RenderError: As for `rgb`.
+        """
+        poses = [camera_pose(self._model, data, camera) for camera in cameras]
         with context.current_context():
-            view = self._look(data, pose)
-            colour = self._stage.colour(view, markers) if rgb else None
-            ids, raw = self._stage.geometry(view) if depth or segmentation else (None, None)
+            self._stage.update(data)
+            return tuple(self._frame(pose, markers, rgb, depth, segmentation) for pose in poses)
+
+    def _frame(
+        self, pose: CameraPose, markers: Sequence[MarkerLike], rgb: bool, depth: bool, segmentation: bool
+    ) -> Frame:
+        view = View.of(pose)
+        colour = self._stage.colour(view, markers) if rgb else None
+        ids, raw = self._stage.geometry(view) if depth or segmentation else (None, None)
         metres = view.metres(raw) if depth and raw is not None else None
         return Frame(pose, colour, metres, ids if segmentation else None)
 

@@ -17,6 +17,7 @@ from mjsim.render.culling import outside, without
 from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers
 from mjsim.render.occlusion import Occluders
 from mjsim.render.profiles import RenderProfile
+from mjsim.render.shadows import ContactShadows
 from mjsim.render.xray import blend_hidden, screen_rectangle
 
 FIRST_PERSON_GROUPS = (0, 1, 2)
@@ -64,12 +65,15 @@ class Stage:
         scale = profile.supersampling
         self._drawn = checked_size(round(width * scale)), checked_size(round(height * scale))
         self._option = _visual_option(groups, profile)
-        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + MAX_MARKERS)
+        shown = np.isin(model.geom_group, list(groups))
+        self._occluders = Occluders(model, shown)
+        self._shadows = ContactShadows(model, shown) if profile.contact_shadows else None
+        spots = self._shadows.count if self._shadows else 0
+        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + MAX_MARKERS + spots)
         self._xray_scene = mujoco.MjvScene(model, maxgeom=MAX_MARKERS)
         self._xray_scene.flags[:] = 0
         self._camera = mujoco.MjvCamera()
         self._model = model
-        self._occluders = Occluders(model, np.isin(model.geom_group, list(groups)))
         self._positions, self._rotations = np.zeros((model.ngeom, 3)), np.zeros((model.ngeom, 3, 3))
         self._colour = np.empty((self._drawn[1], self._drawn[0], 3), np.uint8)
         self._ids = np.empty((height, width, 3), np.uint8)
@@ -120,6 +124,8 @@ class Stage:
         _set_flags(scene, self._profile)
         view.aim(scene)
         try:
+            if self._shadows is not None:
+                self._shadows.add(scene, view, self._aspect, self._positions, self._rotations)
             add_markers(scene, markers)
             with context.current_context(), without(scene, self._unseen(view, self._profile)):
                 rectangle = self._draw(scene, self._drawn, self._colour, None)
@@ -154,11 +160,16 @@ class Stage:
         ids = table[packed[..., 0] | packed[..., 1] << 8 | packed[..., 2] << 16]
         return ids, np.asarray(cv2.flip(self._depth, 0), dtype=np.float32)
 
+    @property
+    def _aspect(self) -> float:
+        """Width over height, of the drawing or the frame: rounding makes them differ."""
+        return max(width / height for width, height in (self._size, self._drawn))
+
     def _unseen(self, view: View, profile: RenderProfile | None = None) -> NDArray[np.bool_]:
         """Geoms (ngeom,) that can leave no trace in this view."""
         if profile is not None and (profile.shadow_size or profile.reflections):
             return np.zeros(self._model.ngeom, dtype=bool)
-        aspect = max(width / height for width, height in (self._size, self._drawn))
+        aspect = self._aspect
         unseen = outside(view, aspect, self._positions, self._model.geom_rbound)
         return unseen | self._occluders.hidden(view, aspect, self._positions, self._rotations, ~unseen)
 

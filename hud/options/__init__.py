@@ -1,0 +1,33 @@
+"""Options of assistance conditions. Every module here is one, named after its file.
+
+An option is a function from a task view and the state that the condition made of it to another state. It is asked for
+by name after the condition's, `highlight-xray-minimap`, and applied in that order.
+"""
+
+import importlib
+import pkgutil
+from collections.abc import Callable
+
+from hud.errors import ConditionError
+from hud.state import HudState
+from hud.task import TaskView
+
+Option = Callable[[TaskView, HudState], HudState]
+ATTRIBUTE = "apply"
+
+
+def option_names() -> tuple[str, ...]:
+    """Names of the options in this package, sorted."""
+    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+
+
+def option(name: str) -> Option:
+    """The option called `name`.
+
+    Raises:
+        ConditionError: There is none of that name.
+    """
+    if name not in option_names():
+        raise ConditionError(f"no option {name!r} of conditions; available: {', '.join(option_names())}")
+    found: Option = getattr(importlib.import_module(f"{__name__}.{name}"), ATTRIBUTE)
+    return found

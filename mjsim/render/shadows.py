@@ -1,0 +1,99 @@
+"""Contact shadows: dark soft spots under loose things near the floor, where shadow maps would cost too much.
+
+They are planes with a soft round texture, added to the scene for one frame as markers are. A spot is as wide as the
+thing above it and fades as the thing is lifted; it takes part in neither depth nor segmentation.
+"""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.render.cameras import View
+from mjsim.render.culling import outside
+
+# Material of the house with a round texture whose alpha fades outwards; without it there are no spots.
+MATERIAL = "shadow_round"
+# How far a spot reaches beyond the thing, m: its texture is faint at the edge.
+_BORDER = 0.05
+# Above the lowest point of the thing, so that thin rugs do not cover it, m.
+_LIFT = 0.010
+# Things higher than this above the floor throw no spot, m.
+_REACH = 0.3
+
+
+class ContactShadows:
+    """The free bodies of a model and the spots under them.
+
+    Args:
+        model: Compiled model; its floor lies at z = 0.
+        shown: Which geoms are drawn, shape (ngeom,).
+    """
+
+    def __init__(self, model: Any, shown: NDArray[np.bool_]) -> None:
+        free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
+        owner = model.body_rootid[model.geom_bodyid]
+        geoms = np.flatnonzero(shown & np.isin(owner, free) & (model.geom_rbound > 0.0))
+        self._geoms = geoms[np.argsort(owner[geoms], kind="stable")]
+        bodies = owner[self._geoms]
+        self._starts = np.flatnonzero(np.diff(bodies, prepend=-1)) if len(bodies) else np.zeros(0, np.intp)
+        self._bounds = model.geom_aabb[self._geoms]
+        self._material = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, MATERIAL)
+        self._rgba = model.mat_rgba[self._material].copy() if self._material >= 0 else np.zeros(4)
+
+    @property
+    def count(self) -> int:
+        """How many geoms `add` appends at most."""
+        return len(self._starts)
+
+    def add(
+        self,
+        scene: Any,
+        view: View,
+        aspect: float,
+        positions: NDArray[np.float64],
+        rotations: NDArray[np.float64],
+    ) -> None:
+        """Append the spots that are in view to a scene's geoms.
+
+        Args:
+            scene: With room for `count` more geoms.
+            view: What the frame sees.
+            aspect: Width over height of the image.
+            positions: Of the model's geoms, shape (ngeom, 3), m.
+            rotations: Of the model's geoms, shape (ngeom, 3, 3).
+        """
+        if not len(self._starts) or self._material < 0:
+            return
+        low, high = self._boxes(positions[self._geoms], rotations[self._geoms])
+        middle, half = (low + high) / 2, (high - low) / 2
+        height = np.maximum(low[:, 2], 0.0)  # boxes of tilted meshes reach into the floor
+        strength = np.clip(1.0 - height / _REACH, 0.0, 1.0)
+        centres = np.column_stack((middle[:, :2], height + _LIFT))
+        radii = np.hypot(half[:, 0], half[:, 1]) + 2 * _BORDER
+        seen = (strength > 0.0) & ~outside(view, aspect, centres, radii)
+        for index in np.flatnonzero(seen):
+            self._append(scene, centres[index], half[index, :2] + _BORDER, strength[index])
+
+    def _append(
+        self, scene: Any, centre: NDArray[np.float64], half: NDArray[np.float64], strength: float
+    ) -> None:
+        geom = scene.geoms[scene.ngeom]
+        rgba = (self._rgba * [1.0, 1.0, 1.0, strength]).astype(np.float32)
+        size = np.array([*half, 0.0])
+        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_PLANE, size, centre, np.eye(3).ravel(), rgba)
+        geom.matid, geom.texcoord = self._material, 0
+        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+        geom.emission = geom.specular = geom.shininess = geom.reflectance = 0.0
+        geom.segid = -1
+        scene.ngeom += 1
+
+    def _boxes(
+        self, positions: NDArray[np.float64], rotations: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lower and upper corners (n, 3) of the bodies' axis-aligned boxes."""
+        middle = positions + np.einsum("cij,cj->ci", rotations, self._bounds[:, :3])
+        reach = np.einsum("cij,cj->ci", np.abs(rotations), self._bounds[:, 3:])
+        lower = np.minimum.reduceat(middle - reach, self._starts, axis=0)
+        return lower, np.maximum.reduceat(middle + reach, self._starts, axis=0)

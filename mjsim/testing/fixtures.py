@@ -1,0 +1,29 @@
+"""Pytest fixtures. Import the one you want into your `conftest.py`; this module alone needs pytest."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mjsim.testing.frames import Comparison, compare_frame
+
+GoldenFrame = Callable[..., Comparison]
+
+
+@pytest.fixture
+def golden_frame(request: pytest.FixtureRequest, tmp_path: Path) -> GoldenFrame:
+    """Compares a frame with `golden/<name>.png` beside the test file; images of a failure go to `tmp_path`.
+
+    `golden_frame(frame)` takes the test's own name, `golden_frame(frame, "hall")` another; other arguments are those
+    of `mjsim.testing.compare_frame`.
+    """
+
+    def compare(frame: NDArray[np.uint8], name: str | None = None, **options: object) -> Comparison:
+        stem = name or re.sub(r"[^\w.-]+", "_", request.node.name).strip("_")
+        folder = request.path.parent / "golden"
+        return compare_frame(frame, folder / f"{stem}.png", **{"output": tmp_path, **options})  # type: ignore[arg-type]
+
+    return compare

@@ -1,0 +1,179 @@
+"""Golden frames: exact on a driver that is known, close on any other.
+
+Beside `name.png` lies `name.json`: the SHA-256 of the frame for each driver on which somebody looked at it and found it
+right. On such a driver every pixel must be the same. On another the frame must come within a PSNR of the picture.
+"""
+
+import hashlib
+import json
+import os
+import platform
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.errors import MjsimError
+from mjsim.files import replacing
+from mjsim.render import gl_info
+
+UPDATE_VARIABLE = "MJSIM_UPDATE_GOLDEN"
+CLOSE_ENOUGH = 45.0  # dB
+_GAIN = 4  # of the difference image, so that few levels can be seen
+
+Image = NDArray[np.uint8]
+
+
+class FrameMismatchError(MjsimError, AssertionError):
+    """A frame differs from its golden frame, or there is none."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How a frame compares with its golden frame.
+
+    Attributes:
+        exact: Every pixel is the same.
+        known_driver: A hash is stored for this driver.
+        psnr: Peak signal-to-noise ratio, dB; inf where exact.
+        updated: The golden frame was written anew.
+    """
+
+    exact: bool
+    known_driver: bool
+    psnr: float
+    updated: bool = False
+
+
+def compare_frame(
+    frame: Image,
+    golden: str | Path,
+    *,
+    key: str | None = None,
+    update: bool | None = None,
+    output: str | Path | None = None,
+    close_enough: float = CLOSE_ENOUGH,
+) -> Comparison:
+    """Compare a frame with the golden frame at `golden`.
+
+    Args:
+        frame: RGB, uint8, shape (height, width, 3).
+        golden: PNG file; the hashes lie beside it as JSON.
+        key: What drew the frame; by default `driver_key()`.
+        update: Whether to store the frame as the golden one; by default whether the environment variable
+            `MJSIM_UPDATE_GOLDEN` is set and not 0. Look at what was stored before you commit it.
+        output: Folder for actual, expected and difference image on failure; by default a new temporary one.
+        close_enough: PSNR that suffices where no hash is stored for `key`, dB.
+
+    Raises:
+        FrameMismatchError: The frame differs, or there is no golden frame; the message names the images.
+        RenderError: `key` was left out and no OpenGL context can be made.
+    """
+    _check_image(frame)
+    path = Path(golden)
+    key = driver_key() if key is None else key
+    if update is None:
+        update = os.environ.get(UPDATE_VARIABLE, "0") not in ("", "0")
+    if update:
+        _store(frame, path, key)
+        return Comparison(True, True, float("inf"), updated=True)
+    folder = Path(tempfile.mkdtemp(prefix="frames-")) if output is None else Path(output)
+    if not path.is_file():
+        actual = _write(folder / f"{path.stem}.actual.png", frame)
+        raise FrameMismatchError(
+            f"no golden frame {path}; look at {actual} and store it with {UPDATE_VARIABLE}=1"
+        )
+    expected = _read(path)
+    known = _hashes(path).get(key)
+    exact = known == _digest(frame) if known is not None else np.array_equal(frame, expected)
+    ratio = float("inf") if exact else psnr(frame, expected)
+    if not exact and (known is not None or ratio <= close_enough):
+        raise FrameMismatchError(_report(frame, expected, path, folder, key, known is not None, ratio))
+    return Comparison(exact, known is not None, ratio)
+
+
+def driver_key() -> str:
+    """What a frame's pixels depend on besides its content: OpenGL driver, OpenCV (text, scaling), processor family."""
+    gl = gl_info()
+    return f"{gl.renderer} | {gl.version} | OpenCV {cv2.__version__} | {platform.machine()}"
+
+
+def psnr(a: Image, b: Image) -> float:
+    """Peak signal-to-noise ratio of two images, dB; inf where they are equal, -inf where their shapes differ."""
+    if a.shape != b.shape:
+        return float("-inf")
+    error = float(np.mean((a.astype(np.float64) - b) ** 2))
+    return float("inf") if error == 0.0 else 10.0 * float(np.log10(255.0**2 / error))
+
+
+def difference_image(a: Image, b: Image) -> Image:
+    """Absolute difference of two images of equal shape, four times as strong."""
+    apart = np.abs(a.astype(np.int16) - b)
+    return np.asarray(np.minimum(_GAIN * apart, 255), dtype=np.uint8)
+
+
+def _check_image(frame: Image) -> None:
+    if frame.dtype != np.uint8 or frame.ndim != 3 or frame.shape[2] != 3:
+        raise FrameMismatchError(
+            f"a frame must be uint8 (height, width, 3), got {frame.dtype} {frame.shape}; golden frames are RGB"
+        )
+
+
+def _report(
+    frame: Image, expected: Image, path: Path, folder: Path, key: str, known: bool, ratio: float
+) -> str:
+    written = [
+        _write(folder / f"{path.stem}.actual.png", frame),
+        _write(folder / f"{path.stem}.expected.png", expected),
+    ]
+    if frame.shape == expected.shape:
+        written.append(_write(folder / f"{path.stem}.difference.png", difference_image(frame, expected)))
+        apart = np.abs(frame.astype(np.int16) - expected).max(axis=2)
+        what = f"{int((apart > 0).sum())} pixels differ by up to {int(apart.max())}, PSNR {ratio:.1f} dB"
+    else:
+        what = f"its shape is {frame.shape} instead of {expected.shape}"
+    rule = "every pixel must be the same on this driver" if known else f"{CLOSE_ENOUGH:g} dB are asked for"
+    return (
+        f"frame {path.name} has changed: {what} ({rule}: {key}). Look at {', '.join(map(str, written))}. "
+        f"If the change is meant, store it with {UPDATE_VARIABLE}=1"
+    )
+
+
+def _digest(frame: Image) -> str:
+    return hashlib.sha256(repr(frame.shape).encode() + np.ascontiguousarray(frame).tobytes()).hexdigest()
+
+
+def _hashes(golden: Path) -> Mapping[str, str]:
+    path = golden.with_suffix(".json")
+    if not path.is_file():
+        return {}
+    stored: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))
+    return stored
+
+
+def _store(frame: Image, path: Path, key: str) -> None:
+    """Write picture and hash; hashes of other drivers stay only while the picture does."""
+    same = path.is_file() and np.array_equal(_read(path), frame)
+    hashes = {**(_hashes(path) if same else {}), key: _digest(frame)}
+    if not same:
+        _write(path, frame)
+    with replacing(path.with_suffix(".json")) as temporary:
+        temporary.write_text(json.dumps(hashes, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def _read(path: Path) -> Image:
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
+    if image is None:
+        raise FrameMismatchError(f"{path} is no picture; store it anew with {UPDATE_VARIABLE}=1")
+    return np.asarray(image, dtype=np.uint8)
+
+
+def _write(path: Path, frame: Image) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        cv2.imwrite(str(temporary), cv2.cvtColor(frame, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    return path
