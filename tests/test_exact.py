@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from planner.checker import check
 from planner.exact.annealing import anneal, decode, propose, tour_actions
+from planner.exact.beam import beam_pass
 from planner.exact.deadline import Deadline
 from planner.exact.instance import make_instance, to_visits
 from planner.exact.multipliers import first_bound, grown
@@ -111,6 +112,21 @@ def test_a_narrow_search_claims_no_more_than_it_knows(seed, n, width, size):
     assert plan.lower_bound <= optimum.cost + 1e-6
     if plan.status is Status.OPTIMAL:
         assert integer_length(problem, plan) == integer_length(problem, optimum)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=seeds, n=st.integers(4, 9), width=st.integers(1, 20), size=st.integers(0, 4))
+def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, width, size):
+    problem = random_problem(seed, n, seed % 3)
+    instance = make_instance(problem, integer_metric(problem.distances))
+    optimum = integer_length(problem, ExactSolver(table_bytes=1 << 30).solve(problem))
+    poor = optimum + optimum // 3  # far from optimal, so that the claim rests on the states that were dropped
+    bound = grown(first_bound(instance, poor), poor, size, NEVER)
+    found = beam_pass(bound, poor, width, 10**9, NEVER)
+    assert found.lower <= optimum <= found.upper
+    if found.actions is not None:
+        visits = to_visits(problem, instance, found.actions)
+        assert tour_length(integer_metric(problem.distances), problem.start, visits) == found.upper
 
 
 @settings(max_examples=30, deadline=None)
