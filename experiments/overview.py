@@ -26,7 +26,7 @@ Bounds = tuple[float, float, float, float]
 
 _TELE = math.radians(20.0)  # from far away, so that walls hide little of the floor
 _WIDE = math.radians(50.0)
-_MARGIN = 1.04
+_MARGIN = 1.12  # the tops of the walls are nearer than the floor
 _LAP = 90.0  # s for once around the house
 _ELEVATION = math.radians(52.0)
 _COAT: Rgba = (0.24, 0.34, 0.47, 1.0)
@@ -56,7 +56,7 @@ def camera_path(
     if eye is not None:
         fixed = CameraPose.looking_at(eye, aim, _WIDE)
         return lambda _: fixed
-    distance = 0.62 * math.hypot(width, depth) / math.tan(_WIDE / 2) * max(1.0, 4.0 / 3.0 / aspect)
+    distance = 0.46 * math.hypot(width, depth) / math.tan(_WIDE / 2) * max(1.0, 4.0 / 3.0 / aspect)
 
     def circle(time: float) -> CameraPose:
         angle = 2.0 * math.pi * time / _LAP - math.pi / 2
@@ -111,7 +111,7 @@ def figure(observation: Observation) -> tuple[Marker, ...]:
     c, s = math.cos(observation.heading), math.sin(observation.heading)
     body = EYE_HEIGHT - 0.25
     return (
-        Marker("cylinder", (x, y, body / 2), (TRUNK_RADIUS, body / 2, 0.0), _COAT, "person"),
+        Marker("cylinder", (x, y, body / 2), (TRUNK_RADIUS, body / 2, 0.0), _COAT, "person", x_ray=True),
         Marker("sphere", (x, y, EYE_HEIGHT), (0.14, 0.0, 0.0), _SKIN, "person"),
         Marker("sphere", (x + 0.15 * c, y + 0.15 * s, EYE_HEIGHT), (0.06, 0.0, 0.0), _COAT, "person"),
     )

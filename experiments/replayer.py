@@ -48,10 +48,11 @@ class _RecordedUser:
             self._stop(Fault(step, "the state differs from the recorded one"))
         if record.fault is not None and step >= record.fault.step:
             raise _EndOfReplay
-        if step == record.steps - 1 and record.reason == INTERRUPTED:
-            raise _EndOfReplay
-        if step == record.steps - 1 and record.reason != PHYSICS_ERROR:
-            self._stop(Fault(step, f"the run ended here ({record.reason}), the replay goes on"))
+        if record.fault is None and step == record.steps - 1:
+            if record.reason == INTERRUPTED:
+                raise _EndOfReplay
+            if record.reason != PHYSICS_ERROR:
+                self._stop(Fault(step, f"the run ended here ({record.reason}), the replay goes on"))
         try:
             return record.action(step)
         except RecordError as error:

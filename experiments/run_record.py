@@ -230,5 +230,5 @@ def _checkpoint_faults(recorded: Recorded, steps: int) -> Iterator[Fault]:
         return
     for number, step in enumerate(recorded.checkpoint_step.tolist()):
         if not 0 <= step < steps or recorded.checkpoint(number).hash != int(recorded.checkpoint_hash[number]):
-            bad = min(max(step, 0), steps - 1)
+            bad = max(0, min(step, steps))
             yield Fault(bad, f"{records.RECORDING}: the checkpoint is not the one that was recorded")
