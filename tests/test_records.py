@@ -1,12 +1,26 @@
 """Records: complete or absent, and never at the cost of something else."""
 
+import hashlib
 import json
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from experiments.errors import RecordError
-from experiments.records import EPISODE, EVENTS, EventLog, Trajectory, read_events, read_json, run_directory
+from experiments.records import (
+    EPISODE,
+    EVENTS,
+    EventLog,
+    Trajectory,
+    decode_action,
+    keep_failed,
+    read_arrays,
+    read_events,
+    read_json,
+    run_directory,
+)
 from mjsim.actions import Move, Pick, Place
 from mjsim.observation import ObjectStatus, Observation
 
@@ -64,7 +78,10 @@ def test_a_run_replaces_an_earlier_run(tmp_path):
 def test_a_run_never_replaces_anything_else(tmp_path):
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "chapter.tex").write_text("precious")
-    with pytest.raises(RecordError, match="thesis exists and is not a run"), run_directory(tmp_path / "thesis"):
+    with (
+        pytest.raises(RecordError, match="thesis exists and is not a run"),
+        run_directory(tmp_path / "thesis"),
+    ):
         pass
     assert (tmp_path / "thesis" / "chapter.tex").read_text() == "precious"
 
@@ -104,9 +121,86 @@ def test_a_trajectory_round_trips_and_repeats_byte_for_byte(tmp_path):
     assert arrays["hands"].tolist() == [[-1, 1]] * 3
     assert arrays["object_status"].tolist() == [[0, 1]] * 3
     assert arrays["object_position"].shape == (3, 2, 3)
-    assert arrays["action"].tolist() == [[0, -1, 1.0, 0.1, -0.5, 0.2], [1, 1, 0, 0, 0, 0], [2, -1, 0, 0, 0, 0]]
+    assert arrays["action"].tolist() == [
+        [0, -1, 1.0, 0.1, -0.5, 0.2],
+        [1, 1, 0, 0, 0, 0],
+        [2, -1, 0, 0, 0, 0],
+    ]
 
 
 def test_an_empty_trajectory_still_saves(tmp_path):
     Trajectory(["a"]).save(tmp_path / "t.npz")
     assert np.load(tmp_path / "t.npz")["time"].shape == (0,)
+
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+NAMES = st.none() | st.sampled_from(["a", "b", "ghost", "", "Ä"])
+ACTIONS = st.builds(Move, FINITE, FINITE, FINITE, FINITE) | st.builds(Pick, NAMES) | st.builds(Place, NAMES)
+
+
+@given(st.lists(ACTIONS, max_size=6))
+def test_actions_are_recorded_at_full_precision(actions):
+    """Names that no object has are recorded, too: a replay refuses them in the same words."""
+    trajectory = Trajectory(["a", "b"])
+    for action in actions:
+        trajectory.append(observation(), action)
+    arrays = trajectory.arrays()
+    names = ["a", "b", *map(str, arrays["unknown_objects"])]
+    again = [decode_action(row, names) for row in arrays["action"].reshape(-1, 6)]
+    assert list(map(repr, again)) == list(map(repr, actions))
+
+
+@pytest.mark.parametrize("row", [[3, 0], [1, 2], [1, 0.5], [2, -2], [np.nan, 0], [0, 0, np.inf]])
+def test_rows_that_are_no_action_are_refused(row):
+    with pytest.raises(RecordError):
+        decode_action(np.array([*row, *[0.0] * (6 - len(row))]), ["a", "b"])
+
+
+def test_the_log_knows_the_size_and_hash_of_its_file(tmp_path):
+    with EventLog(tmp_path / "events.jsonl") as log, EventLog() as memory:
+        for kept in (log, memory):
+            kept.append(0.0, "start", name="Ä")
+            kept.append(0.04, "picked", object="a")
+        content = (tmp_path / "events.jsonl").read_bytes()
+        assert log.size == memory.size == len(content)
+        assert log.hash == memory.hash == int.from_bytes(hashlib.sha1(content).digest()[:8], "little")
+
+
+def test_what_a_failed_run_left_is_kept_beside_the_run(tmp_path):
+    """A later failure replaces it, but nothing else of that name."""
+    for text in ("first", "second"):
+        with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run") as folder:
+            fill(folder)
+            (folder / "note").write_text(text)
+            assert keep_failed(folder, tmp_path / "run") == tmp_path / "run.failed"
+            raise ZeroDivisionError
+    assert (tmp_path / "run.failed" / "note").read_text() == "second"
+    (tmp_path / "other.failed").mkdir()
+    with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "other") as folder:
+        fill(folder)
+        assert keep_failed(folder, tmp_path / "other") == tmp_path / "other.failed-2"
+        raise ZeroDivisionError
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["other.failed", "other.failed-2", "run.failed"]
+
+
+@pytest.mark.parametrize("keep", [0, 1, 100, 600])
+def test_arrays_cut_short_are_named(tmp_path, keep):
+    path = tmp_path / "t.npz"
+    np.savez_compressed(path, a=np.arange(300.0), b=np.zeros(5))
+    assert read_arrays(path)["a"][299] == 299.0
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(RecordError, match=r"t\.npz is cut short or damaged"):
+        read_arrays(path)
+    path.unlink()
+    with pytest.raises(RecordError, match=r"cannot read .*t\.npz"):
+        read_arrays(path)
+
+
+def test_damaged_arrays_are_named(tmp_path):
+    path = tmp_path / "t.npz"
+    np.savez_compressed(path, a=np.arange(300.0))
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 255
+    path.write_bytes(bytes(content))
+    with pytest.raises(RecordError, match=r"t\.npz is cut short or damaged"):
+        read_arrays(path)

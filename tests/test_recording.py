@@ -1,0 +1,155 @@
+"""The state of a world as a value: complete, exact, and hashed."""
+
+import json
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mjsim.actions import IDLE, Move, Pick
+from mjsim.catalogue import Catalogue
+from mjsim.errors import StateError
+from mjsim.recording import StateHash, WorldState, engine_versions, model_fingerprint
+from mjsim.scene import compose
+from mjsim.world import World
+
+FEW = settings(
+    max_examples=15,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+
+
+@pytest.fixture(scope="module")
+def world(scene):
+    return World(scene)
+
+
+def near_an_object(world):
+    """Walk until something can be picked: the start may be anywhere."""
+    rng = np.random.default_rng(1)
+    for _ in range(3000):
+        step = world.step(Pick())
+        if step.result.applied:
+            return
+        for _ in range(5):
+            world.step(Move(0.8, 0.0, float(rng.uniform(-2.0, 2.0))))
+    pytest.fail("nothing came into reach")
+
+
+def wander(world, steps, seed):
+    rng = np.random.default_rng(seed)
+    hashes = []
+    for _ in range(steps):
+        action = Pick() if rng.random() < 0.05 else Move(*rng.uniform(-1.0, 1.0, 4).tolist())
+        world.step(action)
+        hashes.append(world.state_hash())
+    return hashes
+
+
+def free(world):
+    """Wait for the end of a motion."""
+    while world.busy:
+        world.step(IDLE)
+
+
+def test_two_worlds_that_are_set_to_a_state_go_on_alike(scene, world):
+    """Bit for bit, one of them fresh, with something in the hand and the body in full swing."""
+    world.reset()
+    near_an_object(world)
+    free(world)
+    wander(world, 3, seed=2)
+    free(world)
+    state = world.state()
+    assert any(json.loads(state.memory)["hands"])
+    other = World(scene)
+    seen = [w.restore(WorldState(state.physics.copy(), str(state.memory))) for w in (world, other)]
+    assert seen[0].hands == seen[1].hands
+    assert world.state().hash == other.state().hash == state.hash
+    assert wander(world, 150, seed=3) == wander(other, 150, seed=3)
+    assert world.health == other.health
+
+
+def test_a_state_does_not_change_when_the_world_goes_on(world):
+    world.reset()
+    state = world.state()
+    before = state.hash
+    world.restore(state)
+    near_an_object(world)
+    free(world)
+    assert state.hash == before
+    assert world.state().hash != before
+
+
+def test_a_busy_world_has_no_state(world):
+    world.reset()
+    near_an_object(world)
+    with pytest.raises(StateError, match=r"busy at t = .* take its state between motions"):
+        world.state()
+    free(world)
+    world.state()
+
+
+@pytest.mark.parametrize("size", [0, 7])
+def test_a_state_of_another_scene_is_refused(world, size):
+    with pytest.raises(StateError, match=f"a state of {size} numbers"):
+        world.restore(WorldState(np.zeros(size), "{}"))
+
+
+def test_a_state_that_is_not_finite_is_refused(world):
+    world.reset()
+    physics = world.state().physics
+    physics[3] = np.nan
+    with pytest.raises(StateError, match="1 of them not finite"):
+        world.restore(WorldState(physics, "{}"))
+
+
+@pytest.mark.parametrize("memory", ["{}", "[]", "{", '{"health": {"altitude": 3}}'])
+def test_a_memory_that_is_none_is_refused(world, memory):
+    world.reset()
+    with pytest.raises(StateError, match="memory does not fit"):
+        world.restore(WorldState(world.state().physics, memory))
+    world.reset()
+
+
+@FEW
+@given(field=st.sampled_from(["qpos", "qvel", "ctrl", "eq_active", "time"]), data=st.data())
+def test_the_hash_tells_states_apart_by_the_last_bit(scene, field, data):
+    physics = mujoco.MjData(scene.model)
+    hasher = StateHash(scene.model)
+    before = hasher.of(physics)
+    if field == "time":
+        physics.time = np.nextafter(physics.time, 1.0)
+    else:
+        values = getattr(physics, field)
+        place = data.draw(st.integers(0, len(values) - 1))
+        values[place] = 1 if field == "eq_active" else np.nextafter(values[place], 9.0)
+    assert hasher.of(physics) != before
+    mujoco.mj_resetData(scene.model, physics)
+    assert hasher.of(physics) == before
+
+
+def test_the_fingerprint_is_of_what_moves_not_of_looks(episode, catalogue: Catalogue):
+    models = [compose(episode, catalogue).model for _ in range(2)]
+    before = model_fingerprint(models[0])
+    assert model_fingerprint(models[1]) == before
+    models[0].geom_rgba[:] = 0.5
+    models[0].tex_data[:] = 0
+    models[0].mat_specular[:] = 0.0
+    assert model_fingerprint(models[0]) == before
+    for name in ("body_mass", "geom_friction", "mesh_vert", "dof_damping", "geom_pos", "eq_solref"):
+        values = getattr(models[0], name).reshape(-1)
+        kept, values[-1] = float(values[-1]), np.nextafter(values[-1], 9.0, dtype=values.dtype)
+        assert model_fingerprint(models[0]) != before, name
+        values[-1] = kept
+    assert model_fingerprint(models[0]) == before
+    models[0].opt.impratio = 9.0
+    assert model_fingerprint(models[0]) != before
+
+
+def test_versions_name_the_engine():
+    versions = engine_versions()
+    assert versions["mujoco"] == mujoco.__version__
+    assert all(isinstance(value, str) and value for value in versions.values())
