@@ -10,9 +10,10 @@ from experiments.assistant import Assistant
 from experiments.house import House
 from experiments.video import VideoWriter
 from hud.compose import Compositor
+from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
 from mjsim.observation import Observation
-from mjsim.render import Renderer, gl_info, render_pictures
+from mjsim.render import Renderer, gl_info, render_house_map, render_pictures
 from mjsim.scene import Scene
 from mjsim.world import World
 
@@ -43,7 +44,9 @@ class Glasses:
     def __init__(self, scene: Scene, house: House, film: FilmConfig) -> None:
         self.renderer_name = gl_info().renderer
         self._renderer = Renderer(scene.model, width=film.width, height=film.height, profile=film.profile)
-        self._compositor = Compositor(render_pictures(house.catalogue))
+        self._house = house
+        self._pictures = render_pictures(house.catalogue)
+        self._compositor = Compositor(self._pictures)
         self._size = (film.width, film.height)
 
     def frame(self, world: World, observation: Observation, assistant: Assistant) -> NDArray[np.uint8]:
@@ -52,6 +55,9 @@ class Glasses:
         width, height = self._size
         camera = CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
         state = assistant.hud_state(observation, camera)
+        if state.minimap is not None and FLOORPLAN not in self._pictures:
+            self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
+            self._compositor = Compositor(self._pictures)
         rgb = self._renderer.rgb(world.data, EYE, markers=state.markers)
         return self._compositor.compose(rgb, state)
 

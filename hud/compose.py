@@ -129,8 +129,7 @@ def _part(name: str, rect: Rect, state: HudState, layout: Layout) -> tuple[objec
     if name == "checklist":
         items = state.checklist[layout.first : layout.stop]
         hidden = (layout.first, len(state.checklist) - layout.stop)
-        done = f"{sum(r.done for r in state.checklist)} / {len(state.checklist)}"
-        args = (state.checklist_title, items, layout.rows, hidden, done)
+        args = (state.checklist_title, items, layout.rows, hidden, panels.count_text(state.checklist))
         return args, lambda pen: panels.draw_checklist(pen, rect, *args)
     if name == "bins":
         shown, more = state.bins[: len(layout.bin_rows)], len(state.bins) - len(layout.bin_rows)

@@ -7,59 +7,46 @@ task list                            bins
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hud import theme
 from hud.canvas import Rect
 from hud.errors import FrameError
+from hud.rows import (
+    BETWEEN_HANDS,
+    BINS_WIDTH,
+    BINS_WIDTH_WIDE,
+    CHIP_HEIGHT,
+    CHIP_WIDTH,
+    FOOTER,
+    GAP,
+    HEADER,
+    LINE,
+    LIST_BOTTOM,
+    LIST_SHARE,
+    LIST_WIDTH_LIMIT,
+    MAP_HEIGHT,
+    MAP_INSET,
+    MARGIN,
+    MESSAGE_ICON,
+    MESSAGE_LINES,
+    NUMBER,
+    PADDING,
+    POINTER,
+    ROW,
+    SLOT_HEIGHT,
+    SLOT_WIDTH,
+    SMALLEST,
+    TARGET,
+    TILE,
+    BinRow,
+    ListRow,
+    focus,
+    window,
+)
 from hud.state import ChecklistItem, HudState, Message, MiniMap
 from hud.text import Typeface
 from hud.theme import Face
-
-MARGIN = 8
-GAP = 6
-CHIP_HEIGHT = 28
-CHIP_WIDTH = 76
-LIST_SHARE = 0.3  # of the frame's width
-LIST_WIDTH_LIMIT = 230
-BINS_WIDTH = 148
-BINS_WIDTH_WIDE = 164  # on frames that are wider than 4 : 3
-LIST_BOTTOM = 64  # kept free below the lists, so that what lies at the feet is seen
-ROW = 32
-HEADER = 24
-FOOTER = 17
-PADDING = 6
-TILE = 24
-TARGET = 20
-CONTEXT = 2  # rows above the current one that stay in sight
-NUMBER = 19
-LINE = 14
-SLOT_WIDTH = 118
-SLOT_HEIGHT = 40
-MESSAGE_LINES = 3
-MESSAGE_ICON = 26
-POINTER = 36
-MAP_INSET = 4
-MAP_HEIGHT = 150  # at most; a narrower map leaves the bins more room
-SMALLEST = (320, 240)
-
-
-@dataclass(frozen=True)
-class ListRow:
-    """A row of the task list: its height, px, the px that its text may take, and its wrapped detail."""
-
-    height: int
-    text_width: int
-    detail: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class BinRow:
-    """A row of the list of bins: its height, px, and its wrapped place."""
-
-    height: int
-    place: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -112,38 +99,6 @@ def unit_of(width: int, height: int) -> float:
             f"frame of {width} x {height} px is too small for the HUD; use {SMALLEST[0]} x {SMALLEST[1]}"
         )
     return min(width / 640.0, height / 480.0)
-
-
-def window(heights: Sequence[int], current: int, room: int) -> tuple[int, int]:
-    """Which rows of a list to show: the current one, up to two before it, and as many after it as fit.
-
-    Args:
-        heights: Height of each row, px.
-        current: Index of the current row; it is shown even when it is higher than `room`.
-        room: Height that there is, px.
-
-    Returns:
-        First row, and one past the last; neither neighbour would still fit.
-    """
-    first, stop, used = current, current + 1, heights[current]
-    while first > max(0, current - CONTEXT) and used + heights[first - 1] <= room // 2:
-        first -= 1
-        used += heights[first]
-    while stop < len(heights) and used + heights[stop] <= room:
-        used += heights[stop]
-        stop += 1
-    while first > 0 and used + heights[first - 1] <= room:
-        first -= 1
-        used += heights[first]
-    return first, stop
-
-
-def focus(state: HudState) -> int:
-    """Index of the row that must be visible: the current one, or the first, or the last when all are done."""
-    for i, row in enumerate(state.checklist):
-        if row.current:
-            return i
-    return len(state.checklist) - 1 if state.checklist and state.checklist[-1].number is not None else 0
 
 
 def arrange(state: HudState, width: int, height: int, face: Typeface) -> Layout:
@@ -290,11 +245,11 @@ class _Bounds:
         return rect, rows
 
     def inventory(self) -> Rect:
-        """Two slots at the bottom, centred in the frame."""
-        slots = 2 * self.px(SLOT_WIDTH) + self.px(GAP)
-        left, width = self.middle
-        x = min(max((self.width - slots) // 2, left), left + width - slots)
-        return Rect(x, self.height - self.margin - self.px(SLOT_HEIGHT), slots, self.px(SLOT_HEIGHT))
+        """Two slots at the bottom, apart from each other and centred in the frame."""
+        left, room = self.middle
+        width = min(2 * self.px(SLOT_WIDTH) + self.px(BETWEEN_HANDS), room)
+        x = min(max((self.width - width) // 2, left), left + room - width)
+        return Rect(x, self.height - self.margin - self.px(SLOT_HEIGHT), width, self.px(SLOT_HEIGHT))
 
     def message(self, message: Message | None) -> tuple[Rect | None, tuple[str, ...]]:
         """One line between the chips when the text fits there, else up to three lines between the lists."""

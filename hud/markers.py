@@ -11,7 +11,9 @@ BREADCRUMB_SPACING = 0.28  # m along the floor path
 BREADCRUMB_CLEARANCE = 0.5  # m of path in front of the person left empty, so that nothing fills the view
 
 RED: Rgba = (0.90, 0.10, 0.06, 1.0)
-ORANGE: Rgba = (0.90, 0.62, 0.0, 1.0)
+POLE_BANDS = 4
+YELLOW: Rgba = (1.0, 0.86, 0.10, 1.0)
+NAVY: Rgba = (0.03, 0.06, 0.20, 1.0)
 WHITE: Rgba = (0.95, 0.95, 0.95, 1.0)
 SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
 
@@ -43,17 +45,32 @@ def breadcrumbs(path: NDArray[np.float64]) -> tuple[Marker, ...]:
 
 
 def flagpole(position: Vec3, *, x_ray: bool = False) -> tuple[Marker, ...]:
-    """A pole with a flag over an object: 1.2 m tall, standing clear above the object."""
+    """A pole with a flag over an object: 1.2 m tall, standing clear above the object.
+
+    Pole and flag are banded light and dark, so that they stand out from light walls and from dark floors, also for
+    people who see no hues.
+    """
     x, y, z = position
     foot, top = z + 0.25, z + 1.45
-    return (
+    band = (top - foot) / POLE_BANDS
+    pole = tuple(
         Marker(
-            "cylinder", (x, y, (foot + top) / 2), (0.012, (top - foot) / 2, 0.0), WHITE, "flagpole", x_ray
-        ),
-        Marker("box", (x, y + 0.11, top - 0.08), (0.006, 0.11, 0.08), ORANGE, "flagpole", x_ray),
-        Marker("box", (x + 0.11, y, top - 0.08), (0.11, 0.006, 0.08), ORANGE, "flagpole", x_ray),
-        Marker("sphere", (x, y, foot), (0.03, 0.0, 0.0), ORANGE, "flagpole", x_ray),
+            "cylinder",
+            (x, y, foot + (i + 0.5) * band),
+            (0.013, band / 2, 0.0),
+            (NAVY, WHITE)[i % 2],
+            "flagpole",
+            x_ray,
+        )
+        for i in range(POLE_BANDS)
     )
+    flag: tuple[Marker, ...] = ()
+    for height, half, colour in ((top - 0.06, 0.06, YELLOW), (top - 0.15, 0.03, NAVY)):
+        flag += (
+            Marker("box", (x, y + 0.11, height), (0.006, 0.11, half), colour, "flagpole", x_ray),
+            Marker("box", (x + 0.11, y, height), (0.11, 0.006, half), colour, "flagpole", x_ray),
+        )
+    return (*pole, *flag, Marker("sphere", (x, y, foot), (0.03, 0.0, 0.0), YELLOW, "flagpole", x_ray))
 
 
 def goal_pin(position: Vec3, *, x_ray: bool = False) -> tuple[Marker, ...]:

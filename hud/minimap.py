@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from hud import theme
 from hud.canvas import Canvas, Patch, Rect
-from hud.layout import MAP_INSET
 from hud.panels import Pen
+from hud.rows import MAP_INSET
 from hud.state import MiniMap, Vec2
 
 PICTURE_OPACITY = 0.8

@@ -9,7 +9,19 @@ from numpy.typing import NDArray
 
 from hud import theme
 from hud.canvas import Canvas, Patch, Rect
-from hud.layout import GAP, HEADER, LINE, NUMBER, PADDING, TARGET, TILE, BinRow, ListRow
+from hud.rows import (
+    EMPTY_WIDTH,
+    GAP,
+    HEADER,
+    LINE,
+    NUMBER,
+    PADDING,
+    SLOT_WIDTH,
+    TARGET,
+    TILE,
+    BinRow,
+    ListRow,
+)
 from hud.state import BinEntry, ChecklistItem, InventorySlot, Message, MessageKind
 from hud.text import Typeface
 
@@ -41,6 +53,14 @@ class Pen:
             canvas.picture(picture, x + inset, y + inset, size - 2 * inset, opacity)
 
 
+def count_text(items: tuple[ChecklistItem, ...]) -> str:
+    """What is left of a list, or which step of a numbered one is next."""
+    left = sum(not item.done for item in items)
+    if any(item.number is not None for item in items):
+        return f"step {len(items) - left + 1} / {len(items)}" if left else "done"
+    return f"{left} left" if left else "none left"
+
+
 def draw_checklist(
     pen: Pen,
     rect: Rect,
@@ -48,14 +68,14 @@ def draw_checklist(
     items: tuple[ChecklistItem, ...],
     rows: tuple[ListRow, ...],
     hidden: tuple[int, int],
-    finished: str,
+    count: str,
 ) -> Patch:
-    """The task list: the items that fit, and how many are hidden before and after them."""
+    """The task list: the items that fit, how many are hidden before and after them, and a count beside the title."""
     canvas = pen.panel(rect)
     x, width = canvas.px(PADDING + 2), rect.width - 2 * canvas.px(PADDING + 2)
-    taken = canvas.text_width(finished, theme.DETAIL) + canvas.px(GAP)
+    taken = canvas.text_width(count, theme.DETAIL) + canvas.px(GAP)
     canvas.text(x, canvas.px(17), canvas.fit(title, theme.TITLE, width - taken), theme.TITLE, theme.TEXT)
-    canvas.text(rect.width - x - taken + canvas.px(GAP), canvas.px(17), finished, theme.DETAIL, theme.QUIET)
+    canvas.text(rect.width - x - taken + canvas.px(GAP), canvas.px(17), count, theme.DETAIL, theme.QUIET)
     top = canvas.px(HEADER)
     for item, row in zip(items, rows, strict=True):
         _checklist_row(pen, canvas, item, row, top)
@@ -131,25 +151,22 @@ def draw_bins(
 
 
 def draw_inventory(pen: Pen, rect: Rect, slots: tuple[InventorySlot, InventorySlot]) -> Patch:
-    """Two hands side by side: a picture and a name each, or an empty outline."""
+    """Two hands, at the left and the right end: a picture and a name each, or a word that it is empty."""
     canvas = Canvas(rect.width, rect.height, pen.face, pen.unit)
     px = canvas.px
-    width = (rect.width - px(GAP)) // 2
     for i, (slot, hand) in enumerate(zip(slots, ("Left hand", "Right hand"), strict=True)):
+        held = slot.label is not None
+        width = min(px(SLOT_WIDTH if held else EMPTY_WIDTH), (rect.width - px(GAP)) // 2)
         left = 0 if i == 0 else rect.width - width
         area = Rect(left, 0, width, rect.height)
         canvas.rounded(area, 8.0 * pen.unit, theme.PANEL, theme.PANEL_OPACITY)
-        held = slot.label is not None
         edge, opacity = (theme.ACCENT, 0.9) if held else (theme.EDGE, theme.EDGE_OPACITY)
         canvas.rounded(area, 8.0 * pen.unit, edge, opacity, line=max(1.0, pen.unit * (1.5 if held else 1.0)))
-        side = rect.height - 2 * px(5)
-        if held:
+        x = left + px(PADDING + 1)
+        if slot.label is not None:
+            side = rect.height - 2 * px(5)
             pen.tile(canvas, slot.picture, left + px(5), px(5), side)
-        else:
-            canvas.rounded(
-                Rect(left + px(5), px(5), side, side), 4.0 * pen.unit, theme.EDGE, 0.3, max(1.0, pen.unit)
-            )
-        x = left + px(5) + side + px(GAP)
+            x = left + px(5) + side + px(GAP)
         room = left + width - px(PADDING) - x
         if slot.label is not None:
             lines, face, colour = canvas.wrap(slot.label, theme.LABEL, room, 2), theme.LABEL, theme.TEXT

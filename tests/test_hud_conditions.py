@@ -125,7 +125,7 @@ def test_highlight_flags_exactly_the_misplaced_objects() -> None:
     poles = [m for m in flags if m.shape == "cylinder"]
     loose = [o for o in view.objects if o.status == "loose"]
     assert len(loose) == 12 - 4
-    assert sorted(m.position[:2] for m in poles) == sorted(o.position[:2] for o in loose)
+    assert {m.position[:2] for m in poles} == {o.position[:2] for o in loose}
     for pole in poles:
         assert pole.position[2] - pole.size[1] > 0.1, "the pole stands clear above the object"
 

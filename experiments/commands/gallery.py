@@ -1,4 +1,4 @@
-"""`mjsim gallery`: the pictures of the README."""
+"""`mjsim gallery`: the pictures of the documentation."""
 
 import argparse
 from pathlib import Path
@@ -7,24 +7,33 @@ from typing import Any
 from rich.console import Console
 
 from experiments.commands.options import frame_size
-from experiments.gallery import Shot, take_pictures
+from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
 from experiments.glasses import FilmConfig
 from experiments.trial import TrialConfig
 from mjsim.render import PROFILES
 
+SEED = 7
+CONDITIONS = ("none", "highlight", "optimal")
 SHOTS = (
-    Shot("optimal", TrialConfig(objects=12, assistance="optimal", seed=0), 2.0),
-    Shot("highlight", TrialConfig(objects=12, assistance="highlight", seed=0), 3.0),
-    Shot("none", TrialConfig(objects=12, assistance="none", seed=0), 6.0),
+    Shot("optimal", TrialConfig(objects=12, assistance="optimal", seed=SEED), after(2.0)),
+    Shot("optimal_carrying", TrialConfig(objects=12, assistance="optimal", seed=SEED), carrying_two),
+    Shot("highlight", TrialConfig(objects=12, assistance="highlight", seed=0), after(3.0)),
+    Shot("none", TrialConfig(objects=12, assistance="none", seed=0), after(6.0)),
 )
+SHEET = "contact_sheet.png"
+
+DESCRIPTION = """\
+Take a picture of each assistance condition from real trials, as OUT/<name>.png, and a contact sheet of the three
+conditions in four situations, as OUT/contact_sheet.png."""
 
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "gallery",
-        help="make the pictures of the README",
-        description="Take a picture of each assistance condition from real trials, as OUT/<condition>.png.",
+        help="make the pictures of the documentation",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the pictures")
     parser.add_argument(
@@ -36,17 +45,37 @@ def add_parser(commands: Any) -> None:
         metavar="NAME",
         help=f"render profile: {', '.join(PROFILES)} (quality)",
     )
+    parser.add_argument(
+        "--contact-sheet",
+        action="store_true",
+        help="make the contact sheet alone: frames of 640x480 in profile fast, as in a run",
+    )
+    parser.add_argument(
+        "--frames", action="store_true", help="also write the frames of the contact sheet, in their full size"
+    )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Take the pictures."""
     console = Console(stderr=True, highlight=False)
-    film = FilmConfig(arguments.size[0], arguments.size[1], arguments.profile)
-    take_pictures(
-        SHOTS,
-        arguments.out,
-        film,
-        lambda shot: console.print(f"{arguments.out / shot.name}.png", soft_wrap=True),
-    )
+    arguments.out.mkdir(parents=True, exist_ok=True)
+
+    def write(name: str, frame: Any) -> None:
+        save_png(arguments.out / name, frame)
+        console.print(str(arguments.out / name), soft_wrap=True)
+
+    if not arguments.contact_sheet:
+        film = FilmConfig(arguments.size[0], arguments.size[1], arguments.profile)
+        for name, frame in take_pictures(SHOTS, film).items():
+            write(f"{name}.png", frame)
+    frames = {}
+    for condition in CONDITIONS:
+        trial = TrialConfig(objects=12, assistance=condition, seed=SEED)
+        shots = [Shot(key, trial, moment) for key, (_, moment) in SITUATIONS.items()]
+        for key, frame in take_pictures(shots, FilmConfig()).items():
+            frames[condition, key] = frame
+            if arguments.frames:
+                write(f"{condition}_{key}.png", frame)
+    write(SHEET, contact_sheet(CONDITIONS, frames))
     return 0

@@ -2,7 +2,7 @@
 
 from mjsim.render.cameras import CameraPose
 from mjsim.render.context import GlInfo, gl_info
-from mjsim.render.floorplan import FloorPlan, render_floorplan
+from mjsim.render.floorplan import FloorPlan, render_floorplan, render_house_map
 from mjsim.render.labels import Labels
 from mjsim.render.markers import MarkerLike
 from mjsim.render.pictures import render_picture, render_pictures
@@ -24,6 +24,7 @@ __all__ = [
     "Renderer",
     "gl_info",
     "render_floorplan",
+    "render_house_map",
     "render_picture",
     "render_pictures",
 ]

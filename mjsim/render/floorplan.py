@@ -3,14 +3,17 @@
 from dataclasses import dataclass
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjsim.catalogue import Catalogue
 from mjsim.errors import RenderError
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.stage import MAX_SIDE, TOP_DOWN_GROUPS, DirectionalLight, Stage, checked_size
+from mjsim.scene import compile_house
 
 _PAPER = 244  # grey level where there is no house
 # Above any house of one storey.
@@ -89,3 +92,27 @@ def render_floorplan(
     finally:
         stage.close()
     return FloorPlan(rgb, (xmin, ymin, xmax, ymax), pixels_per_metre)
+
+
+def render_house_map(
+    catalogue: Catalogue, bounds: tuple[float, float, float, float], pixels_per_metre: float = 40.0
+) -> NDArray[np.uint8]:
+    """The tidy house from above, without objects and person, as a picture for a map.
+
+    Args:
+        catalogue: Of the house.
+        bounds: What it shows: xmin, ymin, xmax, ymax, m.
+        pixels_per_metre: Scale.
+
+    Returns:
+        RGBA, uint8, shape (height, width, 4), opaque.
+
+    Raises:
+        AssetError: The house does not compile.
+        RenderError: As for `render_floorplan`.
+    """
+    model = compile_house(catalogue)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    rgb = render_floorplan(model, data, bounds, pixels_per_metre).rgb
+    return np.concatenate([rgb, np.full((*rgb.shape[:2], 1), 255, dtype=np.uint8)], axis=2)

@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.errors import RenderError
+from mjsim.render.cameras import View
+from mjsim.render.culling import outside
 
 MAX_MARKERS = 1024
 # Most of a marker's colour is its own light and a little is lit, so that it reads as a solid but shines alike
 # in every room.
 _GLOW = 0.62
 _LIT = 0.32
+_NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _SHAPES = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
@@ -62,11 +65,31 @@ def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False
         size = geom_size(marker)
         position = np.array(_numbers(marker, "position", 3))
         mujoco.mjv_initGeom(geom, _SHAPES[marker.shape], size, position, np.eye(3).ravel(), rgba)
+        # Left as it was by initialisation, so that a slot may still name a geom of another scene.
+        geom.objtype, geom.objid = _NO_OBJECT, -1
         geom.category = mujoco.mjtCatBit.mjCAT_DECOR
         geom.emission = 1.0 if flat else _GLOW / _LIT
         geom.specular = geom.shininess = geom.reflectance = 0.0
         geom.segid = -1
         scene.ngeom += 1
+
+
+def in_view(view: View, aspect: float, markers: Sequence[MarkerLike]) -> list[MarkerLike]:
+    """The markers that a frame can show, in their order.
+
+    Raises:
+        RenderError: As for `add_markers`.
+    """
+    if len(markers) > MAX_MARKERS:
+        raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
+    if not markers:
+        return []
+    for marker in markers:  # also those that are not drawn, so that a mistake shows wherever one looks
+        _numbers(marker, "rgba", 4)
+    centres = np.array([_numbers(marker, "position", 3) for marker in markers])
+    radii = np.array([np.linalg.norm(geom_size(marker)) for marker in markers])
+    beside = outside(view, aspect, centres, radii)
+    return [marker for marker, away in zip(markers, beside, strict=True) if not away]
 
 
 def geom_size(marker: MarkerLike) -> NDArray[np.float64]:

@@ -22,6 +22,8 @@ _LIFT = 0.010
 # Things higher than this above the floor throw no spot, m.
 _REACH = 0.3
 
+_NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
+
 
 class ContactShadows:
     """The free bodies of a model and the spots under them.
@@ -84,6 +86,8 @@ class ContactShadows:
         size = np.array([*half, 0.0])
         mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_PLANE, size, centre, np.eye(3).ravel(), rgba)
         geom.matid, geom.texcoord = self._material, 0
+        # Left as it was by initialisation, so that a slot may still name a geom of another scene.
+        geom.objtype, geom.objid = _NO_OBJECT, -1
         geom.category = mujoco.mjtCatBit.mjCAT_DECOR
         geom.emission = geom.specular = geom.shininess = geom.reflectance = 0.0
         geom.segid = -1

@@ -14,7 +14,7 @@ from mjsim.errors import RenderError
 from mjsim.render import context
 from mjsim.render.cameras import View
 from mjsim.render.culling import outside, without
-from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers
+from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, in_view
 from mjsim.render.occlusion import Occluders
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.shadows import ContactShadows
@@ -126,7 +126,7 @@ class Stage:
         try:
             if self._shadows is not None:
                 self._shadows.add(scene, view, self._aspect, self._positions, self._rotations)
-            add_markers(scene, markers)
+            add_markers(scene, in_view(view, self._aspect, markers))
             with context.current_context(), without(scene, self._unseen(view, self._profile)):
                 rectangle = self._draw(scene, self._drawn, self._colour, None)
                 self._add_x_ray(view, [m for m in markers if m.x_ray], rectangle)
