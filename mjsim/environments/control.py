@@ -146,7 +146,8 @@ def _walk(observation: Observation, stride: float, options: WorldOptions) -> Ste
         if waited == _PATIENCE or stride - walked <= _NEAR:
             break
         left = stride - walked
-        pace = min(options.max_speed, math.sqrt(2 * _BRAKING * left), _GAIN * left)
+        late = _BRAKING * options.control_timestep / 2  # braking begins a step late, and acts in steps
+        pace = min(options.max_speed, math.sqrt(2 * _BRAKING * left + late**2) - late, _GAIN * left)
         step = yield Move(forward=pace)
         now = float((step.observation.position - start) @ ahead)
         waited = waited + 1 if now - walked < 0.0005 else 0

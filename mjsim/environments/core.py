@@ -16,7 +16,7 @@ from mjsim.environments.layout import Layout
 from mjsim.environments.rewards import RewardFunction
 from mjsim.environments.sensors import Moment, Sensor
 from mjsim.environments.sensors.sight import visible_pixels
-from mjsim.errors import SamplingError
+from mjsim.errors import PhysicsError, SamplingError
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.render import Frame
 from mjsim.world import StepResult, World
@@ -56,6 +56,7 @@ class Rearrangement:
         sensors: What is observed.
         control: What can be done.
         reward: What it is worth.
+        forgiving: Whether a failure of the physics cuts the episode off instead of being raised.
     """
 
     def __init__(
@@ -66,16 +67,19 @@ class Rearrangement:
         sensors: Sequence[Sensor],
         control: Control,
         reward: RewardFunction,
+        forgiving: bool = False,
     ) -> None:
         self.layout = layout
         self.sensors = tuple(sensors)
         self.control = control
         self._episodes = episodes
         self._reward = reward
+        self._forgiving = forgiving
         self._images = frozenset[str]().union(*(s.images for s in sensors))
         self._stage: Stage | None = None
         self._seed = 0
         self._over = True
+        self._seen: ObservationDict = {}
         self.on_control_step: Callable[[World], None] | None = None
 
     @property
@@ -156,23 +160,25 @@ class Rearrangement:
         Raises:
             EnvironmentStateError: The episode is over, or none was begun.
             ActionError: The action does not conform to its spec.
-            PhysicsError: MuJoCo warned; the episode is over.
+            PhysicsError: MuJoCo warned and that is not forgiven; the episode is over.
         """
         world = self.world
         if self._over:
             raise EnvironmentStateError("the episode is over; call reset before the next step")
         before = world.observation()
-        steps = self._run(world, action, before)
-        after = steps[-1].observation
+        steps, failure = self._run(world, action, before)
+        after = steps[-1].observation if steps else before
         terminated, truncated = self._ends(after)
-        self._over = terminated or truncated
+        self._over = terminated or truncated or failure is not None
         moment = self._moment(after)
+        # A state that the physics failed in cannot be read; what was last seen has to do.
+        observation = self._observe(moment) if failure is None else self._seen_again()
         return Transition(
-            observation=self._observe(moment),
+            observation=observation,
             reward=float(self._reward(world.scene, before, after)),
             terminated=terminated,
-            truncated=truncated,
-            info=self._info(moment, steps),
+            truncated=self._over and not terminated,
+            info=self._info(moment, steps, failure),
             steps=steps,
         )
 
@@ -190,26 +196,30 @@ class Rearrangement:
         self._stage, self._over = None, True
         self._episodes.close()
 
-    def _run(self, world: World, action: Any, before: Observation) -> tuple[StepResult, ...]:
+    def _run(
+        self, world: World, action: Any, before: Observation
+    ) -> tuple[tuple[StepResult, ...], PhysicsError | None]:
+        """The control steps of one action, up to its end, the episode's, or a failure that is forgiven."""
         commands = self.control.steps(action, before, world.options)
         results: list[StepResult] = []
         command = next(commands)
         while True:
             try:
                 results.append(world.step(command))
-            except Exception:
+            except PhysicsError as failure:
                 self._over = True
-                raise
+                if not self._forgiving:
+                    raise
+                return tuple(results), failure
             if self.on_control_step is not None:
                 self.on_control_step(world)
             if any(self._ends(results[-1].observation)):
                 commands.close()
-                break
+                return tuple(results), None
             try:
                 command = commands.send(results[-1])
             except StopIteration:
-                break
-        return tuple(results)
+                return tuple(results), None
 
     def _ends(self, observation: Observation) -> tuple[bool, bool]:
         """Whether the episode is terminated, and whether it is truncated."""
@@ -224,7 +234,7 @@ class Rearrangement:
                 drawn.append(self._draw())
             return drawn[0]
 
-        return Moment(self.layout, self.world, observation, frame)
+        return Moment(self.layout, self.world, observation, frame, lambda: self.stage.labels)
 
     def _draw(self) -> Frame:
         camera = self.layout.camera
@@ -237,9 +247,17 @@ class Rearrangement:
         )
 
     def _observe(self, moment: Moment) -> ObservationDict:
-        return {s.name: s.read(moment) for s in self.sensors}
+        seen = {s.name: s.read(moment) for s in self.sensors}
+        if self._forgiving:
+            self._seen = {name: array.copy() for name, array in seen.items()}
+        return seen
 
-    def _info(self, moment: Moment, steps: Sequence[StepResult]) -> dict[str, Any]:
+    def _seen_again(self) -> ObservationDict:
+        return {name: array.copy() for name, array in self._seen.items()}
+
+    def _info(
+        self, moment: Moment, steps: Sequence[StepResult], failure: PhysicsError | None = None
+    ) -> dict[str, Any]:
         seen = moment.observation
         delivered = len(seen.names_with(ObjectStatus.DELIVERED))
         events = [e for step in steps for e in step.events]
@@ -254,7 +272,9 @@ class Rearrangement:
             "placed": _count(events, EventKind.PLACED),
             "refusal": refusals[0].value if refusals else "",
         }
-        if "segmentation" in self._images:
+        if failure is not None:
+            info["physics_error"] = str(failure)
+        elif "segmentation" in self._images:
             info["visible"] = visible_pixels(moment)
         return info
 

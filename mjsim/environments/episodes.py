@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.layout import HouseKit
 from mjsim.episode import Episode
 from mjsim.options import WorldOptions
-from mjsim.render import Renderer
+from mjsim.render import Labels, Renderer
 from mjsim.sampling import sample_episode
 from mjsim.scene import compose
 from mjsim.world import World
@@ -40,6 +41,11 @@ class Stage:
         if key not in self._renderers:
             self._renderers[key] = Renderer(self.world.model, width=width, height=height, profile=profile)
         return self._renderers[key]
+
+    @cached_property
+    def labels(self) -> Labels:
+        """What the episode's geoms belong to."""
+        return Labels.of(self.world.scene)
 
     @property
     def physics(self) -> Any:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Literal
 
 from mjsim.environments.control import Control, resolve_control
 from mjsim.environments.core import Rearrangement
@@ -36,6 +36,8 @@ class EnvironmentOptions:
         camera: The eye camera's images.
         world: Limits of walking, reach and grip.
         keep: How many compiled episodes are kept, about 20 MB each; None for all of a number of `episodes`, else 8.
+        physics_errors: `raise`, or `truncate` to let training go on: a failure of the physics then cuts the episode
+            off, with the last sound observation and `info["physics_error"]`.
         navigable: Works out where one can walk; None for the installed one.
     """
 
@@ -50,6 +52,7 @@ class EnvironmentOptions:
     camera: CameraOptions = field(default_factory=CameraOptions)
     world: WorldOptions = field(default_factory=WorldOptions)
     keep: int | None = None
+    physics_errors: Literal["raise", "truncate"] = "raise"
     navigable: NavigableBuilder | None = None
 
     def __post_init__(self) -> None:
@@ -70,6 +73,10 @@ class EnvironmentOptions:
             )
         if self.keep is not None and self.keep < 1:
             raise EnvironmentConfigError(f"keep must be at least 1, got {self.keep}")
+        if self.physics_errors not in ("raise", "truncate"):
+            raise EnvironmentConfigError(
+                f"physics_errors must be 'raise' or 'truncate', got {self.physics_errors!r}"
+            )
         if self.slots is not None and self.slots < high:
             raise EnvironmentConfigError(f"slots is {self.slots}, but an episode may have {high} objects")
 
@@ -130,4 +137,11 @@ def build(options: EnvironmentOptions) -> Rearrangement:
         options=options.world,
         keep=options.kept,
     )
-    return Rearrangement(source, layout, sensors=sensors, control=control, reward=reward)
+    return Rearrangement(
+        source,
+        layout,
+        sensors=sensors,
+        control=control,
+        reward=reward,
+        forgiving=options.physics_errors == "truncate",
+    )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mjsim.environments.layout import Layout
 from mjsim.episode import StartPose
 from mjsim.observation import Observation
-from mjsim.render import Frame
+from mjsim.render import Frame, Labels
 from mjsim.world import World
 
 IMAGES = ("rgb", "depth", "segmentation")
@@ -27,12 +27,14 @@ class Moment:
         observation: Live poses.
         frame: Draws what the eye sees, all that the environment's sensors need at once; drawn on first use and
             kept for the moment.
+        labels: What the geoms of the episode belong to.
     """
 
     layout: Layout
     world: World
     observation: Observation
     frame: Callable[[], Frame]
+    labels: Callable[[], Labels]
 
     @property
     def start(self) -> StartPose:

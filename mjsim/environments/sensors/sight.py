@@ -1,6 +1,5 @@
 """What the person sees: images from the eye, and which objects are in them."""
 
-import mujoco
 import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
@@ -8,37 +7,16 @@ from numpy.typing import NDArray
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.layout import Layout
 from mjsim.environments.sensors.base import Moment, Sensor, unit_spec
-from mjsim.scene import Scene
 from mjsim.visibility import visible_objects
 
-BACKGROUND = 0
+# Numbers of `mjsim.render.Labels`: background -1, house 0, person 1, then receptacles, then the objects by slot.
+LOWEST = -1
+FIRST_RECEPTACLE = 2
 
 
-def labels_of_geoms(scene: Scene, layout: Layout) -> NDArray[np.int32]:
-    """What each geom belongs to, the same numbers in every episode.
-
-    Returns:
-        Shape (ngeom + 1,): `BACKGROUND` for house and person and for geom -1, i + 1 for the object in slot i, and
-        `layout.slots` + 1 + k for receptacle k.
-    """
-    model = scene.model
-    labels = np.full(model.ngeom + 1, BACKGROUND, np.int32)
-    owner = scene.index.geom_owner
-    labels[:-1][owner >= 0] = owner[owner >= 0] + 1
-    for k, key in enumerate(layout.receptacles):
-        root = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{key}/receptacle")
-        inside = _descendants(model, root)
-        labels[:-1][inside[model.geom_bodyid]] = layout.slots + 1 + k
-    return labels
-
-
-def _descendants(model: mujoco.MjModel, root: int) -> NDArray[np.bool_]:
-    """Which bodies are `root` or hang from it, shape (nbody,)."""
-    inside = np.zeros(model.nbody, bool)
-    inside[root] = True
-    for body in range(root + 1, model.nbody):  # parents come before their children
-        inside[body] = inside[model.body_parentid[body]]
-    return inside
+def first_object(layout: Layout) -> int:
+    """Number of the object in slot 0 in a segmentation, the same in every episode."""
+    return FIRST_RECEPTACLE + len(layout.receptacles)
 
 
 def visible_pixels(moment: Moment) -> dict[str, int]:
@@ -69,7 +47,7 @@ def _segmentation(moment: Moment) -> NDArray[np.int32]:
     ids = moment.frame().segmentation
     if ids is None:
         raise _undrawn("segmentation")
-    return labels_of_geoms(moment.world.scene, moment.layout)[ids]
+    return moment.labels().instance_map(ids)
 
 
 def _undrawn(channel: str) -> EnvironmentConfigError:
@@ -77,9 +55,10 @@ def _undrawn(channel: str) -> EnvironmentConfigError:
 
 
 def _pixels(moment: Moment) -> NDArray[np.int32]:
-    slots = moment.layout.slots
-    counts = np.bincount(_segmentation(moment).ravel(), minlength=slots + 1)
-    return counts[1 : slots + 1].astype(np.int32)
+    slots, first = moment.layout.slots, first_object(moment.layout)
+    numbers = _segmentation(moment).ravel()
+    counts = np.bincount(numbers[numbers >= 0], minlength=first + slots)
+    return counts[first : first + slots].astype(np.int32)
 
 
 def _in_view(moment: Moment) -> NDArray[np.float32]:
@@ -99,7 +78,7 @@ DEPTH = Sensor(
 )
 SEGMENTATION = Sensor(
     "segmentation",
-    lambda layout: _image_spec(layout, np.int32, 0, layout.slots + len(layout.receptacles)),
+    lambda layout: _image_spec(layout, np.int32, LOWEST, first_object(layout) + layout.slots - 1),
     _segmentation,
     frozenset({"segmentation"}),
 )

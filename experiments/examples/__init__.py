@@ -1,0 +1,1 @@
+"""Worked examples for people who train agents."""

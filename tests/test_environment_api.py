@@ -1,0 +1,360 @@
+"""Both public interfaces: conformance, seeding, ends of episodes, vectors, rendering, and errors."""
+
+import math
+import subprocess
+import sys
+import warnings
+from typing import Any
+
+import dm_env
+import gymnasium
+import numpy as np
+import pytest
+from absl.testing import absltest
+from dm_env import specs, test_utils
+from gymnasium.utils.env_checker import check_env
+
+import mjsim
+from mjsim.catalogue import Catalogue
+from mjsim.environments import gymnasium_environment, viewer
+from mjsim.environments.control import MOVES
+from mjsim.environments.errors import EnvironmentConfigError, EnvironmentStateError, ViewerError
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.errors import ActionError, PhysicsError
+from mjsim.world import World
+
+FORWARD, PICK, PLACE = MOVES.index("forward"), MOVES.index("pick"), MOVES.index("place")
+ID = "mjsim/Rearrange-v0"
+
+
+def within_reach(catalogue: Catalogue, seed: int = 0) -> Episode:
+    """A cube and its crate, both within reach of the start, so that two actions finish the task."""
+    cube = PlacedObject("object_00", "solids", "cube", (1.6, 3.1), (1.6, 3.1, 0.0), (1.0, 0.0, 0.0, 0.0))
+    return Episode(
+        house=catalogue.name,
+        seed=seed,
+        start=StartPose(1.0, 3.2, 0.3),
+        objects=(cube,),
+        receptacles=("crate", "tray"),
+        targets={"object_00": "crate"},
+    )
+
+
+@pytest.fixture(scope="module")
+def easy(small_catalogue: Catalogue) -> dict[str, Any]:
+    """Options of an environment that two actions solve."""
+    return {
+        "house": small_catalogue.name,
+        "episodes": (within_reach(small_catalogue),),
+        "time_limit": 20.0,
+    }
+
+
+@pytest.fixture
+def discrete(easy: dict[str, Any]) -> Any:
+    made = mjsim.make(seed=0, actions="discrete", **easy)
+    yield made
+    made.close()
+
+
+class _Conformance(test_utils.EnvironmentTestMixin):
+    options: dict[str, Any]
+
+    @pytest.fixture(autouse=True)
+    def _options(self, easy: dict[str, Any]) -> None:
+        self.options = easy
+
+
+class DiscreteConformance(_Conformance, absltest.TestCase):
+    """dm_env's own contract, over the end of an episode."""
+
+    def make_object_under_test(self) -> dm_env.Environment:
+        return mjsim.make(
+            seed=0, actions="discrete", observations=("state", "map", "in_view"), **self.options
+        )
+
+    def make_action_sequence(self) -> Any:
+        return iter([FORWARD, PICK, PLACE, PICK, FORWARD])
+
+
+class ContinuousConformance(_Conformance, absltest.TestCase):
+    """dm_env's own contract, with images, over a cut-off."""
+
+    def make_object_under_test(self) -> dm_env.Environment:
+        seen = ("state", "rgb", "depth", "segmentation", "visible_pixels")
+        return mjsim.make(seed=0, observations=seen, **{**self.options, "time_limit": 0.2})
+
+
+def test_delivering_everything_terminates(discrete: Any) -> None:
+    """The last step of a finished task has discount 0."""
+    discrete.reset()
+    picked = discrete.step(PICK)
+    assert picked.mid() and picked.discount == 1.0
+    last = discrete.step(PLACE)
+    assert last.last() and last.discount == 0.0
+    assert last.observation["object_status"].tolist() == [[0.0, 0.0, 1.0]]
+    assert last.observation["remaining"] == 0.0
+    assert discrete.step(FORWARD).first()
+
+
+def test_time_limit_truncates(easy: dict[str, Any]) -> None:
+    """A cut-off episode keeps discount 1, and ends within a control step of its limit even amid an action."""
+    env = mjsim.make(seed=0, actions="discrete", **{**easy, "time_limit": 0.5})
+    env.reset()
+    last = env.step(PICK)
+    assert last.last() and last.discount == 1.0
+    assert env.core.state.time == pytest.approx(0.52, abs=0.021)
+    assert env.core.state.busy
+    env.close()
+
+
+def test_reward_is_minus_time(discrete: Any) -> None:
+    """Rewards of an episode add up to minus its duration."""
+    discrete.reset()
+    total = sum(discrete.step(a).reward for a in (FORWARD, PICK, PLACE))
+    assert total == pytest.approx(-discrete.core.state.time, abs=1e-9)
+
+
+def test_physics_is_the_state_that_runs(discrete: Any) -> None:
+    """dm_control's view is of the episode to come, then of the running one, without a copy."""
+    physics = discrete.physics
+    discrete.reset()
+    discrete.step(FORWARD)
+    assert discrete.physics is physics
+    assert physics.time() == discrete.core.state.time > 0.0
+    np.testing.assert_array_equal(physics.named.data.qpos["avatar/x"], discrete.core.state.position[0])
+
+
+def test_make_is_seeded() -> None:
+    """The same seed gives the same houses, the first one being the seed's own; another seed gives others."""
+    starts = []
+    for seed in (4, 4, 5):
+        env = mjsim.make(objects=2, seed=seed)
+        env.reset()
+        first = env.core.world.scene.episode
+        env.reset()
+        starts.append((first.seed, env.core.world.scene.episode))
+        env.close()
+    assert starts[0] == starts[1]
+    assert starts[0][0] == 4
+    assert starts[2] != starts[0]
+
+
+class FakeViewer:
+    """Stands in for a window."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+        self.closed = False
+
+    def show(self, world: World) -> None:
+        self.times.append(float(world.data.time))
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> list[FakeViewer]:
+    opened: list[FakeViewer] = []
+
+    def open_fake() -> FakeViewer:
+        opened.append(FakeViewer())
+        return opened[-1]
+
+    monkeypatch.setattr(gymnasium_environment, "open_viewer", open_fake)
+    return opened
+
+
+@pytest.mark.parametrize("actions", ["continuous", "discrete"])
+@pytest.mark.parametrize("observations", [("state",), ("rgb", "depth", "segmentation", "map")])
+def test_gymnasium_checks_pass_without_a_warning(
+    easy: dict[str, Any], actions: str, observations: tuple[str, ...], windows: list[FakeViewer]
+) -> None:
+    env = gymnasium.make(ID, actions=actions, observations=observations, **easy)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    env.close()
+    assert windows and windows[0].closed
+
+
+def test_human_mode_shows_every_control_step(easy: dict[str, Any], windows: list[FakeViewer]) -> None:
+    """The window follows by itself, through the whole of a discrete action."""
+    env = gymnasium.make(ID, actions="discrete", render_mode="human", **easy)
+    env.reset(seed=0)
+    env.step(FORWARD)
+    times = windows[0].times
+    assert times[0] == 0.0 and times[-1] > 0.3
+    np.testing.assert_allclose(np.diff(times), 0.04, atol=1e-9)
+    env.close()
+
+
+def test_a_missing_display_is_named(easy: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a display the error says what to do, and does not spoil off-screen rendering."""
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    import glfw
+
+    monkeypatch.setattr(glfw, "init", lambda: False)
+    with pytest.raises(ViewerError, match="rgb_array"):
+        gymnasium.make(ID, render_mode="human", **easy)
+    env = gymnasium.make(ID, render_mode="rgb_array", **easy)
+    env.reset(seed=0)
+    frame = env.render()
+    assert frame.shape == (480, 640, 3) and frame.dtype == np.uint8 and frame.std() > 5.0
+    env.close()
+
+
+def test_a_window_needs_its_own_backend(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    with pytest.raises(ViewerError, match="MUJOCO_GL=glfw"):
+        viewer.open_viewer()
+
+
+def test_reset_with_a_seed_repeats_the_episode_bit_for_bit() -> None:
+    """Whatever came in between: the same observations and rewards, and the same seeds of later episodes."""
+    env = gymnasium.make(ID, objects=2)
+    runs = []
+    for disturb in (False, True):
+        if disturb:
+            env.reset(seed=99)
+            env.step(env.action_space.sample())
+        seen, info = env.reset(seed=7)
+        env.action_space.seed(1)
+        log = [*seen.values()]
+        for _ in range(25):
+            seen, reward, *_ = env.step(env.action_space.sample())
+            log += [*seen.values(), np.array(reward)]
+        _, later = env.reset()
+        runs.append((info["episode_seed"], later["episode_seed"], [x.tobytes() for x in log]))
+    env.close()
+    assert runs[0] == runs[1]
+    assert runs[0][0] == 7 != runs[0][1]
+
+
+def test_vectors_agree(easy: dict[str, Any]) -> None:
+    """Environments in one process and in several give the same, row by row."""
+    logs = []
+    for mode, extra in (("sync", {}), ("async", {"context": "spawn"})):
+        envs = gymnasium.make_vec(
+            ID, num_envs=2, vectorization_mode=mode, vector_kwargs=extra, actions="discrete", **easy
+        )
+        seen, _ = envs.reset(seed=3)
+        log = [seen]
+        for actions in ([FORWARD, PICK], [PICK, PLACE], [PLACE, FORWARD]):
+            seen, rewards, ended, cut, _ = envs.step(np.array(actions))
+            log.append({**seen, "reward": rewards, "ended": ended, "cut": cut})
+        envs.close()
+        logs.append(log)
+    assert logs[0][0]["goals"].shape == (2, 1, 2)
+    assert [bool(step["ended"][1]) for step in logs[0][1:]] == [False, True, False]
+    for one, other in zip(*logs, strict=True):
+        assert one.keys() == other.keys()
+        for name in one:
+            np.testing.assert_array_equal(one[name], other[name], err_msg=name)
+
+
+def test_info_tells_what_happened(easy: dict[str, Any]) -> None:
+    env = gymnasium.make(ID, actions="discrete", **easy)
+    env.reset(seed=0)
+    *_, refused = env.step(PLACE)
+    *_, picked = env.step(PICK)
+    *_, terminated, _, placed = env.step(PLACE)
+    env.close()
+    assert refused["refusal"] == "hands_empty" and refused["picked"] == 0
+    assert (picked["refusal"], picked["picked"], picked["is_success"]) == ("", 1, False)
+    assert terminated and placed["placed"] == placed["delivered"] == 1 and placed["is_success"]
+
+
+def test_steps_out_of_turn_are_refused(easy: dict[str, Any]) -> None:
+    env = gymnasium.make(ID, actions="discrete", disable_env_checker=True, **easy).unwrapped
+    with pytest.raises(EnvironmentStateError, match="reset"):
+        env.step(PICK)
+    env.reset(seed=0)
+    env.step(PICK)
+    assert env.step(PLACE)[2]
+    with pytest.raises(EnvironmentStateError, match="over"):
+        env.step(FORWARD)
+    env.close()
+
+
+def test_an_unusable_action_changes_nothing(easy: dict[str, Any]) -> None:
+    """A typed error, after which the episode goes on."""
+    env = gymnasium.make(ID, disable_env_checker=True, **easy).unwrapped
+    env.reset(seed=0)
+    for wrong in ([0.0, 0.0, 0.0], [math.nan, 0.0, 0.0, 0.0], "forward"):
+        with pytest.raises((ActionError, ValueError)):
+            env.step(wrong)
+    assert env.core.state.time == 0.0
+    env.step([0.0, 0.0, 0.0, 0.0])
+    assert env.core.state.time == pytest.approx(0.04)
+    env.close()
+
+
+def test_failed_physics_ends_the_episode(easy: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """No step is taken from a state that cannot be trusted; a reset makes all well."""
+    env = mjsim.make(seed=0, **easy)
+    env.reset()
+
+    def fail(*_: object) -> None:
+        raise PhysicsError("as if MuJoCo had warned")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(World, "step", fail)
+        with pytest.raises(PhysicsError):
+            env.step(np.zeros(4))
+    assert env.step(np.zeros(4)).first()
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"objets": 3}, "objets"),
+        ({"objects": 0}, "objects"),
+        ({"objects": (5, 2)}, "objects"),
+        ({"observations": ("state", "smell")}, "smell"),
+        ({"observations": ()}, "empty"),
+        ({"actions": "telepathy"}, "telepathy"),
+        ({"reward": "fame"}, "fame"),
+        ({"time_limit": 0.0}, "time_limit"),
+        ({"episodes": 0}, "episodes"),
+        ({"episodes": ()}, "episodes"),
+        ({"objects": 6, "slots": 4}, "slots"),
+        ({"keep": 0}, "keep"),
+        ({"physics_errors": "ignore"}, "physics_errors"),
+        ({"render_mode": "ansi"}, "ansi"),
+    ],
+)
+def test_unusable_options_are_named(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(EnvironmentConfigError, match=said):
+        gymnasium_environment.RearrangeEnv(**given)
+
+
+def test_unknown_reset_options_are_refused(easy: dict[str, Any]) -> None:
+    env = gymnasium.make(ID, **easy)
+    with pytest.raises(EnvironmentConfigError, match="weather"):
+        env.reset(options={"weather": "rain"})
+    env.close()
+
+
+def test_a_sensor_without_bounds_has_no_space() -> None:
+    with pytest.raises(EnvironmentConfigError, match="bounds"):
+        gymnasium_environment.to_space(specs.Array((2,), np.float32, name="endless"))
+
+
+def test_importing_mjsim_is_light() -> None:
+    """It registers the environment by name and loads neither physics nor planner."""
+    code = (
+        "import sys, mjsim, gymnasium; assert 'mjsim/Rearrange-v0' in gymnasium.registry; "
+        "print(sorted(m for m in ('mujoco', 'dm_control', 'planner', 'experiments', 'OpenGL') if m in sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_mjsim_has_nothing_else() -> None:
+    with pytest.raises(AttributeError, match="maker"):
+        _ = mjsim.maker
