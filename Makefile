@@ -46,4 +46,5 @@ $(READY): pyproject.toml .ci/system-libraries
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --editable '.[dev]'
+	$(BIN)/python -m planner.warmup
 	@touch $@

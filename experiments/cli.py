@@ -1,15 +1,16 @@
 """The `mjsim` command: one subcommand per module of `experiments.commands`."""
 
 import argparse
+import importlib
 import sys
 from collections.abc import Sequence
 
-from experiments.commands import batch, doctor, gallery, house, replay, run
 from experiments.errors import ExperimentError
 from hud.errors import HudError
 from mjsim.errors import MjsimError
 from planner.errors import PlannerError
 
+COMMANDS = ("run", "replay", "batch", "plan", "house", "gallery", "doctor")
 USAGE_ERROR = 2
 INTERRUPTED = 130
 
@@ -27,12 +28,18 @@ examples:
       run a factorial design on all cores; run it again to go on after an interruption
   mjsim house --objects 12 --seed 3 --out house.xml
       write a disorganized house that stock MuJoCo loads
+  mjsim plan problem.json
+      solve a pickup-and-delivery problem, proven optimal where that is possible
   mjsim doctor
       show versions and whether off-screen rendering works"""
 
 
-def parser() -> argparse.ArgumentParser:
-    """The whole command line."""
+def parser(command: str | None = None) -> argparse.ArgumentParser:
+    """The command line.
+
+    Args:
+        command: Leave out all other commands: `mjsim plan` need not load the renderer to answer at once.
+    """
     top = argparse.ArgumentParser(
         prog="mjsim",
         description=DESCRIPTION,
@@ -40,14 +47,16 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (run, replay, batch, house, gallery, doctor):
-        module.add_parser(commands)
+    for name in COMMANDS if command is None else (command,):
+        importlib.import_module(f"experiments.commands.{name}").add_parser(commands)
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0 done, 1 failed, 2 bad input, 130 interrupted."""
-    arguments = parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else list(argv)
+    command = words[0] if words and words[0] in COMMANDS else None
+    arguments = parser(command).parse_args(words)
     try:
         return int(arguments.run(arguments))
     except (ExperimentError, MjsimError, PlannerError, HudError) as error:

@@ -27,7 +27,7 @@ from mjsim.errors import PhysicsError
 from mjsim.scene import Scene, compose
 from mjsim.world import World
 from planner.replanner import Replanner
-from planner.solver import solver
+from planner.solver import DEFAULT_SOLVER, solver
 
 _SESSION = 77  # keeps the session's chance apart from that of the house with the same seed
 SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
@@ -52,7 +52,7 @@ class TrialConfig:
     seed: int
     user: str | None = None
     house: str = "apartment"
-    planner: str = "ortools"
+    planner: str = DEFAULT_SOLVER
     time_limit: float | None = None
 
     def __post_init__(self) -> None:

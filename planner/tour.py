@@ -14,16 +14,26 @@ from planner.problem import RoutingProblem
 UNIT = 1e-4  # m per integer unit of distance: 0.1 mm
 
 
+def integer_distances(distances: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Distances in units of 0.1 mm, symmetric, (k, k)."""
+    rounded = np.rint(distances / UNIT)
+    return np.minimum(rounded, rounded.T).astype(np.int64)
+
+
 def integer_metric(distances: NDArray[np.float64]) -> NDArray[np.int64]:
     """Distances in units of 0.1 mm, closed to a metric, (k, k).
 
     Rounding can break the triangle inequality by a unit, and solvers rely on it: closing restores it.
     """
-    rounded = np.rint(distances / UNIT)
-    rounded = np.minimum(rounded, rounded.T)
+    rounded = integer_distances(distances)
     for k in range(len(rounded)):  # Floyd-Warshall; scipy's reads a distance of 0 as "no edge"
         np.minimum(rounded, rounded[:, k, None] + rounded[None, k, :], out=rounded)
-    return rounded.astype(np.int64)
+    return rounded
+
+
+def is_metric(distances: NDArray[np.float64], metric: NDArray[np.int64]) -> bool:
+    """Whether distances keep the triangle inequality, to rounding; `metric` is their closure."""
+    return bool((integer_distances(distances) - metric).max(initial=0) <= 2 * len(metric))
 
 
 def pick(problem: RoutingProblem, shipment: int) -> Visit:

@@ -5,7 +5,7 @@ import argparse
 import mujoco
 import pytest
 
-from experiments.cli import main, parser
+from experiments.cli import COMMANDS, main, parser
 from experiments.commands.options import frame_size, int_list, text_list
 from mjsim.episode import Episode
 
@@ -38,14 +38,18 @@ def test_unusable_frame_sizes(text):
         frame_size(text)
 
 
-@pytest.mark.parametrize("command", ["run", "batch", "house", "gallery", "doctor"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command, capsys):
     with pytest.raises(SystemExit) as stop:
         main([command, "--help"])
     assert stop.value.code == 0
     text = capsys.readouterr().out
     assert len(text.splitlines()) > 5
-    assert parser().prog == "mjsim"
+
+
+def test_the_overview_names_every_command():
+    text = parser().format_help()
+    assert all(f"\n    {command} " in text for command in COMMANDS)
 
 
 @pytest.mark.parametrize(

@@ -277,14 +277,22 @@ def test_all_bins_distinct():
     assert SEARCH.solve(problem).cost == pytest.approx(TABLE.solve(problem).cost, abs=1e-9)
 
 
-def test_distances_that_are_no_metric_are_not_called_optimal():
-    # The closed metric goes 1 -> 0 -> 3 for 3, but the leg 1 -> 3 as given costs 50.
+def test_distances_that_are_no_metric_are_taken_as_given():
+    # The closed metric goes 1 -> 0 -> 3 for 3, but the leg 1 -> 3 as given costs 50, and no visit lies between.
     d = np.array([[0, 1, 9, 2.0], [1, 0, 9, 50], [9, 9, 0, 9], [2.0, 50, 9, 0]])
     problem = RoutingProblem(d, 0, (Shipment(1, 3),), (), 2)
     plan = solver("exact").solve(problem)
     check(problem, plan)
-    assert plan.status is Status.FEASIBLE
-    assert plan.lower_bound < plan.cost
+    assert (plan.status, plan.cost) == (Status.OPTIMAL, 51.0)
+
+
+@pytest.mark.parametrize("capacity", [1, 3, 4])
+def test_many_objects_at_other_capacities_get_an_honest_bound(capacity):
+    problem = random_problem(3, 16)
+    problem = RoutingProblem(problem.distances, problem.start, problem.shipments, (), capacity)
+    plan = solver("exact").solve(problem, limit=SolveLimit(seconds=0.5))
+    check(problem, plan)
+    assert 0 < plan.lower_bound <= plan.cost
 
 
 def test_never_worse_than_or_tools():

@@ -1,4 +1,4 @@
-"""The exact planner for capacity two; other capacities are left to OR-Tools."""
+"""The exact planner: for capacity two up to 40 objects; for other capacities while they are few."""
 
 import math
 import time
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from planner.exact.annealing import anneal, tour_actions
 from planner.exact.beam import beam_pass
 from planner.exact.deadline import Deadline
+from planner.exact.general import best_first
 from planner.exact.instance import Instance, make_instance, to_visits
 from planner.exact.multipliers import first_bound, grown
 from planner.exact.relaxation import fill, new_table, walk
@@ -17,11 +18,12 @@ from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
-from planner.tour import integer_metric, make_plan
+from planner.tour import integer_distances, integer_metric, is_metric, make_plan
 
 TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
 ANNEALING_MOVES = 20_000
 DEFAULT_WORK = 8_000_000  # states: some 5 s
+GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
 LONGEST = 1 << 27  # units; tours beyond this would overflow 32 bits
 
 
@@ -63,8 +65,9 @@ class ExactSolver:
         limit = limit or SolveLimit()
         metric = integer_metric(problem.distances)
         n = len(problem.shipments)
-        if problem.capacity != 2 or n > 40 or int(metric.max()) * (2 * n + 2) > LONGEST:
-            return OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=limit.seconds))
+        special = problem.capacity != 2 or n > 40 or int(metric.max()) * (2 * n + 2) > LONGEST
+        if special or not is_metric(problem.distances, metric):
+            return self._general(problem, metric, seed, limit, started)
         instance = make_instance(problem, metric)
         size = _table_bytes(instance)
         if size <= min(self.table_bytes, math.inf if limit.seconds is None else limit.seconds * TABLE_RATE):
@@ -72,6 +75,18 @@ class ExactSolver:
         else:
             actions, bound = self._search(instance, seed, limit, started)
         return make_plan(problem, metric, to_visits(problem, instance, actions), bound, started)
+
+    def _general(
+        self, problem: RoutingProblem, metric: NDArray[np.int64], seed: int, limit: SolveLimit, started: float
+    ) -> Plan:
+        """Any capacity and any distances: proven for a few objects, else OR-Tools with the bound reached."""
+        legs = metric if is_metric(problem.distances, metric) else integer_distances(problem.distances)
+        found = best_first(problem, legs, metric, GENERAL_STATES)
+        visits = found.visits
+        if visits is None:
+            plan = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=limit.seconds))
+            visits = list(plan.visits)
+        return make_plan(problem, legs, visits, found.bound, started)
 
     def _search(
         self, instance: Instance, seed: int, limit: SolveLimit, started: float

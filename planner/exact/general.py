@@ -1,0 +1,135 @@
+"""Proven optimal tours for any capacity and any distances, by best-first search; for tasks of a few objects."""
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.errors import InfeasibleError
+from planner.plan import Visit
+from planner.problem import RoutingProblem
+from planner.tour import pick, place, place_onboard
+
+# Where one is, which shipments are not yet picked (bits), and where each carried object goes (sorted).
+State = tuple[int, int, tuple[int, ...]]
+Matrix = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a best-first search ended.
+
+    Attributes:
+        visits: The optimal tour, or None if the search was cut short.
+        bound: Its length, or that of the best tour that may still exist, in the unit of the distances.
+    """
+
+    visits: list[Visit] | None
+    bound: int
+
+
+def best_first(problem: RoutingProblem, distances: Matrix, metric: Matrix, most_states: int) -> Found:
+    """Search states by cost so far plus the farthest errand left (A*).
+
+    In a metric, what belongs where one is, is dropped at once: that is free and never wrong. Otherwise a detour over
+    the same place may pay later, so each drop is a move of its own.
+
+    Args:
+        problem: What is left to do.
+        distances: Length of each leg, integers, (k, k).
+        metric: The same, closed to a metric.
+        most_states: How many states may be expanded.
+    """
+    search = _Search(problem, distances.tolist(), metric.tolist(), at_once=np.array_equal(distances, metric))
+    start = search.arrive(problem.start, (1 << len(problem.shipments)) - 1, problem.onboard)
+    frontier: list[tuple[int, int, State]] = [(search.still_to_go(start), 0, start)]
+    cost: dict[State, int] = {start: 0}
+    before: dict[State, State] = {}
+    closed: set[State] = set()
+    while frontier:
+        estimate, so_far, state = heapq.heappop(frontier)
+        if state in closed:
+            continue
+        if not state[1] and not state[2]:
+            return Found(search.visits(state, before), so_far)
+        if len(closed) == most_states:
+            return Found(None, estimate)
+        closed.add(state)
+        for leg, following in search.moves(state):
+            total = so_far + leg
+            if total < cost.get(following, total + 1):
+                cost[following], before[following] = total, state
+                heapq.heappush(frontier, (total + search.still_to_go(following), total, following))
+    raise InfeasibleError("no order of visits keeps to the capacity")
+
+
+class _Search:
+    """Moves and bounds of one problem."""
+
+    def __init__(
+        self, problem: RoutingProblem, legs: list[list[int]], metric: list[list[int]], *, at_once: bool
+    ) -> None:
+        self._problem = problem
+        self._legs = legs
+        self._metric = metric
+        self._at_once = at_once
+        self._errand = [metric[s.pickup][s.delivery] for s in problem.shipments]
+
+    def arrive(self, here: int, left: int, carried: tuple[int, ...]) -> State:
+        """State on arrival, after what is dropped at once."""
+        return here, left, tuple(sorted(j for j in carried if not (self._at_once and j == here)))
+
+    def moves(self, state: State) -> list[tuple[int, State]]:
+        """Legs to every feasible next state."""
+        here, left, carried = state
+        row = self._legs[here]
+        found = []
+        for j in dict.fromkeys(carried):
+            rest = list(carried)
+            rest.remove(j)
+            found.append((row[j], self.arrive(j, left, tuple(rest))))
+        if len(carried) < self._problem.capacity:
+            for k, shipment in enumerate(self._problem.shipments):
+                if left >> k & 1:
+                    held = (*carried, shipment.delivery)
+                    found.append((row[shipment.pickup], self.arrive(shipment.pickup, left ^ 1 << k, held)))
+        return found
+
+    def still_to_go(self, state: State) -> int:
+        """A lower bound: the farthest single errand that is left."""
+        here, left, carried = state
+        row = self._metric[here]
+        farthest = max((row[j] for j in carried), default=0)
+        for k, shipment in enumerate(self._problem.shipments):
+            if left >> k & 1:
+                farthest = max(farthest, row[shipment.pickup] + self._errand[k])
+        return farthest
+
+    def visits(self, end: State, before: dict[State, State]) -> list[Visit]:
+        """The visits that lead to a state."""
+        chain = [end]
+        while chain[-1] in before:
+            chain.append(before[chain[-1]])
+        chain.reverse()
+        problem = self._problem
+        holding = [(j, place_onboard(problem, k)) for k, j in enumerate(problem.onboard)]
+        left, visits = (1 << len(problem.shipments)) - 1, list[Visit]()
+        for _, now_left, carried in chain:
+            for k, shipment in enumerate(problem.shipments):
+                if (left ^ now_left) >> k & 1:
+                    visits.append(pick(problem, k))
+                    holding.append((shipment.delivery, place(problem, k)))
+            left = now_left
+            for dropped in _difference([j for j, _ in holding], carried):
+                at = next(i for i, (j, _) in enumerate(holding) if j == dropped)
+                visits.append(holding.pop(at)[1])
+        return visits
+
+
+def _difference(held: list[int], still: tuple[int, ...]) -> list[int]:
+    """What is in `held` but no longer in `still`, counted."""
+    rest = list(held)
+    for j in still:
+        rest.remove(j)
+    return rest
