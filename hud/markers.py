@@ -44,14 +44,16 @@ def breadcrumbs(path: NDArray[np.float64]) -> tuple[Marker, ...]:
     )
 
 
-def flagpole(position: Vec3, *, x_ray: bool = False) -> tuple[Marker, ...]:
+def flagpole(position: Vec3, *, low: bool = False, x_ray: bool = False) -> tuple[Marker, ...]:
     """A pole with a flag over an object: 1.2 m tall, standing clear above the object.
+
+    A low one has half the height and no flag: for objects so near that a flag would fill the view.
 
     Pole and flag are banded light and dark, so that they stand out from light walls and from dark floors, also for
     people who see no hues.
     """
     x, y, z = position
-    foot, top = z + 0.25, z + 1.45
+    foot, top = z + 0.25, z + (0.85 if low else 1.45)
     band = (top - foot) / POLE_BANDS
     pole = tuple(
         Marker(
@@ -65,7 +67,8 @@ def flagpole(position: Vec3, *, x_ray: bool = False) -> tuple[Marker, ...]:
         for i in range(POLE_BANDS)
     )
     flag: tuple[Marker, ...] = ()
-    for height, half, colour in ((top - 0.06, 0.06, YELLOW), (top - 0.15, 0.03, NAVY)):
+    bands = () if low else ((top - 0.06, 0.06, YELLOW), (top - 0.15, 0.03, NAVY))
+    for height, half, colour in bands:
         flag += (
             Marker("box", (x, y + 0.11, height), (0.006, 0.11, half), colour, "flagpole", x_ray),
             Marker("box", (x + 0.11, y, height), (0.11, 0.006, half), colour, "flagpole", x_ray),

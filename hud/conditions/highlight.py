@@ -1,9 +1,13 @@
 """Highlight: a flagpole over every misplaced object, and the room of each in the list (PAPER section 5)."""
 
+import math
+
 from hud.lists import assemble, random_order_rows
 from hud.markers import flagpole
 from hud.state import HudState
 from hud.task import TaskObject, TaskView
+
+CLOSE = 1.6  # m; about where an object leaves the lower edge of the view
 
 
 def hud_state(view: TaskView) -> HudState:
@@ -13,5 +17,8 @@ def hud_state(view: TaskView) -> HudState:
         target = f"→ {view.receptacle(thing.receptacle).label}"
         return f"{thing.room}\n{target}" if thing.status == "loose" else target
 
-    markers = tuple(m for o in view.objects if o.status == "loose" for m in flagpole(o.position))
+    loose = [o for o in view.objects if o.status == "loose"]
+    markers = tuple(
+        m for o in loose for m in flagpole(o.position, low=math.dist(o.position[:2], view.position) < CLOSE)
+    )
     return assemble(view, "Objects to put away", random_order_rows(view, detail), markers)

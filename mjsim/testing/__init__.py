@@ -5,6 +5,7 @@ from mjsim.testing.frames import (
     FrameMismatchError,
     compare_frame,
     difference_image,
+    drawing_key,
     driver_key,
     psnr,
 )
@@ -14,6 +15,7 @@ __all__ = [
     "FrameMismatchError",
     "compare_frame",
     "difference_image",
+    "drawing_key",
     "driver_key",
     "psnr",
 ]

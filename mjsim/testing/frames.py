@@ -63,7 +63,7 @@ def compare_frame(
     Args:
         frame: RGB, uint8, shape (height, width, 3).
         golden: PNG file; the hashes lie beside it as JSON.
-        key: What drew the frame; by default `driver_key()`.
+        key: What drew the frame; by default `driver_key()`, for frames without OpenGL `drawing_key()`.
         update: Whether to store the frame as the golden one; by default whether the environment variable
             `MJSIM_UPDATE_GOLDEN` is set and not 0. Look at what was stored before you commit it.
         output: Folder for actual, expected and difference image on failure; by default a new temporary one.
@@ -97,9 +97,14 @@ def compare_frame(
 
 
 def driver_key() -> str:
-    """What a frame's pixels depend on besides its content: OpenGL driver, OpenCV (text, scaling), processor family."""
+    """What a frame's pixels depend on besides its content: the OpenGL driver, and what `drawing_key` names."""
     gl = gl_info()
-    return f"{gl.renderer} | {gl.version} | OpenCV {cv2.__version__} | {platform.machine()}"
+    return f"{gl.renderer} | {gl.version} | {drawing_key()}"
+
+
+def drawing_key() -> str:
+    """What text and scaling depend on: OpenCV and the vector instructions that it uses, which round differently."""
+    return f"OpenCV {cv2.__version__} | {platform.machine()} {cv2.getCPUFeaturesLine()}"
 
 
 def psnr(a: Image, b: Image) -> float:
