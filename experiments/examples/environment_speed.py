@@ -1,0 +1,72 @@
+"""How fast the environment is: steps and resets per second on one core, with and without pixels.
+
+python -m experiments.examples.environment_speed
+"""
+
+import time
+from typing import Any
+
+import gymnasium
+from rich.console import Console
+from rich.table import Table
+
+import mjsim  # noqa: F401 - registers the environment
+
+SECONDS = 3.0
+SETTINGS: dict[str, dict[str, Any]] = {
+    "one number": {"observations": ("remaining",)},
+    "state": {"observations": ("state",)},
+    "state, in_view": {"observations": ("state", "in_view")},
+    "state, rgb 128 x 96": {"observations": ("state", "rgb")},
+    "state, rgb, depth, segmentation": {"observations": ("state", "rgb", "depth", "segmentation")},
+    "state, discrete": {"observations": ("state",), "actions": "discrete"},
+}
+
+
+def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple[float, float]:
+    """Steps and simulated seconds per second of wall time, with random actions and 6 objects."""
+    env = gymnasium.make("mjsim/Rearrange-v0", episodes=1, disable_env_checker=True, **options)
+    env.action_space.seed(0)
+    env.reset(seed=0)
+    for _ in range(20):  # numba, caches and the OpenGL context
+        env.step(env.action_space.sample())
+    steps, simulated, spent = 0, 0.0, 0.0
+    while spent < seconds:
+        _, info = env.reset(seed=0)
+        started, over = time.perf_counter(), False
+        while not over and spent + time.perf_counter() - started < seconds:
+            *_, terminated, truncated, info = env.step(env.action_space.sample())
+            steps, over = steps + 1, terminated or truncated
+        spent += time.perf_counter() - started
+        simulated += float(info["time"])
+    env.close()
+    return steps / spent, simulated / spent
+
+
+def seconds_per_reset(episodes: int | None, resets: int) -> float:
+    """Mean wall time of a reset, s; a number of episodes that come again, or new ones without end."""
+    env = gymnasium.make("mjsim/Rearrange-v0", episodes=episodes, disable_env_checker=True)
+    for seed in range(episodes or 1):
+        env.reset(seed=seed)
+    started = time.perf_counter()
+    for seed in range(1, resets + 1):
+        env.reset(seed=seed)
+    spent = time.perf_counter() - started
+    env.close()
+    return spent / resets
+
+
+def main() -> None:
+    """Measure and print."""
+    table = Table("observations", "steps/s", "simulated s/s")
+    for name, options in SETTINGS.items():
+        steps, simulated = steps_per_second(options)
+        table.add_row(name, f"{steps:.0f}", f"{simulated:.0f}")
+    console = Console()
+    console.print(table)
+    console.print(f"reset to a new house: {seconds_per_reset(None, 10) * 1e3:.0f} ms")
+    console.print(f"reset to one of 4 houses that come again: {seconds_per_reset(4, 400) * 1e3:.2f} ms")
+
+
+if __name__ == "__main__":
+    main()

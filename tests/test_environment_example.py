@@ -1,0 +1,82 @@
+"""Gathering demonstrations, the part of the worked example that needs no learning library."""
+
+import numpy as np
+import pytest
+
+from experiments.examples.demonstrations import demonstrate, encode
+from experiments.house import House
+from mjsim.actions import Move, Pick, Place
+from mjsim.environments.control import Continuous
+from mjsim.environments.core import ObservationDict, Rearrangement
+from mjsim.environments.options import EnvironmentOptions, build
+from mjsim.options import WorldOptions
+
+
+@pytest.fixture(scope="module")
+def house() -> House:
+    return House.load()
+
+
+@pytest.fixture(scope="module")
+def core(house: House) -> Rearrangement:
+    return build(
+        EnvironmentOptions(
+            objects=1, actions=Continuous(repeat=3), time_limit=60.0, navigable=lambda *_: house.navmesh
+        )
+    )
+
+
+def test_the_demonstrator_does_the_task(core: Rearrangement, house: House) -> None:
+    """Rows are what was observed and what was done about it; each episode holds one pick and one place."""
+    shown = demonstrate(core, house, seeds=range(2), rng=np.random.default_rng(0))
+    assert shown.delivered == 1.0
+    assert {len(v) for v in shown.observations.values()} == {len(shown.actions)}
+    assert np.abs(shown.actions).max() <= 1.0
+    trigger = shown.actions[:, 3]
+    assert (trigger == 1.0).sum() >= 2 <= (trigger == -1.0).sum()
+    assert (shown.observations["motion"][:, 3] == 0.0).all()  # never while the hands are busy
+
+
+def test_replayed_demonstrations_do_it_again(core: Rearrangement, house: House) -> None:
+    """The written actions, played back while the hands are free, solve the same episode."""
+    shown = demonstrate(core, house, seeds=range(3, 4), rng=np.random.default_rng(0))
+    core.reset(3)
+    rows, over = iter(shown.actions), False
+    while not over:
+        action = np.zeros(4, np.float32) if core.world.busy else next(rows)
+        taken = core.step(action)
+        over = taken.terminated or taken.truncated
+    assert taken.terminated
+
+
+def test_the_learner_drives_and_the_demonstrator_corrects(core: Rearrangement, house: House) -> None:
+    """A driver that turns on the spot gets advice that is not its own action."""
+
+    def spin(_: ObservationDict) -> np.ndarray:
+        return np.array([0.0, 0.0, 1.0, 0.0], np.float32)
+
+    shown = demonstrate(core, house, seeds=range(1), rng=np.random.default_rng(0), driver=spin)
+    assert shown.delivered == 0.0
+    assert len(shown.actions) == 500
+    assert np.abs(shown.actions[:, 2]).min() < 0.9
+    np.testing.assert_allclose(shown.observations["gps"], 0.0, atol=0.001)
+
+
+def test_demonstrations_are_repeatable(core: Rearrangement, house: House) -> None:
+    """Noise and all, by its generator."""
+    one, two, other = (
+        demonstrate(core, house, seeds=range(1), rng=np.random.default_rng(s), noise=0.2) for s in (0, 0, 1)
+    )
+    assert one.actions.tobytes() == two.actions.tobytes()
+    assert one.actions.tobytes() != other.actions.tobytes()
+
+
+def test_actions_are_encoded_for_continuous_control(core: Rearrangement) -> None:
+    """Control of an encoded action asks the world for the action itself, triggers for the attempt."""
+    options = WorldOptions()
+    core.reset(0)
+    for action in (Move(forward=0.7, left=-0.3, turn=1.1), Pick("object_00"), Place("object_00")):
+        asked = next(Continuous().steps(encode(action, options), core.state, options))
+        assert type(asked) is type(action)
+        if isinstance(action, Move) and isinstance(asked, Move):
+            assert (asked.forward, asked.left, asked.turn) == pytest.approx((0.7, -0.3, 1.1), abs=1e-6)
