@@ -29,7 +29,7 @@ _WIDE = math.radians(50.0)
 _MARGIN = 1.12  # the tops of the walls are nearer than the floor
 _LAP = 90.0  # s for once around the house
 _ELEVATION = math.radians(52.0)
-_COAT: Rgba = (0.24, 0.34, 0.47, 1.0)
+_COAT: Rgba = (0.85, 0.10, 0.55, 1.0)  # a colour that nothing in a house has
 _SKIN: Rgba = (0.93, 0.74, 0.22, 1.0)
 
 
@@ -56,7 +56,9 @@ def camera_path(
     if eye is not None:
         fixed = CameraPose.looking_at(eye, aim, _WIDE)
         return lambda _: fixed
-    distance = 0.46 * math.hypot(width, depth) / math.tan(_WIDE / 2) * max(1.0, 4.0 / 3.0 / aspect)
+    # So that a ball around the floor fits.
+    half_angle = math.atan(math.tan(_WIDE / 2) * min(1.0, aspect))
+    distance = 0.5 * math.hypot(width, depth) / math.sin(half_angle)
 
     def circle(time: float) -> CameraPose:
         angle = 2.0 * math.pi * time / _LAP - math.pi / 2
