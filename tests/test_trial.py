@@ -111,6 +111,7 @@ def test_the_same_command_twice_gives_the_same_bytes(tmp_path):
         records.EVENTS,
         records.EPISODE,
         records.TRAJECTORY,
+        records.RECORDING,
         records.PLAN,
         records.TOPDOWN,
         records.VIDEO,
