@@ -246,3 +246,67 @@ def test_rows_are_plain_values() -> None:
     assert shown("none", sample.task(6)).checklist[0] == ChecklistItem(
         "Blue mug", "→ Dish bin", "object:Blue mug", "receptacle:dish_bin"
     )
+
+
+# --- options ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("base", ["none", "highlight", "optimal"])
+def test_x_ray_changes_nothing_but_that_markers_show_through_walls(base: str) -> None:
+    view = sample.task(12, steps=5)
+    plain, x_ray = shown(base, view), shown(f"{base}-xray", view)
+    assert all(m.x_ray for m in x_ray.markers) and not any(m.x_ray for m in plain.markers)
+    assert (
+        dataclasses.replace(x_ray, markers=tuple(dataclasses.replace(m, x_ray=False) for m in x_ray.markers))
+        == plain
+    )
+
+
+@pytest.mark.parametrize("base", ["none", "highlight", "optimal"])
+def test_the_map_tells_no_more_than_the_condition(base: str) -> None:
+    view = dataclasses.replace(
+        sample.task(12, steps=5), bounds=(-4.0, -1.0, 4.0, 7.0), position=(0.5, 0.25), heading=0.7
+    )
+    state = shown(f"{base}-minimap", view)
+    assert dataclasses.replace(state, minimap=None) == shown(base, view)
+    found = state.minimap
+    assert found is not None
+    assert (found.bounds, found.position, found.heading) == (view.bounds, view.position, view.heading)
+    loose = {o.position[:2] for o in view.objects if o.status == "loose"}
+    assert set(found.things) == (loose if base == "highlight" else set())
+    assert len(found.things) == len(set(found.things))
+    crumbs = [m.position[:2] for m in state.markers if m.role == "breadcrumb"]
+    assert list(found.way) == crumbs and (len(crumbs) > 0) is (base == "optimal")
+    assert found.goal == (view.goal[:2] if base == "optimal" and view.goal else None)
+
+
+def test_without_a_map_of_the_house_there_is_no_mini_map() -> None:
+    assert shown("none-minimap", sample.task(6)) == shown("none", sample.task(6))
+
+
+def test_options_combine_and_follow_outside_conditions() -> None:
+    view = dataclasses.replace(sample.task(6), bounds=(-4.0, -1.0, 4.0, 7.0))
+    both = shown("hud.conditions.highlight:hud_state-xray-minimap", view)
+    assert both == shown("highlight-minimap-xray", view)
+    assert both.minimap is not None and all(m.x_ray for m in both.markers)
+
+
+def test_an_unknown_option_is_refused_with_the_choices() -> None:
+    with pytest.raises(ConditionError, match=r"'sparkle'.*minimap, xray"):
+        condition("none-sparkle")
+    with pytest.raises(ConditionError, match=r"'magic'.*-minimap or -xray"):
+        condition("magic-minimap")
+
+
+def test_flags_of_near_objects_are_low() -> None:
+    """So that no flag fills the view of somebody who stands before the object."""
+    view = sample.task(6)
+    thing = view.objects[0]
+    x, y, _ = thing.position
+
+    def top(distance: float) -> float:
+        markers = shown("highlight", dataclasses.replace(view, position=(x + distance, y))).markers
+        here = [m for m in markers if np.hypot(m.position[0] - x, m.position[1] - y) < 0.2]
+        return max(m.position[2] + (m.size[2] if m.shape == "box" else m.size[1]) for m in here)
+
+    assert top(1.2) < 0.9 and top(2.0) > 1.4

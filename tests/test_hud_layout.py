@@ -15,7 +15,7 @@ from hud.conditions import condition
 from hud.errors import FrameError
 from hud.layout import Layout, window
 from hud.messages import TEXTS, message
-from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, Pointer
+from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, MiniMap, Pointer
 from hud.text import Typeface
 
 FRAMES = ((640, 480), (1280, 720), (1920, 1080), (320, 240), (800, 600), (480, 640), (2560, 1080), (641, 479))
@@ -25,6 +25,19 @@ labels = st.one_of(
     st.sampled_from(["Blue mug", "Set of very long wooden building blocks", "W" * 60, "ÄÖÅ ñ", ""]),
 )
 pictures = st.sampled_from([None, "object:Novel", "missing"])
+
+
+points = st.tuples(st.floats(-30.0, 30.0), st.floats(-30.0, 30.0))
+minimaps = st.builds(
+    MiniMap,
+    st.just("missing"),
+    st.tuples(st.just(0.0), st.just(0.0), st.floats(1.0, 20.0), st.floats(1.0, 20.0)),
+    points,
+    st.floats(-math.pi, math.pi),
+    st.lists(points, max_size=3).map(tuple),
+    st.lists(points, max_size=3).map(tuple),
+    st.one_of(st.none(), points),
+)
 
 
 @st.composite
@@ -58,6 +71,7 @@ def states(draw: st.DrawFn) -> HudState:
         total=draw(st.integers(0, 40)),
         clock=draw(st.one_of(st.none(), st.floats(0.0, 1e5))),
         pointer=draw(st.one_of(st.none(), st.builds(Pointer, st.floats(-math.pi, math.pi)))),
+        minimap=draw(st.one_of(st.none(), minimaps)),
     )
 
 

@@ -1,6 +1,7 @@
 """The HUD state as JSON: nothing is lost, and the schema describes exactly what is written."""
 
 import copy
+import dataclasses
 import json
 from typing import Any
 
@@ -46,11 +47,15 @@ def conforms(schema: dict[str, Any], value: Any) -> bool:
     }[kind]
 
 
-@given(st.sampled_from(condition_names()), st.integers(0, 24), st.data())
+@given(
+    st.sampled_from([*condition_names(), "highlight-minimap", "optimal-minimap-xray"]),
+    st.integers(0, 24),
+    st.data(),
+)
 def test_states_survive_json_and_fit_the_schema(name: str, count: int, data: st.DataObject) -> None:
     steps = data.draw(st.integers(0, 2 * count))
     view = sample.task(count, steps=steps, message=message("picked", object="Novel", opacity=0.25))
-    state = condition(name)(view)
+    state = condition(name)(dataclasses.replace(view, bounds=(0.0, 0.0, 9.0, 7.5)))
     written = to_dict(state)
     read = json.loads(json.dumps(written))
     assert read == written, "only JSON values are written"

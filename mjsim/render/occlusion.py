@@ -86,7 +86,12 @@ class Occluders:
         # Nearer than this, the near plane could cut a hole into the box.
         clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
         usable = (np.abs(ahead) - size[rows, self._thin] > clear) & _opaque(self._model, ids)
-        looks = size[rows, one] * size[rows, two] * np.abs(ahead) / np.linalg.norm(centre, axis=1) ** 3
+        looks = (
+            size[rows, one]
+            * size[rows, two]
+            * np.abs(ahead)
+            / np.maximum(np.linalg.norm(centre, axis=1), 1e-6) ** 3
+        )
         chosen = np.argsort(-np.where(usable, looks, 0.0), kind="stable")[:_TESTED]
         chosen = chosen[usable[chosen]]
         centre, across, along = centre[chosen], across[chosen], along[chosen]
