@@ -16,9 +16,14 @@ from rich.progress import (
 )
 
 from experiments.batch import BatchConfig, BatchProgress, run_batch
-from experiments.commands.options import add_house, add_user, assistance_help, int_list, text_list
-from experiments.trial import TrialConfig
-from planner.solver import SOLVERS
+from experiments.commands.options import (
+    add_house,
+    add_planner,
+    add_user,
+    assistance_help,
+    int_list,
+    text_list,
+)
 
 DESCRIPTION = """\
 Run every combination of --objects, --assistance and --seeds, without video, one process per core. Each trial is a run
@@ -53,12 +58,7 @@ def add_parser(commands: Any) -> None:
     )
     add_user(parser)
     add_house(parser)
-    parser.add_argument(
-        "--planner",
-        default=TrialConfig.planner,
-        metavar="NAME",
-        help=f"{', '.join(SOLVERS)} ({TrialConfig.planner})",
-    )
+    add_planner(parser)
     parser.add_argument(
         "--workers", type=int, default=os.cpu_count(), metavar="N", help="processes (one per core)"
     )

@@ -5,6 +5,8 @@ import re
 
 from experiments.participants import participant_names
 from hud.conditions import condition_names
+from mjsim.render import FAST, PROFILES
+from planner.solver import DEFAULT_SOLVER, SOLVERS
 
 
 def int_list(text: str) -> list[int]:
@@ -63,6 +65,32 @@ def add_user(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"simulated participant: {', '.join(participant_names())}, or package.module:attribute "
         "(default: the one that makes the most of the assistance)",
+    )
+
+
+def add_planner(parser: argparse.ArgumentParser) -> None:
+    """Add `--planner`."""
+    parser.add_argument(
+        "--planner",
+        default=DEFAULT_SOLVER,
+        metavar="NAME",
+        help=f"solver of the routing problem: {', '.join(SOLVERS)} ({DEFAULT_SOLVER})",
+    )
+
+
+def add_frame(
+    parser: argparse.ArgumentParser, *, size: tuple[int, int] = (640, 480), profile: str = FAST.name
+) -> None:
+    """Add `--size` and `--profile` with these defaults."""
+    shown = f"{size[0]}x{size[1]}"
+    parser.add_argument(
+        "--size", type=frame_size, default=size, metavar="WxH", help=f"frame size in pixels ({shown})"
+    )
+    parser.add_argument(
+        "--profile",
+        default=profile,
+        metavar="NAME",
+        help=f"render profile: {', '.join(PROFILES)} ({profile})",
     )
 
 

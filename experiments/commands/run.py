@@ -8,12 +8,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from experiments.commands.options import add_house, add_user, assistance_help, frame_size
+from experiments.commands.options import add_frame, add_house, add_planner, add_user, assistance_help
 from experiments.glasses import FilmConfig
 from experiments.session import Progress as SessionProgress
 from experiments.trial import TrialConfig, run_trial
-from mjsim.render import PROFILES
-from planner.solver import SOLVERS
 
 SHOWN = (
     ("delivered", "objects delivered", "{}"),
@@ -54,26 +52,13 @@ def add_parser(commands: Any) -> None:
         "--seed", type=int, default=0, metavar="S", help="seed of house, lists and participant (0)"
     )
     add_house(parser)
-    parser.add_argument(
-        "--planner",
-        default=TrialConfig.planner,
-        metavar="NAME",
-        help=f"{', '.join(SOLVERS)} ({TrialConfig.planner})",
-    )
+    add_planner(parser)
     parser.add_argument(
         "--time-limit", type=float, metavar="S", help="simulated seconds after which the trial ends"
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run directory to write")
     parser.add_argument("--no-video", action="store_true", help="do not film; some 10 times quicker")
-    parser.add_argument(
-        "--size", type=frame_size, default=(640, 480), metavar="WxH", help="frame size (640x480)"
-    )
-    parser.add_argument(
-        "--profile",
-        default="fast",
-        metavar="NAME",
-        help=f"render profile: {', '.join(PROFILES)} (fast)",
-    )
+    add_frame(parser)
     parser.set_defaults(run=run)
 
 
