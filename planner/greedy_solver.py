@@ -1,8 +1,10 @@
 """The nearest possible visit first: a baseline, and the answer when there is no time to think."""
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+from planner.certificate import Certificate, Proof
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
@@ -26,7 +28,14 @@ class GreedySolver:
         del seed, limit
         started = time.perf_counter()
         metric = integer_metric(problem.distances)
-        return make_plan(problem, metric, nearest_first(problem), spanning_bound(problem, metric), started)
+        visits, bound = nearest_first(problem), spanning_bound(problem, metric)
+        return make_plan(problem, metric, visits, bound, started, Certificate(Proof.SPANNING_TREE, bound))
+
+    def improve(
+        self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
+    ) -> Iterator[Plan]:
+        """Yield the one plan that there is."""
+        yield self.solve(problem, seed=seed, limit=limit)
 
 
 def nearest_first(problem: RoutingProblem) -> list[Visit]:

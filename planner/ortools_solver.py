@@ -2,13 +2,15 @@
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from ortools.constraint_solver import pywrapcp, routing_enums_pb2
 
-from planner.greedy_solver import nearest_first
+from planner.certificate import Certificate, Proof
+from planner.greedy_solver import GreedySolver, nearest_first
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
@@ -22,6 +24,7 @@ from planner.tour import (
     spanning_bound,
 )
 
+FIRST_SOLUTIONS = (1, 10)  # of the anytime form
 DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
 LONGEST_SECONDS = 60.0  # ends a search that is limited by work but finds no more solutions
 
@@ -51,12 +54,38 @@ class OrToolsSolver:
         metric = integer_metric(problem.distances)
         if len(problem.shipments) + len(problem.onboard) <= 3:
             visits, bound = best_of_all(problem, metric)
+            proof = Proof.EXHAUSTIVE
         else:
-            bound = spanning_bound(problem, metric)
+            bound, proof = spanning_bound(problem, metric), Proof.SPANNING_TREE
             if limit is None or limit == SolveLimit():
                 limit = SolveLimit(work=DEFAULT_SOLUTIONS)
             visits = _search(problem, metric, limit)
-        return make_plan(problem, metric, visits, bound, started)
+        return make_plan(problem, metric, visits, bound, started, Certificate(proof, bound))
+
+    def improve(
+        self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
+    ) -> Iterator[Plan]:
+        """Yield the nearest-first tour at once, then what the searches find that end after 1 solution, 10, and all.
+
+        The search starts anew each time; the short ones cost little beside the long one.
+
+        Args:
+            problem: What is left to do.
+            seed: Unused.
+            limit: As in `solve`; seconds count from the beginning.
+        """
+        started = time.perf_counter()
+        best = GreedySolver().solve(problem)
+        yield best
+        limit = SolveLimit(work=DEFAULT_SOLUTIONS) if limit is None or limit == SolveLimit() else limit
+        for work in (*(w for w in FIRST_SOLUTIONS if limit.work is None or w < limit.work), limit.work):
+            left = None if limit.seconds is None else started + limit.seconds - time.perf_counter()
+            if limit.stopped or (left is not None and left <= 0):
+                return
+            plan = self.solve(problem, seed=seed, limit=replace(limit, work=work, seconds=left))
+            if plan.improves_on(best):
+                best = plan
+                yield best
 
 
 def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> tuple[list[Visit], int]:

@@ -3,6 +3,8 @@
 import enum
 from dataclasses import dataclass
 
+from planner.certificate import Certificate
+
 
 class Status(enum.Enum):
     """How much is known of a plan."""
@@ -46,6 +48,7 @@ class Plan:
         lower_bound: No feasible tour is shorter than this, m.
         status: OPTIMAL exactly when cost equals lower_bound up to rounding.
         seconds: Wall time it took to find; never used in anything that must repeat.
+        certificate: What proves the lower bound; None for a plan that was read from a record.
     """
 
     visits: tuple[Visit, ...]
@@ -53,3 +56,9 @@ class Plan:
     lower_bound: float
     status: Status
     seconds: float
+    certificate: Certificate | None = None
+
+    def improves_on(self, other: "Plan") -> bool:
+        """Whether it is shorter, or known to be closer to the shortest, by more than rounding."""
+        shorter = self.cost < other.cost - 1e-9
+        return shorter or self.lower_bound > other.lower_bound + 1e-9 or self.status is not other.status

@@ -1,6 +1,8 @@
 """What every planner of the tour looks like from outside, and finding one by name."""
 
 import importlib
+import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol, cast
 
@@ -24,15 +26,22 @@ class SolveLimit:
     Attributes:
         work: Amount of work in the solver's own unit: results repeat bit for bit on every machine.
         seconds: Wall time, for live use; results then depend on the machine.
+        stop: Stops the solver soon after it is set, from another thread; for live use too.
     """
 
     work: int | None = None
     seconds: float | None = None
+    stop: threading.Event | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("work", self.work), ("seconds", self.seconds)):
             if value is not None and not value > 0:
                 raise PlannerError(f"SolveLimit.{name} must be positive or None, got {value}")
+
+    @property
+    def stopped(self) -> bool:
+        """Whether somebody asked to stop."""
+        return self.stop is not None and self.stop.is_set()
 
 
 class Solver(Protocol):
@@ -44,6 +53,15 @@ class Solver(Protocol):
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
         """Find a plan; the same arguments with a limit on work (or none) give the same visits."""
+
+    def improve(
+        self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
+    ) -> Iterator[Plan]:
+        """Yield a first plan at once, then each that is shorter or has a better bound.
+
+        The last is what `solve` returns for the same arguments, but for limits on time. Leave the iteration
+        whenever the plan in hand is good enough.
+        """
 
 
 def solver(name: str) -> Solver:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import minimum_spanning_tree
 
+from planner.certificate import Certificate
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 
@@ -89,7 +90,12 @@ def spanning_bound(problem: RoutingProblem, metric: NDArray[np.int64]) -> int:
 
 
 def make_plan(
-    problem: RoutingProblem, metric: NDArray[np.int64], visits: Sequence[Visit], bound: int, started: float
+    problem: RoutingProblem,
+    metric: NDArray[np.int64],
+    visits: Sequence[Visit],
+    bound: int,
+    started: float,
+    certificate: Certificate,
 ) -> Plan:
     """A plan with an honest lower bound.
 
@@ -99,6 +105,7 @@ def make_plan(
         visits: The tour.
         bound: Lower bound in the integer metric, units of 0.1 mm.
         started: `time.perf_counter()` when solving began.
+        certificate: What proves the bound.
 
     Returns:
         OPTIMAL if the tour meets the bound in the integer metric and is as long in the given distances (to
@@ -109,4 +116,4 @@ def make_plan(
     optimal = tour_length(metric, problem.start, visits) <= bound and cost <= bound * UNIT + rounding
     lower = cost if optimal else max(0.0, min(cost, bound * UNIT - rounding))
     status = Status.OPTIMAL if optimal else Status.FEASIBLE
-    return Plan(tuple(visits), cost, lower, status, time.perf_counter() - started)
+    return Plan(tuple(visits), cost, lower, status, time.perf_counter() - started, certificate)

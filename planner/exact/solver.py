@@ -2,18 +2,21 @@
 
 import math
 import time
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.certificate import Certificate, Proof
 from planner.exact.annealing import anneal, tour_actions
 from planner.exact.beam import beam_pass
 from planner.exact.deadline import Deadline
 from planner.exact.general import best_first
 from planner.exact.instance import Instance, make_instance, to_visits
-from planner.exact.multipliers import first_bound, grown
+from planner.exact.multipliers import Bound, first_bound, grown
 from planner.exact.relaxation import fill, new_table, walk
+from planner.greedy_solver import GreedySolver
 from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem
@@ -61,20 +64,49 @@ class ExactSolver:
         Returns:
             OPTIMAL where proven, else FEASIBLE with the best bound so far.
         """
+        for plan in self._plans(problem, seed, limit or SolveLimit(), table_at_once=True):
+            best = plan
+        return best
+
+    def improve(
+        self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
+    ) -> Iterator[Plan]:
+        """Yield the annealed tour with a first bound, then each shorter tour or better bound.
+
+        Args:
+            problem: What is left to do.
+            seed: Of the annealing.
+            limit: As in `solve`.
+        """
+        best = None
+        for plan in self._plans(problem, seed, limit or SolveLimit(), table_at_once=False):
+            if best is None or plan.improves_on(best):
+                best = plan
+                yield plan
+
+    def _plans(
+        self, problem: RoutingProblem, seed: int, limit: SolveLimit, *, table_at_once: bool
+    ) -> Iterator[Plan]:
+        """Ever better plans; only one where a table is filled at once."""
         started = time.perf_counter()
-        limit = limit or SolveLimit()
         metric = integer_metric(problem.distances)
         n = len(problem.shipments)
         special = problem.capacity != 2 or n > 40 or int(metric.max()) * (2 * n + 2) > LONGEST
         if special or not is_metric(problem.distances, metric):
-            return self._general(problem, metric, seed, limit, started)
+            if not table_at_once:
+                yield GreedySolver().solve(problem)
+            yield self._general(problem, metric, seed, limit, started)
+            return
         instance = make_instance(problem, metric)
-        size = _table_bytes(instance)
-        if size <= min(self.table_bytes, math.inf if limit.seconds is None else limit.seconds * TABLE_RATE):
-            actions, bound = _by_table(instance)
+        seconds = math.inf if limit.seconds is None else limit.seconds
+        by_table = _table_bytes(instance) <= min(self.table_bytes, seconds * TABLE_RATE)
+        if by_table and table_at_once:
+            found: Iterable[_Found] = [_by_table(instance)]
         else:
-            actions, bound = self._search(instance, seed, limit, started)
-        return make_plan(problem, metric, to_visits(problem, instance, actions), bound, started)
+            found = self._search(instance, seed, limit, started, by_table=by_table)
+        for actions, bound, certificate in found:
+            visits = to_visits(problem, instance, actions)
+            yield make_plan(problem, metric, visits, bound, started, certificate)
 
     def _general(
         self, problem: RoutingProblem, metric: NDArray[np.int64], seed: int, limit: SolveLimit, started: float
@@ -86,19 +118,25 @@ class ExactSolver:
         if visits is None:
             plan = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=limit.seconds))
             visits = list(plan.visits)
-        return make_plan(problem, legs, visits, found.bound, started)
+        certificate = Certificate(Proof.EXHAUSTIVE, found.bound)
+        return make_plan(problem, legs, visits, found.bound, started, certificate)
 
     def _search(
-        self, instance: Instance, seed: int, limit: SolveLimit, started: float
-    ) -> tuple[list[int], int]:
-        """Actions of the best tour found, and a lower bound in units."""
-        deadline = Deadline(None if limit.seconds is None else started + limit.seconds)
+        self, instance: Instance, seed: int, limit: SolveLimit, started: float, *, by_table: bool
+    ) -> Iterator["_Found"]:
+        """Ever better tours and bounds: annealed, then by the full table or by passes of the search."""
+        deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
         work = limit.work or DEFAULT_WORK
         upper, order = anneal(instance, seed, ANNEALING_MOVES)
         upper = int(upper)
         actions: list[int] = tour_actions(instance, order).tolist()
         bound = first_bound(instance, upper)
         lower = bound.root
+        yield actions, min(lower, upper), _certificate(bound)
+        if by_table:
+            if not deadline.over():
+                yield _by_table(instance)
+            return
         done = 0
         for size, wanted in self.passes:
             # A pass expands about n / 2 times its width. Cut below the last one's, it would hardly help.
@@ -112,7 +150,19 @@ class ExactSolver:
             lower = max(lower, bound.root, result.lower)
             if result.actions is not None:
                 upper, actions = result.upper, result.actions
-        return actions, min(lower, upper)
+            yield actions, min(lower, upper), _certificate(bound)
+
+
+# Actions of a tour, a lower bound in units, and what proves it.
+_Found = tuple[list[int], int, Certificate]
+
+
+def _certificate(bound: Bound) -> Certificate:
+    prices = [0] * len(bound.order)
+    for k, price in zip(bound.order, bound.table.multipliers.tolist(), strict=True):
+        prices[k] = price
+    exact = tuple(sorted(bound.order[: bound.table.s]))
+    return Certificate(Proof.RELAXATION, bound.root, exact, tuple(prices))
 
 
 def _table_bytes(instance: Instance) -> int:
@@ -120,9 +170,9 @@ def _table_bytes(instance: Instance) -> int:
     return 4 * (m * m + n) << n
 
 
-def _by_table(instance: Instance) -> tuple[list[int], int]:
+def _by_table(instance: Instance) -> _Found:
     table = new_table(instance, len(instance.home))
     fill(instance, table)
     actions: NDArray[np.int64] = np.empty(2 * len(instance.home) + 2, np.int64)
     length, count = walk(instance, table, actions)
-    return actions[:count].tolist(), int(length)
+    return actions[:count].tolist(), int(length), Certificate(Proof.FULL_TABLE, int(length))

@@ -1,0 +1,39 @@
+"""What proves the lower bound of a plan, as a value that anybody can check."""
+
+import enum
+from dataclasses import dataclass
+
+
+class Proof(enum.Enum):
+    """How a lower bound was found.
+
+    EXHAUSTIVE: every order of visits was tried, or left out because it cannot be shorter.
+    FULL_TABLE: the cost-to-go of every set of objects left was computed.
+    RELAXATION: the same for a relaxed problem that keeps a subset of the objects exactly, with a price on each pick;
+        where the bound exceeds the relaxation's, a search left out only states that cannot lead to a shorter tour.
+    SPANNING_TREE: a tour connects all its locations.
+    """
+
+    EXHAUSTIVE = "exhaustive"
+    FULL_TABLE = "full-table"
+    RELAXATION = "relaxation"
+    SPANNING_TREE = "spanning-tree"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A claim about the shortest tour, in units of 0.1 mm and the metric of whole such units.
+
+    Attributes:
+        proof: How the bound was found.
+        root: What the proof gives without any search, units: the relaxation at the start of the tour, the length of
+            the spanning tree, the optimum by the table or by trying all. Up to here a checker can follow. Where a
+            plan's lower bound is higher, the rest is the word of the solver that its search was complete.
+        exact: Shipments that the relaxation keeps exactly, ascending.
+        multipliers: Price of picking each shipment in the relaxation, units.
+    """
+
+    proof: Proof
+    root: int
+    exact: tuple[int, ...] = ()
+    multipliers: tuple[int, ...] = ()
