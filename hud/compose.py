@@ -11,7 +11,7 @@ from hud import panels
 from hud.canvas import Patch, Rect
 from hud.errors import FrameError
 from hud.layout import Layout, arrange, pointer_rect
-from hud.minimap import draw_minimap
+from hud.minimap import Kind, draw_base, draw_mark, marks
 from hud.options.minimap import FLOORPLAN
 from hud.panels import Pen, Pictures
 from hud.state import HudState, MiniMap
@@ -70,6 +70,10 @@ class Compositor:
             if name == "message" and state.message is not None and state.message.opacity < 1.0:
                 patch = patch.faded(state.message.opacity)
             patch.lay_over(out, rect.x, rect.y)
+        if state.minimap is not None and layout.minimap is not None:
+            for mark in marks(layout.minimap, state.minimap, layout.unit):
+                stamp = self._stamp(mark.kind, mark.step, pen)
+                stamp.lay_over(out, mark.x, mark.y)
         return out
 
     def layout(self, state: HudState, width: int, height: int) -> Layout:
@@ -85,6 +89,9 @@ class Compositor:
         if state.pointer is None:
             return found
         return dataclasses.replace(found, pointer=pointer_rect(state.pointer.angle, found.free, found.unit))
+
+    def _stamp(self, kind: Kind, step: int, pen: Pen) -> Patch:
+        return self._patch(f"{kind} {step}", pen.unit, lambda pen: draw_mark(pen, kind, step), pen)
 
     def _patch(self, name: str, key: object, draw: Callable[[Pen], Patch], pen: Pen) -> Patch:
         known = self._patches.get(name)
@@ -143,7 +150,8 @@ def _part(name: str, rect: Rect, state: HudState, layout: Layout) -> tuple[objec
         counts = (state.delivered, state.total)
         return counts, lambda pen: panels.draw_progress(pen, rect, *counts)
     if name == "minimap" and (minimap := state.minimap) is not None:
-        return minimap, lambda pen: draw_minimap(pen, rect, minimap)
+        base = (minimap.picture, minimap.bounds)
+        return base, lambda pen: draw_base(pen, rect, *base)
     if name == "clock" and state.clock is not None:
         text = panels.clock_text(state.clock)
         return text, lambda pen: panels.draw_clock(pen, rect, text)
