@@ -1,4 +1,6 @@
-"""How fast the environment is: steps and resets per second on one core, with and without pixels.
+"""How fast the environment is: steps and resets per second of one core, with and without pixels.
+
+Times are those of the processor, so that what else runs on the machine matters little.
 
 python -m experiments.examples.environment_speed
 """
@@ -24,7 +26,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple[float, float]:
-    """Steps and simulated seconds per second of wall time, with random actions and 6 objects."""
+    """Steps and simulated seconds per second of one core, with random actions and 6 objects."""
     env = gymnasium.make("mjsim/Rearrange-v0", episodes=1, disable_env_checker=True, **options)
     env.action_space.seed(0)
     env.reset(seed=0)
@@ -33,32 +35,32 @@ def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple
     steps, simulated, spent = 0, 0.0, 0.0
     while spent < seconds:
         _, info = env.reset(seed=0)
-        started, over = time.perf_counter(), False
-        while not over and spent + time.perf_counter() - started < seconds:
+        started, over = time.process_time(), False
+        while not over and spent + time.process_time() - started < seconds:
             *_, terminated, truncated, info = env.step(env.action_space.sample())
             steps, over = steps + 1, terminated or truncated
-        spent += time.perf_counter() - started
+        spent += time.process_time() - started
         simulated += float(info["time"])
     env.close()
     return steps / spent, simulated / spent
 
 
 def seconds_per_reset(episodes: int | None, resets: int) -> float:
-    """Mean wall time of a reset, s; a number of episodes that come again, or new ones without end."""
+    """Mean processor time of a reset, s; a number of episodes that come again, or new ones without end."""
     env = gymnasium.make("mjsim/Rearrange-v0", episodes=episodes, disable_env_checker=True)
     for seed in range(episodes or 1):
         env.reset(seed=seed)
-    started = time.perf_counter()
+    started = time.process_time()
     for seed in range(1, resets + 1):
         env.reset(seed=seed)
-    spent = time.perf_counter() - started
+    spent = time.process_time() - started
     env.close()
     return spent / resets
 
 
 def main() -> None:
     """Measure and print."""
-    table = Table("observations", "steps/s", "simulated s/s")
+    table = Table("observations", "steps per core-second", "simulated s per core-second")
     for name, options in SETTINGS.items():
         steps, simulated = steps_per_second(options)
         table.add_row(name, f"{steps:.0f}", f"{simulated:.0f}")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsim.environments.dm_physics import physics_of
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.layout import HouseKit
 from mjsim.episode import Episode
@@ -29,7 +30,6 @@ class Stage:
     def __init__(self, world: World) -> None:
         self.world = world
         self._renderers: dict[tuple[int, int, str], Renderer] = {}
-        self._physics: Any = None
 
     def renderer(self, width: int, height: int, profile: str) -> Renderer:
         """A renderer of this size, made on first use.
@@ -47,14 +47,10 @@ class Stage:
         """What the episode's geoms belong to."""
         return Labels.of(self.world.scene)
 
-    @property
+    @cached_property
     def physics(self) -> Any:
         """The same state as a `dm_control.mujoco.Physics`, for dm_control's tools."""
-        if self._physics is None:
-            from dm_control import mujoco as dm_mujoco  # it loads a GL backend: only who asks for it pays
-
-            self._physics = dm_mujoco.Physics(dm_mujoco.wrapper.MjData(self.world.data))
-        return self._physics
+        return physics_of(self.world)
 
     def close(self) -> None:
         """Free the GL resources; again does nothing."""

@@ -5,6 +5,7 @@ import time
 import warnings
 from typing import Any, Protocol
 
+from mjsim.environments.dm_physics import physics_of
 from mjsim.environments.errors import ViewerError
 from mjsim.world import World
 
@@ -77,11 +78,9 @@ class _DmControlViewer:
         return self._renderer.pixels
 
     def _load_world(self, world: World) -> None:
-        from dm_control import mujoco as dm_mujoco
-
         self._release()
         self._world = world
-        physics = dm_mujoco.Physics(dm_mujoco.wrapper.MjData(world.data))
+        physics = physics_of(world)
         surface = self._render.Renderer(max_width=2048, max_height=2048)
         self._renderer = self._renderer_module.OffScreenRenderer(physics.model, surface)
         self._viewer = self._viewer_module.Viewer(self._viewport, self._window.mouse, self._window.keyboard)

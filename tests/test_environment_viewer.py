@@ -1,0 +1,130 @@
+"""The window, driven step by step, with stand-ins for dm_control's parts so that no display is needed."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mjsim.catalogue import Catalogue
+from mjsim.environments import viewer
+from mjsim.environments.errors import ViewerError
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.scene import compose
+from mjsim.world import World
+
+
+class Parts:
+    """dm_control's modules as far as the window uses them; notes what happens."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+        self.frames: list[Any] = []
+        self.shown: Any = None
+
+    def load(self) -> tuple[Any, Any, Any, Any]:
+        note = self.notes.append
+
+        def initialize(physics: Any, *_: Any, **__: Any) -> None:
+            self.shown = physics
+            note("initialize")
+
+        window = SimpleNamespace(
+            mouse=None,
+            keyboard=None,
+            shape=(320, 240),
+            update=lambda draw: self.frames.append(draw()),
+            close=lambda: note("close window"),
+        )
+        drawing = SimpleNamespace(
+            initialize=initialize,
+            zoom_to_scene=lambda: None,
+            render=lambda: None,
+            deinitialize=lambda: note("deinitialize"),
+        )
+        offscreen = SimpleNamespace(
+            pixels=np.zeros((240, 320, 3), np.uint8), release=lambda: note("release renderer")
+        )
+        return (
+            SimpleNamespace(RenderWindow=lambda *_: window),
+            SimpleNamespace(Renderer=lambda **_: None),
+            SimpleNamespace(Viewer=lambda *_: drawing),
+            SimpleNamespace(
+                Viewport=lambda *_: SimpleNamespace(set_size=lambda *_: None),
+                OffScreenRenderer=lambda *_: offscreen,
+            ),
+        )
+
+
+@pytest.fixture
+def parts(monkeypatch: pytest.MonkeyPatch) -> Parts:
+    made = Parts()
+    monkeypatch.setattr(viewer, "_load", made.load)
+    return made
+
+
+@pytest.fixture(scope="module")
+def worlds(small_catalogue: Catalogue) -> tuple[World, World]:
+    cube = PlacedObject("object_00", "solids", "cube", (1.6, 3.1), (1.6, 3.1, 0.0), (1.0, 0.0, 0.0, 0.0))
+    episode = Episode(
+        small_catalogue.name,
+        0,
+        StartPose(1.0, 3.2, 0.3),
+        (cube,),
+        ("crate", "tray"),
+        {"object_00": "crate"},
+    )
+    return World(compose(episode, small_catalogue)), World(compose(episode, small_catalogue))
+
+
+def test_a_world_is_loaded_once_and_drawn_every_time(parts: Parts, worlds: tuple[World, World]) -> None:
+    """The next episode takes the place of the last, whose resources are freed first."""
+    window = viewer.open_viewer(realtime=False)
+    first, second = worlds
+    window.show(first)
+    window.show(first)
+    assert parts.notes == ["initialize"]
+    assert np.shares_memory(parts.shown.data.qpos, first.data.qpos)
+    window.show(second)
+    assert parts.notes[1:] == ["deinitialize", "release renderer", "initialize"]
+    assert len(parts.frames) == 3
+    window.close()
+    window.close()
+    assert parts.notes[4:] == ["deinitialize", "release renderer", "close window"]
+    with pytest.raises(ViewerError, match="closed"):
+        window.show(first)
+
+
+def test_the_window_keeps_pace_with_the_simulation(
+    parts: Parts, worlds: tuple[World, World], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It waits for what is left of a control step after the work, and never after a reset."""
+    clock, waits = [100.0], []
+
+    def sleep(seconds: float) -> None:
+        waits.append(seconds)
+        clock[0] += seconds
+
+    monkeypatch.setattr(viewer, "time", SimpleNamespace(monotonic=lambda: clock[0], sleep=sleep))
+    window, world = viewer.open_viewer(), worlds[0]
+    world.reset()
+    window.show(world)
+    world.data.time, clock[0] = 0.04, clock[0] + 0.01
+    window.show(world)
+    world.data.time, clock[0] = 0.08, clock[0] + 0.09
+    window.show(world)
+    world.reset()
+    window.show(world)
+    assert waits == pytest.approx([0.03, 0.0])
+    assert len(parts.frames) == 4
+
+
+def test_a_window_that_cannot_be_made_is_named(parts: Parts, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any) -> Any:
+        raise RuntimeError("Failed to create window")
+
+    modules = parts.load()
+    modules[0].RenderWindow = refuse
+    monkeypatch.setattr(viewer, "_load", lambda: modules)
+    with pytest.raises(ViewerError, match="Failed to create window"):
+        viewer.open_viewer()
