@@ -1,16 +1,29 @@
 """An independent check that a plan solves a problem; it shares no code with the solvers."""
 
+from planner.bound_checker import proven_bound
 from planner.errors import ProblemError
 from planner.plan import Plan, Status, VisitKind
 from planner.problem import RoutingProblem
 
 
-def check(problem: RoutingProblem, plan: Plan, tolerance: float = 1e-6) -> None:
-    """Replay a plan against the constraints of equation 1 (PAPER section 2).
+def check(problem: RoutingProblem, plan: Plan, tolerance: float = 1e-6) -> float:
+    """Replay a plan against the constraints of equation 1 (PAPER section 2), then follow its proof.
+
+    Feasibility and cost are verified for every plan. Of the lower bound, what :func:`proven_bound` can derive anew
+    is; where the returned number is lower than `plan.lower_bound`, the rest is the solver's word: a search that
+    says it was complete, or a problem too large for the checker.
+
+    Args:
+        problem: What the plan claims to solve.
+        plan: The plan.
+        tolerance: Of lengths, m.
+
+    Returns:
+        No tour is shorter than this, m, as far as this check could see for itself.
 
     Raises:
         ProblemError: A visit that is impossible or repeated, an object left over, a wrong cost, a lower bound
-            above the cost, or OPTIMAL with a gap.
+            above the cost, OPTIMAL with a gap, or a certificate that claims more than it proves.
     """
     loose = set(range(len(problem.shipments)))
     shipped: set[int] = set()
@@ -46,6 +59,7 @@ def check(problem: RoutingProblem, plan: Plan, tolerance: float = 1e-6) -> None:
             f"never done: {len(loose)} picks, {len(shipped) + len(onboard)} places of carried ones"
         )
     _check_numbers(plan, cost, tolerance)
+    return proven_bound(problem, plan)
 
 
 def _check_numbers(plan: Plan, cost: float, tolerance: float) -> None:
