@@ -10,7 +10,7 @@ from hud.errors import HudError
 from mjsim.errors import MjsimError
 from planner.errors import PlannerError
 
-COMMANDS = ("run", "replay", "batch", "plan", "house", "gallery", "doctor")
+COMMANDS = ("run", "replay", "batch", "plan", "house", "gallery", "bench", "doctor")
 USAGE_ERROR = 2
 INTERRUPTED = 130
 

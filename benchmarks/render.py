@@ -1,0 +1,273 @@
+"""Frames per second and core by size and profile, against raw `mjr_render` and against MuJoCo's default quality.
+
+Everything is measured in one run on the same views of the same disorganized apartment, interleaved, so that the ratios
+hold on a busy machine as well. With a software rasteriser times are CPU times of this process, else wall times.
+"""
+
+import dataclasses
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from experiments.conditions import TaskBoard
+from experiments.house import House
+from hud.compose import Compositor
+from hud.conditions import condition
+from hud.state import HudState
+from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info, render_pictures
+from mjsim.render.cameras import View
+from mjsim.render.context import current_context
+from mjsim.render.markers import add_markers
+from mjsim.scene import Scene, compose
+from mjsim.world import World
+
+SIZES = ((320, 240), (640, 480), (1280, 720))
+REPEATS = {"draft": 5, "fast": 7, "quality": 1}
+SLOW_VIEWS = 2  # views that slow settings are measured on
+FOVY = 1.2
+TARGETS = (
+    ("fast 640x480 with HUD over raw mjr_render", "with_hud_ratio", "<=", 1.15),
+    ("MuJoCo's default quality over fast 640x480", "default_over_fast", ">=", 20.0),
+    ("HUD drawing, ms per frame", "hud_steady_ms", "<=", 1.0),
+)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Subject:
+    """What is drawn: a scene, views of it, and what the glasses show."""
+
+    scene: Scene
+    data: Any
+    poses: tuple[CameraPose, ...]
+    state: HudState
+    compositor: Compositor
+    clock: Callable[[], float]
+
+
+def measure() -> dict[str, Any]:
+    """Run the benchmark; everything in it can be written as JSON."""
+    gl = gl_info()
+    subject = make_subject(time.process_time if gl.software else time.perf_counter)
+    rows = [
+        measure_profile(subject, profile, size)
+        for size in SIZES
+        for profile in PROFILES.values()
+        if profile.name != "quality" or not gl.software or size == (640, 480)
+    ]
+    hud = measure_hud(subject)
+    default = measure_default(subject, shadows_of_all_lights=True)
+    authored = measure_default(subject, shadows_of_all_lights=False)
+    fast = next(r for r in rows if (r["profile"], r["width"]) == ("fast", 640))
+    headline = {
+        "with_hud_ratio": (fast["ms"] + hud["steady_ms"]) / fast["raw_ms"],
+        "default_over_fast": default["ms"] / default["fast_ms"],
+        "authored_over_fast": authored["ms"] / authored["fast_ms"],
+        "hud_steady_ms": hud["steady_ms"],
+    }
+    return {
+        "benchmark": "render",
+        "renderer": gl.renderer,
+        "gl": gl.version,
+        "clock": "CPU time" if gl.software else "wall time",
+        "cores": os.cpu_count(),
+        "geoms": int(subject.scene.model.ngeom),
+        "views": len(subject.poses),
+        "frames": rows,
+        "default_quality": default,
+        "default_quality_authored_lights": authored,
+        "hud": hud,
+        **headline,
+    }
+
+
+def lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result for people."""
+    yield f"{result['renderer']}, {result['gl']}; {result['clock']}, {result['views']} views, {result['geoms']} geoms"
+    yield f"{'profile':10}{'size':>12}{'ms':>9}{'fps/core':>10}{'raw ms':>9}{'to raw':>8}"
+    for row in result["frames"]:
+        size = f"{row['width']}x{row['height']}"
+        yield (
+            f"{row['profile']:10}{size:>12}{row['ms']:9.2f}{1e3 / row['ms']:10.1f}"
+            f"{row['raw_ms']:9.2f}{row['ratio']:8.2f}"
+        )
+    yield "mujoco.Renderer, 4x multisampling, shadow maps of 4096, 640x480:"
+    default, authored = result["default_quality"], result["default_quality_authored_lights"]
+    ratio = result["default_over_fast"]
+    yield f"  every light casts shadows, MuJoCo's default: {default['ms']:.0f} ms, {ratio:.1f} x fast"
+    yield f"  only those of the house that do: {authored['ms']:.0f} ms, {result['authored_over_fast']:.1f} x fast"
+    hud = result["hud"]
+    yield f"HUD: {hud['steady_ms']:.2f} ms per frame, {hud['first_ms']:.1f} ms the first time"
+    for label, key, relation, bound in TARGETS:
+        holds = result[key] <= bound if relation == "<=" else result[key] >= bound
+        yield f"{label}: {result[key]:.2f} ({relation} {bound:g}: {'holds' if holds else 'MISSED'})"
+
+
+def make_subject(clock: Callable[[], float]) -> Subject:
+    """Twelve objects in the apartment, seen from the start and from the middle of every room."""
+    house = House.load("apartment")
+    scene = compose(house.sample_episode(objects=12, seed=7), house.catalogue)
+    world = World(scene)
+    seen = world.reset()
+    path = house.geodesics.shortest_path(seen.position, seen.object_positions[0, :2]).points
+    view = TaskBoard(house, scene.episode, seen.object_names).view(
+        seen, plan=[("pick", seen.object_names[0])], path=path
+    )
+    places = [seen.position, *house.rooms.centers]
+    turns = [seen.heading, *np.random.default_rng(0).uniform(0.0, math.tau, len(house.rooms.centers))]
+    poses = []
+    for place, turn in zip(places, turns, strict=True):
+        eye = np.array([place[0], place[1], 1.6])
+        gaze = np.array([math.cos(turn), math.sin(turn), -0.3])
+        poses.append(CameraPose.looking_at(eye, eye + gaze, FOVY))
+    compositor = Compositor(render_pictures(house.catalogue))
+    return Subject(scene, world.data, tuple(poses), condition("optimal")(view), compositor, clock)
+
+
+def measure_profile(subject: Subject, profile: RenderProfile, size: tuple[int, int]) -> dict[str, Any]:
+    """Milliseconds of a frame with markers, and of raw `mjr_render` at the same drawn size and settings."""
+    width, height = size
+    poses = subject.poses if profile.name != "quality" else subject.poses[:SLOW_VIEWS]
+    ours: list[float] = []
+    raw: list[float] = []
+    with (
+        Renderer(subject.scene.model, width=width, height=height, profile=profile) as renderer,
+        raw_renderer(subject, profile, size) as draw_raw,
+    ):
+        for pose in poses:
+            pairs = [
+                (
+                    timed(subject.clock, lambda: renderer.rgb(subject.data, pose, subject.state.markers)),  # noqa: B023
+                    timed(subject.clock, lambda: draw_raw(pose)),  # noqa: B023
+                )
+                for _ in range(REPEATS[profile.name] + 1)
+            ][1:]
+            mine, theirs = np.median(pairs, axis=0)
+            ours.append(float(mine))
+            raw.append(float(theirs))
+    ms, raw_ms = 1e3 * float(np.mean(ours)), 1e3 * float(np.mean(raw))
+    return {
+        "profile": profile.name,
+        "width": width,
+        "height": height,
+        "ms": ms,
+        "fps_per_core": 1e3 / ms,
+        "raw_ms": raw_ms,
+        "ratio": ms / raw_ms,
+    }
+
+
+@contextmanager
+def raw_renderer(
+    subject: Subject, profile: RenderProfile, size: tuple[int, int]
+) -> Iterator[Callable[[CameraPose], None]]:
+    """Draws the whole scene with the markers by `mjr_render` alone: no update, no reading, no reduction."""
+    model = subject.scene.model
+    drawn = tuple(round(side * profile.supersampling) for side in size)
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 1000)
+    option = mujoco.MjvOption()
+    option.geomgroup[:] = [1, 1, 1, 0, 0, 0]
+    option.flags[mujoco.mjtVisFlag.mjVIS_TEXTURE] = profile.textures
+    camera, category = mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL
+    mujoco.mjv_updateScene(model, subject.data, option, None, camera, category, scene)
+    scene.flags[:] = 0
+    for flag, on in (
+        (mujoco.mjtRndFlag.mjRND_CULL_FACE, True),
+        (mujoco.mjtRndFlag.mjRND_SHADOW, profile.shadow_size > 0),
+        (mujoco.mjtRndFlag.mjRND_REFLECTION, profile.reflections),
+        (mujoco.mjtRndFlag.mjRND_SKYBOX, profile.skybox),
+    ):
+        scene.flags[flag] = on
+    add_markers(scene, subject.state.markers)
+    with current_context(), quality_of(model, drawn, profile.samples, profile.shadow_size):
+        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
+    rectangle = mujoco.MjrRect(0, 0, *drawn)
+
+    def draw(pose: CameraPose) -> None:
+        View.of(pose).aim(scene)
+        with current_context():
+            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
+            mujoco.mjr_render(rectangle, scene, context)
+            mujoco.mjr_finish()
+
+    yield draw
+    with current_context():
+        context.free()
+
+
+def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[str, Any]:
+    """A frame of 640 x 480 by `mujoco.Renderer` as MuJoCo's defaults have it, and by profile `fast`."""
+    model = subject.scene.model
+    authored = model.light_castshadow.copy()
+    if shadows_of_all_lights:
+        model.light_castshadow[:] = 1
+    with quality_of(model, (640, 480), samples=4, shadow_size=4096), off_screen():
+        default = mujoco.Renderer(model, 480, 640)
+    option = mujoco.MjvOption()
+    theirs: list[float] = []
+    ours: list[float] = []
+    with Renderer(model) as fast:
+        for pose in subject.poses[:SLOW_VIEWS]:
+            default.update_scene(subject.data, scene_option=option)
+            View.of(pose).aim(default.scene)
+            default.render()
+            fast.rgb(subject.data, pose)
+            theirs.append(timed(subject.clock, default.render))
+            ours.append(min(timed(subject.clock, lambda: fast.rgb(subject.data, pose)) for _ in range(5)))  # noqa: B023
+    default.close()
+    model.light_castshadow[:] = authored
+    return {"ms": 1e3 * float(np.mean(theirs)), "fast_ms": 1e3 * float(np.mean(ours))}
+
+
+def measure_hud(subject: Subject, frames: int = 200) -> dict[str, Any]:
+    """Milliseconds of laying the HUD over a frame of 640 x 480, while its clock runs at 25 frames per second."""
+    frame = np.zeros((480, 640, 3), np.uint8)
+    state = subject.state
+
+    def draw(number: int) -> float:
+        shown = dataclasses.replace(state, clock=number / 25.0)
+        return timed(subject.clock, lambda: subject.compositor.compose(frame, shown))
+
+    first = draw(0)
+    steady = [draw(number) for number in range(1, frames)]
+    return {"first_ms": 1e3 * first, "steady_ms": 1e3 * float(np.mean(steady))}
+
+
+@contextmanager
+def off_screen() -> Iterator[None]:
+    """Let `mujoco.Renderer` make EGL contexts, whatever MUJOCO_GL was when MuJoCo was imported."""
+    from mujoco import egl  # only now, when the driver is known to work
+
+    backend = sys.modules[mujoco.Renderer.__module__].gl_context  # type: ignore[attr-defined]
+    kept = backend.GLContext
+    backend.GLContext = egl.GLContext
+    try:
+        yield
+    finally:
+        backend.GLContext = kept
+
+
+@contextmanager
+def quality_of(model: Any, size: tuple[int, ...], samples: int, shadow_size: int) -> Iterator[None]:
+    """Lend a model buffer sizes, which contexts read when they are made."""
+    general, quality = model.vis.global_, model.vis.quality
+    kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
+    general.offwidth, general.offheight = size
+    quality.offsamples, quality.shadowsize = samples, shadow_size
+    try:
+        yield
+    finally:
+        general.offwidth, general.offheight, quality.offsamples, quality.shadowsize = kept
+
+
+def timed(clock: Callable[[], float], work: Callable[[], Any]) -> float:
+    """Seconds that `work` takes."""
+    start = clock()
+    work()
+    return clock() - start

@@ -1,0 +1,54 @@
+"""Benchmarks are found in a checkout, and said to be there alone; the render benchmark reports what it should."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from experiments.cli import main
+from experiments.commands.bench import benchmark, benchmark_names
+from experiments.errors import ConfigError
+
+
+def test_the_benchmarks_of_the_checkout_are_found() -> None:
+    assert "render" in benchmark_names()
+    for name in benchmark_names():
+        assert benchmark(name).__doc__
+
+
+def test_an_installed_package_says_where_benchmarks_live(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="source checkout"):
+        benchmark("render", tmp_path / "benchmarks")
+
+
+def test_an_unknown_benchmark_is_refused_with_the_choices(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "speed"]) == 2
+    assert "no benchmark 'speed'; there are" in capsys.readouterr().err
+
+
+def test_a_module_that_measures_nothing_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "empty.py").write_text("x = 1\n", encoding="utf-8")
+    (tmp_path / "good.py").write_text(
+        "def measure(): return {'n': 1}\ndef lines(result): yield str(result['n'])\n", encoding="utf-8"
+    )
+    assert benchmark_names(tmp_path) == ("empty", "good")
+    assert list(benchmark("good", tmp_path).lines({"n": 1})) == ["1"]
+    with pytest.raises(ConfigError, match=r"empty\.py is no benchmark"):
+        benchmark("empty", tmp_path)
+
+
+def test_the_render_benchmark_measures_positive_times_and_judges_them() -> None:
+    module = benchmark("render")
+    subject = module.make_subject(time.process_time)
+    row = module.measure_profile(subject, module.PROFILES["draft"], (160, 120))
+    assert row["ms"] > 0 and row["ratio"] == pytest.approx(row["ms"] / row["raw_ms"])
+    hud = module.measure_hud(subject, frames=5)
+    assert hud["steady_ms"] > 0 and hud["first_ms"] > 0
+    quality = {"ms": 400.0, "fast_ms": 20.0}
+    result = {
+        "renderer": "r", "gl": "v", "clock": "CPU time", "views": 9, "geoms": 3, "frames": [row], "hud": hud,
+        "default_quality": quality, "default_quality_authored_lights": quality, "authored_over_fast": 20.0,
+        "with_hud_ratio": 1.2, "default_over_fast": 20.0, "hud_steady_ms": 0.5,
+    }  # fmt: skip
+    verdicts = [line.rpartition(": ")[2].rstrip(")") for line in module.lines(result)][-3:]
+    assert verdicts == ["MISSED", "holds", "holds"]
