@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 from experiments.errors import ExperimentError
 from hud.errors import HudError
-from mjsim.errors import MjsimError
+from mjsim.errors import MjsimError, PhysicsError
 from planner.errors import PlannerError
 
 COMMANDS = ("run", "replay", "batch", "plan", "house", "gallery", "bench", "doctor")
+FAILED = 1
 USAGE_ERROR = 2
 INTERRUPTED = 130
 
@@ -59,6 +60,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser(command).parse_args(words)
     try:
         return int(arguments.run(arguments))
+    except PhysicsError as error:
+        print(f"mjsim: {error}", file=sys.stderr)
+        return FAILED
     except (ExperimentError, MjsimError, PlannerError, HudError) as error:
         print(f"mjsim: {error}", file=sys.stderr)
         return USAGE_ERROR

@@ -114,7 +114,6 @@ def test_the_same_command_twice_gives_the_same_bytes(tmp_path):
         records.RECORDING,
         records.PLAN,
         records.TOPDOWN,
-        records.VIDEO,
     ):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
     metrics = [read_json(tmp_path / name / records.METRICS) for name in ("one", "two")]

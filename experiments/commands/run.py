@@ -32,7 +32,7 @@ Run one trial: a simulated person tidies a disorganized apartment under an assis
   events.jsonl     everything that happened          plan.json      every plan that was made
   trajectory.npz   poses and actions, 25 per second  topdown.png    floor plan with planned and walked path
   video.mp4        what the person saw
-Equal options and seeds give equal files."""
+Equal options and seeds give equal frames and files (but for the wall time in metrics.json)."""
 
 
 def add_parser(commands: Any) -> None:
