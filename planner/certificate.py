@@ -29,7 +29,7 @@ class Certificate:
         root: What the proof gives without any search, units: the relaxation at the start of the tour, the length of
             the spanning tree, the optimum by the table or by trying all. Up to here a checker can follow. Where a
             plan's lower bound is higher, the rest is the word of the solver that its search was complete.
-        exact: Shipments that the relaxation keeps exactly, ascending.
+        exact: Shipments that the relaxation keeps exactly, those first that matter most.
         multipliers: Price of picking each shipment in the relaxation, units.
     """
 

@@ -84,15 +84,23 @@ class ExactSolver:
                 best = plan
                 yield plan
 
+    def applies(self, problem: RoutingProblem, metric: NDArray[np.int64]) -> bool:
+        """Whether table and search apply: capacity two, up to 40 objects, true distances; `metric` is their closure."""
+        n = len(problem.shipments)
+        small = n <= 40 and int(metric.max()) * (2 * n + 2) <= LONGEST
+        return problem.capacity == 2 and small and is_metric(problem.distances, metric)
+
+    def table_fits(self, instance: Instance) -> bool:
+        """Whether the full table is small enough."""
+        return _table_bytes(instance) <= self.table_bytes
+
     def _plans(
         self, problem: RoutingProblem, seed: int, limit: SolveLimit, *, table_at_once: bool
     ) -> Iterator[Plan]:
         """Ever better plans; only one where a table is filled at once."""
         started = time.perf_counter()
         metric = integer_metric(problem.distances)
-        n = len(problem.shipments)
-        special = problem.capacity != 2 or n > 40 or int(metric.max()) * (2 * n + 2) > LONGEST
-        if special or not is_metric(problem.distances, metric):
+        if not self.applies(problem, metric):
             if not table_at_once:
                 yield GreedySolver().solve(problem)
             yield self._general(problem, metric, seed, limit, started)
@@ -161,8 +169,7 @@ def _certificate(bound: Bound) -> Certificate:
     prices = [0] * len(bound.order)
     for k, price in zip(bound.order, bound.table.multipliers.tolist(), strict=True):
         prices[k] = price
-    exact = tuple(sorted(bound.order[: bound.table.s]))
-    return Certificate(Proof.RELAXATION, bound.root, exact, tuple(prices))
+    return Certificate(Proof.RELAXATION, bound.root, bound.order[: bound.table.s], tuple(prices))
 
 
 def _table_bytes(instance: Instance) -> int:

@@ -1,0 +1,160 @@
+"""Cost of the rest of a task after each possible next visit: all from one full table, or one exhaustive pass."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.exact.deadline import Deadline
+from planner.exact.instance import Instance
+from planner.exact.multipliers import Bound
+from planner.exact.relaxation import INFINITE, Table, after_pick, fill, new_table, row_without
+from planner.exact.search import PLACE_BITS, Nodes, expand, new_nodes, offer_roots, slot_of
+from planner.kernels import kernel
+
+FIRST_ROOM = 1 << 12
+UNLIMITED = 1 << 40  # states of a layer
+
+# Length of the rest of the task, units, by next action: k >= 0 picks object k, -1 - k places onboard object k.
+Costs = dict[int, int]
+
+
+def costs_by_table(instance: Instance) -> Costs:
+    """Exact costs of all next actions, by filling the full table."""
+    table = new_table(instance, len(instance.home))
+    fill(instance, table)
+    return costs_in(instance, table)
+
+
+def costs_in(instance: Instance, table: Table) -> Costs:
+    """Costs of all next actions as a table has them; with a relaxed one these are lower bounds, prices included."""
+    carried = [int(b) for b in instance.carried]
+    row = table.bin.shape[0] - 1
+    costs = {}
+    for k, b in enumerate(carried):
+        other = carried[1 - k] if len(carried) == 2 else b
+        costs[-1 - k] = int(instance.root_bin[b]) + int(table.bin[row, b, other])
+    if len(carried) < 2:
+        for j in range(len(instance.home)):
+            left = row_without(row, j, table.s)
+            if carried:
+                rest = after_pick(instance, table, left, j, carried[0])
+            else:
+                rest = int(table.object[left, j]) + int(table.multipliers[j])
+            costs[j] = int(instance.root[j]) + rest
+    return costs
+
+
+def costs_by_pass(bound: Bound, longest: int, most_states: int, deadline: Deadline) -> Costs | None:
+    """Costs of all next actions, exact where at most `longest`, else some number greater than it.
+
+    Every state on a tour of at most that length is visited, layer by layer; a sweep back finds the way on from each.
+
+    Args:
+        bound: Bound of the cost-to-go.
+        longest: Greatest length of interest, units.
+        most_states: Give up beyond so many states.
+        deadline: Give up when it is over.
+
+    Returns:
+        Costs by object number of the problem, or None if the pass was given up.
+    """
+    instance, table = bound.instance, bound.table
+    n = len(bound.order)
+    limit = longest + 1 + int(table.multipliers.sum())
+    layers: list[Nodes] = []
+    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
+    offer_roots(instance, table, here, after, limit)
+    states = 0
+    for _ in range(n + 1):
+        here, after, *_rest = expand(instance, table, here, after, limit, UNLIMITED)
+        layers.append(here)
+        states += int(here.size[0])
+        if states > most_states or deadline.over():
+            return None
+        here, after = after, new_nodes(FIRST_ROOM)
+    rest = [np.zeros(0, np.int32)] * (n + 1)
+    beyond, nothing = here, np.zeros(0, np.int32)
+    for k in range(n, -1, -1):
+        after, after_rest = (layers[k + 1], rest[k + 1]) if k < n else (beyond, nothing)
+        rest[k] = sweep(instance, layers[k], after, after_rest)
+    carried = [int(b) for b in instance.carried]
+    first = (layers[1], rest[1]) if n else (beyond, nothing)
+    found = root_costs(instance, layers[0], rest[0], *first)
+    names = [-1 - k for k in range(len(carried))] + list(bound.order if len(carried) < 2 else ())
+    return {name: int(cost) for name, cost in zip(names, found, strict=True)}
+
+
+@kernel
+def look_up(nodes: Nodes, rest: NDArray[np.int32], left: int, place: int) -> int:
+    """Length of the rest of the task from a state; `INFINITE` if it is not among the nodes."""
+    k = nodes.slots[slot_of(nodes, (left << PLACE_BITS) | place)]
+    return int(rest[k]) if k >= 0 else INFINITE
+
+
+@kernel
+def after_second(
+    inst: Instance, after: Nodes, after_rest: NDArray[np.int32], left: int, j: int, d: int
+) -> int:
+    """Length of the rest from object j, just picked, with one for d in hand too; `left` no longer has j."""
+    m = inst.bins.shape[0]
+    c = inst.home[j]
+    first = inst.to_bin[j, d] + look_up(after, after_rest, left, d * m + c)
+    second = inst.to_bin[j, c] + look_up(after, after_rest, left, c * m + d)
+    return int(min(first, second))
+
+
+@kernel
+def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Length of the rest of the task from each state of a layer, given those of the next layer."""
+    n, m = inst.to_bin.shape
+    size = here.size[0]
+    rest = np.full(size, INFINITE, np.int32)
+    for k in range(size):  # at a bin with empty hands
+        place = here.key[k] & ((1 << PLACE_BITS) - 1)
+        b, left = place // m, here.key[k] >> PLACE_BITS
+        if place >= m * m or b != place % m:
+            continue
+        best = INFINITE if left else 0
+        for i in range(n):
+            if (left >> i) & 1:
+                best = min(best, inst.from_bin[b, i] + look_up(after, after_rest, left ^ (1 << i), m * m + i))
+        rest[k] = best
+    for k in range(size):  # with one in hand: drop it, or pick another
+        place = here.key[k] & ((1 << PLACE_BITS) - 1)
+        i, b, d = place - m * m, place // m, place % m
+        left = here.key[k] >> PLACE_BITS
+        if i < 0 and b == d:
+            continue
+        if i >= 0:
+            d, legs, home_leg = inst.home[i], inst.between[i], inst.to_bin[i, inst.home[i]]
+        else:
+            legs, home_leg = inst.from_bin[b], inst.bins[b, d]
+        best = home_leg + look_up(here, rest, left, d * m + d)
+        for j in range(n):
+            if (left >> j) & 1:
+                best = min(best, legs[j] + after_second(inst, after, after_rest, left ^ (1 << j), j, d))
+        rest[k] = min(best, INFINITE)
+    return rest
+
+
+@kernel
+def root_costs(
+    inst: Instance, here: Nodes, rest: NDArray[np.int32], after: Nodes, after_rest: NDArray[np.int32]
+) -> NDArray[np.int64]:
+    """Length of the task by next action: places of what is carried, then picks if a hand is free."""
+    n, m = inst.to_bin.shape
+    count = inst.carried.size
+    everything = (1 << n) - 1
+    costs = np.empty(count + (n if count < 2 else 0), np.int64)
+    for k in range(count):
+        b = inst.carried[k]
+        other = inst.carried[count - 1 - k] if count == 2 else b
+        costs[k] = inst.root_bin[b] + look_up(here, rest, everything, b * m + other)
+    if count < 2:
+        for j in range(n):
+            left = everything ^ (1 << j)
+            if count == 1:
+                then = after_second(inst, after, after_rest, left, j, inst.carried[0])
+            else:
+                then = look_up(after, after_rest, left, m * m + j)
+            costs[count + j] = inst.root[j] + then
+    return costs
