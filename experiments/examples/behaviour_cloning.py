@@ -75,6 +75,7 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
         The Stable-Baselines3 model, and its share of delivered objects in unseen episodes before and after.
     """
     torch.manual_seed(settings.seed)
+    torch.set_num_threads(1)  # the network is small: more threads wait for each other
     rng = np.random.default_rng(settings.seed)
     house, environment = House.load(), make_environment(settings.episodes, 30.0)
     model = PPO(
