@@ -20,16 +20,52 @@ from experiments.trial import TrialConfig, prepare_session
 from mjsim.files import replacing
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.scene import compose
+from mjsim.visibility import visible_objects
 from mjsim.world import World
 
 Image = NDArray[np.uint8]
-Moment = Callable[[Observation, Mapping[str, NDArray[np.float64]]], bool]
 
-APPROACHING = 2.4  # m to an object: nearer ones lie below the view of somebody who looks straight ahead
-AT_A_BIN = 2.2  # m to the middle of a bin
-SETTLED = 2.0  # s; what lies near the start is not approached yet
+APPROACHING = (
+    2.3,
+    3.3,
+)  # m to an object: nearer ones lie below the view of somebody who looks straight ahead
+AT_A_BIN = (0.0, 2.2)  # m to the middle of a bin
+SETTLED = 1.0  # s; what lies near the start is not approached yet
 FACING = math.radians(20.0)
 PATIENCE = 240.0  # s of simulated time until every moment must have come
+
+
+@dataclass(frozen=True, eq=False)
+class Now:
+    """A moment of a trial.
+
+    Attributes:
+        world: The physics.
+        observation: What there is.
+        targets: Object name -> middle of its bin, m, shape (3,).
+    """
+
+    world: World
+    observation: Observation
+    targets: Mapping[str, NDArray[np.float64]]
+
+    def ahead(self, place: NDArray[np.float64], distance: tuple[float, float]) -> bool:
+        """Whether the person faces a place within a range of distances, m."""
+        offset = place[:2] - self.observation.position
+        turn = math.remainder(math.atan2(offset[1], offset[0]) - self.observation.heading, math.tau)
+        return distance[0] < float(np.hypot(*offset)) < distance[1] and abs(turn) < FACING
+
+    def walking(self) -> bool:
+        """Whether the person is on the way."""
+        return float(np.linalg.norm(self.observation.velocity)) > 0.5
+
+    def visible(self) -> tuple[str, ...]:
+        """Objects in view."""
+        seen = self.observation
+        return visible_objects(self.world.scene, self.world.data, seen.eye, seen.heading, seen.pitch)
+
+
+Moment = Callable[[Now], bool]
 
 
 @dataclass(frozen=True)
@@ -39,7 +75,7 @@ class Shot:
     Attributes:
         name: Of the picture.
         trial: The trial.
-        moment: Judges from the observation and each object's target position, m.
+        moment: Whether to take it now.
     """
 
     name: str
@@ -64,37 +100,39 @@ class _Photographer:
 
     def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
         """Take the pictures whose moment this is."""
-        now = [shot for shot in self._due if shot.moment(observation, self._targets)]
-        if now:
+        now = Now(world, observation, self._targets)
+        come = [shot for shot in self._due if shot.moment(now)]
+        if come:
             frame = self._glasses.frame(world, observation, assistant)
-            self.taken |= {shot.name: frame for shot in now}
-            self._due = [shot for shot in self._due if shot not in now]
+            self.taken |= {shot.name: frame for shot in come}
+            self._due = [shot for shot in self._due if shot not in come]
         if not self._due:
             raise _Done
 
 
 def after(seconds: float) -> Moment:
     """The first moment from a simulated time on, s."""
-    return lambda observation, _: observation.time >= seconds
+    return lambda now: now.observation.time >= seconds
 
 
-def approaching(observation: Observation, targets: Mapping[str, NDArray[np.float64]]) -> bool:  # noqa: ARG001
-    """Hands empty, and an object lies close ahead."""
-    places = [
-        p for n, p in _positions(observation).items() if n in observation.names_with(ObjectStatus.LOOSE)
-    ]
-    near = any(_ahead(observation, place, APPROACHING) for place in places)
-    return observation.time > SETTLED and not observation.carried and _walking(observation) and near
+def approaching(now: Now) -> bool:
+    """Hands not full, and an object in view ahead."""
+    seen = now.observation
+    if len(seen.carried) > 1 or seen.busy or seen.time < SETTLED:
+        return False
+    places = dict(zip(seen.object_names, seen.object_positions, strict=True))
+    near = [n for n in seen.names_with(ObjectStatus.LOOSE) if now.ahead(places[n], APPROACHING)]
+    return bool(near) and not set(near).isdisjoint(now.visible())
 
 
-def carrying_two(observation: Observation, targets: Mapping[str, NDArray[np.float64]]) -> bool:  # noqa: ARG001
-    """Both hands full and at rest, on the way."""
-    return len(observation.carried) == 2 and not observation.busy and _walking(observation)
+def carrying_two(now: Now) -> bool:
+    """Both hands full, on the way."""
+    return len(now.observation.carried) == 2 and not now.observation.busy and now.walking()
 
 
-def at_a_bin(observation: Observation, targets: Mapping[str, NDArray[np.float64]]) -> bool:
+def at_a_bin(now: Now) -> bool:
     """The bin of something carried is close ahead."""
-    return any(_ahead(observation, targets[name], AT_A_BIN) for name in observation.carried)
+    return any(now.ahead(now.targets[name], AT_A_BIN) for name in now.observation.carried)
 
 
 SITUATIONS: Mapping[str, tuple[str, Moment]] = {
@@ -173,20 +211,6 @@ def save_png(path: Path, rgb: Image) -> None:
     """Write an RGB image of shape (height, width, 3), whole or not at all."""
     with replacing(path) as temporary:
         cv2.imwrite(str(temporary), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
-
-
-def _positions(observation: Observation) -> dict[str, NDArray[np.float64]]:
-    return dict(zip(observation.object_names, observation.object_positions, strict=True))
-
-
-def _walking(observation: Observation) -> bool:
-    return float(np.linalg.norm(observation.velocity)) > 0.5
-
-
-def _ahead(observation: Observation, place: NDArray[np.float64], reach: float) -> bool:
-    offset = place[:2] - observation.position
-    turn = math.atan2(offset[1], offset[0]) - observation.heading
-    return float(np.hypot(*offset)) < reach and abs(math.remainder(turn, math.tau)) < FACING
 
 
 def _write(image: Image, text: str, x: int, y: int, size: int) -> None:
