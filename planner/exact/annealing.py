@@ -179,19 +179,30 @@ def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArr
 
 @kernel
 def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64]]:
-    """Simulated annealing from the order of the indices.
+    """Simulated annealing from the order of the indices; see `anneal_from`."""
+    return anneal_from(inst, seed, moves, np.arange(inst.home.size), HOT, COLD)
+
+
+@kernel
+def anneal_from(
+    inst: Instance, seed: int, moves: int, first: NDArray[np.int64], hot: float, cold: float
+) -> tuple[int, NDArray[np.int64]]:
+    """Simulated annealing.
 
     Args:
         inst: The instance.
         seed: Of the random moves.
         moves: How many to try.
+        first: Order of picks to start from, (n,).
+        hot: Temperature at the beginning, mean legs.
+        cold: Temperature at the end, mean legs.
 
     Returns:
         Length of the best tour, and its order of picks (n,).
     """
     n, m = inst.to_bin.shape
     state = np.array([seed], np.uint64)
-    order = np.arange(n)
+    order = first.copy()
     costs = np.empty((n + 1, m + 1), np.int32)
     trial_costs = np.empty((n + 1, m + 1), np.int32)
     cost = decode(inst, order, 0, costs)
@@ -200,8 +211,8 @@ def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64
         return best, best_order
     candidate = order.copy()
     legs = cost / (2.0 * n)
-    temperature = HOT * legs
-    cooling = (COLD / HOT) ** (1.0 / moves)
+    temperature = hot * legs
+    cooling = (cold / hot) ** (1.0 / moves)
     for _ in range(moves):
         temperature *= cooling
         low = propose(order, candidate, state)

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.certificate import Certificate, Proof
-from planner.exact.annealing import anneal, tour_actions
+from planner.errors import ProblemError
+from planner.exact.annealing import anneal, anneal_from, tour_actions
 from planner.exact.beam import beam_pass
 from planner.exact.deadline import Deadline
 from planner.exact.general import best_first
 from planner.exact.instance import Instance, make_instance, to_visits
 from planner.exact.multipliers import Bound, first_bound, grown
 from planner.exact.relaxation import fill, new_table, walk
+from planner.exact.warm import Warm, warm_bound
 from planner.greedy_solver import GreedySolver
 from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
@@ -24,7 +26,11 @@ from planner.solver import SolveLimit
 from planner.tour import integer_distances, integer_metric, is_metric, make_plan
 
 TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
+SMALL_TABLE = 1 << 22  # bytes; filled in some 20 ms, so there is no need of a plan before it
 ANNEALING_MOVES = 20_000
+# A first plan with something known: some 20 ms.
+WARM_MOVES, WARM_EXACT, WARM_WIDTH = 3_000, 8, 600
+WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
 DEFAULT_WORK = 8_000_000  # states: some 5 s
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
 LONGEST = 1 << 27  # units; tours beyond this would overflow 32 bits
@@ -69,7 +75,12 @@ class ExactSolver:
         return best
 
     def improve(
-        self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
+        self,
+        problem: RoutingProblem,
+        *,
+        seed: int = 0,
+        limit: SolveLimit | None = None,
+        warm: Warm | None = None,
     ) -> Iterator[Plan]:
         """Yield the annealed tour with a first bound, then each shorter tour or better bound.
 
@@ -77,9 +88,18 @@ class ExactSolver:
             problem: What is left to do.
             seed: Of the annealing.
             limit: As in `solve`.
+            warm: What is known from a similar problem. The first plan is then that of a narrow search with it,
+                which is better; the last may differ from that of `solve` where it is not proven, or ties.
+
+        Raises:
+            ProblemError: What is known is about another number of shipments.
         """
+        if warm is not None and len(warm.order) != len(problem.shipments):
+            raise ProblemError(
+                f"known are {len(warm.order)} shipments, the problem has {len(problem.shipments)}"
+            )
         best = None
-        for plan in self._plans(problem, seed, limit or SolveLimit(), table_at_once=False):
+        for plan in self._plans(problem, seed, limit or SolveLimit(), table_at_once=False, warm=warm):
             if best is None or plan.improves_on(best):
                 best = plan
                 yield plan
@@ -95,7 +115,13 @@ class ExactSolver:
         return _table_bytes(instance) <= self.table_bytes
 
     def _plans(
-        self, problem: RoutingProblem, seed: int, limit: SolveLimit, *, table_at_once: bool
+        self,
+        problem: RoutingProblem,
+        seed: int,
+        limit: SolveLimit,
+        *,
+        table_at_once: bool,
+        warm: Warm | None = None,
     ) -> Iterator[Plan]:
         """Ever better plans; only one where a table is filled at once."""
         started = time.perf_counter()
@@ -107,11 +133,12 @@ class ExactSolver:
             return
         instance = make_instance(problem, metric)
         seconds = math.inf if limit.seconds is None else limit.seconds
-        by_table = _table_bytes(instance) <= min(self.table_bytes, seconds * TABLE_RATE)
-        if by_table and table_at_once:
+        size = _table_bytes(instance)
+        by_table = size <= min(self.table_bytes, seconds * TABLE_RATE)
+        if by_table and (table_at_once or size <= SMALL_TABLE):
             found: Iterable[_Found] = [_by_table(instance)]
         else:
-            found = self._search(instance, seed, limit, started, by_table=by_table)
+            found = self._search(instance, seed, limit, started, by_table=by_table, warm=warm)
         for actions, bound, certificate in found:
             visits = to_visits(problem, instance, actions)
             yield make_plan(problem, metric, visits, bound, started, certificate)
@@ -130,16 +157,32 @@ class ExactSolver:
         return make_plan(problem, legs, visits, found.bound, started, certificate)
 
     def _search(
-        self, instance: Instance, seed: int, limit: SolveLimit, started: float, *, by_table: bool
+        self,
+        instance: Instance,
+        seed: int,
+        limit: SolveLimit,
+        started: float,
+        *,
+        by_table: bool,
+        warm: Warm | None,
     ) -> Iterator["_Found"]:
         """Ever better tours and bounds: annealed, then by the full table or by passes of the search."""
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
         work = limit.work or DEFAULT_WORK
-        upper, order = anneal(instance, seed, ANNEALING_MOVES)
-        upper = int(upper)
+        if warm is None:
+            upper, order = anneal(instance, seed, ANNEALING_MOVES)
+            bound = first_bound(instance, int(upper))
+        else:
+            first = np.array(warm.order, dtype=np.int64)
+            upper, order = anneal_from(instance, seed, WARM_MOVES, first, *WARM_TEMPERATURES)
+            bound = warm_bound(instance, warm.certificate, WARM_EXACT)
+        upper, lower = int(upper), bound.root
         actions: list[int] = tour_actions(instance, order).tolist()
-        bound = first_bound(instance, upper)
-        lower = bound.root
+        if warm is not None:
+            narrow = beam_pass(bound, upper, WARM_WIDTH, work, Deadline(None))
+            lower = max(lower, narrow.lower)
+            if narrow.actions is not None:
+                upper, actions = narrow.upper, narrow.actions
         yield actions, min(lower, upper), _certificate(bound)
         if by_table:
             if not deadline.over():

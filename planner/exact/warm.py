@@ -4,14 +4,41 @@ Any prices give a lower bound, for any objects left, wherever they lie. So what 
 later replan; only the table has to be filled anew, with the objects that are left.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from planner.certificate import Certificate, Proof
+from planner.errors import ProblemError
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
 from planner.exact.relaxation import fill, new_table, walk
 
 STEP = 0.2  # where fitting goes on from, if it does
+
+
+@dataclass(frozen=True)
+class Warm:
+    """What is known from a similar problem, in the numbering of the shipments of the one to solve.
+
+    Attributes:
+        certificate: A relaxation with a price for each shipment.
+        order: All shipments in the order in which a good tour may pick them.
+
+    Raises:
+        ProblemError: The certificate is of another kind, or the two are not about the same shipments.
+    """
+
+    certificate: Certificate
+    order: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        count = len(self.certificate.multipliers)
+        if self.certificate.proof is not Proof.RELAXATION or sorted(self.order) != list(range(count)):
+            raise ProblemError(
+                f"{self.certificate.proof.value} with {count} prices does not go with the order {self.order}; "
+                "give a relaxation and each shipment once"
+            )
 
 
 def warm_bound(instance: Instance, certificate: Certificate, most_exact: int) -> Bound:
@@ -21,13 +48,8 @@ def warm_bound(instance: Instance, certificate: Certificate, most_exact: int) ->
         instance: What is left to do; its objects are numbered as the certificate's shipments.
         certificate: A relaxation.
         most_exact: How many objects of its subset to keep exactly; the first ones matter most.
-
-    Raises:
-        ValueError: The certificate is of another kind or size.
     """
     n = len(instance.home)
-    if certificate.proof is not Proof.RELAXATION or len(certificate.multipliers) != n:
-        raise ValueError(f"a {certificate.proof.value} certificate of {len(certificate.multipliers)} prices")
     exact = certificate.exact[: min(most_exact, n)]
     order = (*exact, *(k for k in range(n) if k not in exact))
     permuted = instance.permuted(order)
