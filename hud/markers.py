@@ -10,6 +10,8 @@ BREADCRUMB_RADIUS = 0.04  # m; 7 px across at 5 m in a 480 px frame
 BREADCRUMB_SPACING = 0.28  # m along the floor path
 BREADCRUMB_CLEARANCE = 0.5  # m of path in front of the person left empty, so that nothing fills the view
 
+RIM = 1.3  # radius of the white rim, in radii of the breadcrumb
+
 RED: Rgba = (0.90, 0.10, 0.06, 1.0)
 POLE_BANDS = 4
 YELLOW: Rgba = (1.0, 0.86, 0.10, 1.0)
@@ -41,6 +43,14 @@ def breadcrumbs(path: NDArray[np.float64]) -> tuple[Marker, ...]:
     return tuple(
         Marker("sphere", (float(x), float(y), float(z)), (BREADCRUMB_RADIUS, 0.0, 0.0), RED, "breadcrumb")
         for x, y, z in zip(xs, ys, heights, strict=True)
+    )
+
+
+def rims(crumbs: tuple[Marker, ...]) -> tuple[Marker, ...]:
+    """A thin white disc around each breadcrumb: who sees no red would lose bare spheres on a brown floor."""
+    return tuple(
+        Marker("cylinder", crumb.position, (RIM * crumb.size[0], 0.003, 0.0), WHITE, "rim", crumb.x_ray)
+        for crumb in crumbs
     )
 
 

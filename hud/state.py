@@ -19,7 +19,7 @@ class Marker:
         position: Centre in the house frame, m.
         size: Sizes in m; meaning by shape.
         rgba: Colour, components in 0..1.
-        role: What it is for: `breadcrumb`, `flagpole`, `goal`.
+        role: What it is for: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal`.
         x_ray: Whether it also shows faintly through walls.
     """
 

@@ -1,7 +1,7 @@
 """Optimal: breadcrumbs to the next visit, and the plan as numbered steps (PAPER section 5)."""
 
 from hud.lists import assemble
-from hud.markers import breadcrumbs, goal_pin
+from hud.markers import breadcrumbs, goal_pin, rims
 from hud.projection import pointer_to
 from hud.state import ChecklistItem, HudState
 from hud.task import TaskView
@@ -12,7 +12,8 @@ def hud_state(view: TaskView) -> HudState:
     done = len(view.steps_done)
     steps = (*view.steps_done, *view.plan)
     checklist = tuple(_row(view, i, kind, name, done) for i, (kind, name) in enumerate(steps))
-    markers = breadcrumbs(view.path) if view.path is not None else ()
+    crumbs = breadcrumbs(view.path) if view.path is not None else ()
+    markers = (*crumbs, *rims(crumbs))
     pointer = None
     if view.goal is not None:
         markers += goal_pin(view.goal)
