@@ -9,12 +9,41 @@ from numpy.typing import NDArray
 
 from planner.errors import NotNavigableError, PlannerError, UnreachableError
 from planner.geodesics import Geodesics, ShortestPath
-from planner.plan import VisitKind
+from planner.plan import Plan, VisitKind
 from planner.problem import RoutingProblem, Shipment
 from planner.route import XY, Route, RouteVisit, TaskState
 from planner.solver import SolveLimit, Solver
 
+Stop = tuple[VisitKind, str]
+
 MOVED = 0.3  # m; an object that was pushed farther than this since it was planned for asks for a new plan
+
+
+def named(plan: Plan, names: Sequence[str], state: TaskState) -> list[Stop]:
+    """The visits of a plan by name; `names` are those of its shipments, `state` is what it was made for."""
+    stops = []
+    for visit in plan.visits:
+        name = names[visit.shipment] if visit.shipment is not None else state.carried[visit.onboard or 0]
+        stops.append((visit.kind, name))
+    return stops
+
+
+def left_of(stops: Sequence[Stop], state: TaskState) -> list[Stop] | None:
+    """The stops that are still to be done if what was done is a beginning of them, else None."""
+    loose = {name for kind, name in stops if kind is VisitKind.PICK}
+    carried = {name for _, name in stops} - loose
+    done = 0
+    while (loose, carried) != (set(state.loose), set(state.carried)):
+        if done == len(stops):
+            return None
+        kind, name = stops[done]
+        done += 1
+        if kind is VisitKind.PICK:
+            loose.remove(name)
+            carried.add(name)
+        else:
+            carried.remove(name)
+    return list(stops[done:])
 
 
 class Replanner:
@@ -75,15 +104,24 @@ class Replanner:
         """
         spots = self._spots(state)
         problem, names = self._problem(state, spots)
-        plan = self.solver.solve(problem, seed=self.seed, limit=limit or self.limit)
-        carried = list(state.carried)
-        visits = []
-        for visit in plan.visits:
-            name = names[visit.shipment] if visit.shipment is not None else carried[visit.onboard or 0]
-            visits.append(RouteVisit(visit.kind, name, spots[visit.kind, name]))
-        self._route = Route(tuple(visits), plan.cost, plan)
+        plan = self._first_plan(problem, names, state, limit or self.limit)
+        visits = tuple(RouteVisit(kind, name, spots[kind, name]) for kind, name in named(plan, names, state))
+        self._route = Route(visits, plan.cost, plan)
         self._planned = dict(state.loose)
         return self._route
+
+    def poll(self, state: TaskState) -> Route | None:  # noqa: ARG002 - nothing goes on behind the scenes
+        """A better route than the one shown, if one was found meanwhile; this replanner finds none."""
+        return None
+
+    def _first_plan(
+        self,
+        problem: RoutingProblem,
+        names: list[str],  # noqa: ARG002 - for replanners that know something of these objects
+        state: TaskState,  # noqa: ARG002
+        limit: SolveLimit | None,
+    ) -> Plan:
+        return self.solver.solve(problem, seed=self.seed, limit=limit)
 
     def update(self, state: TaskState) -> Route:
         """The route for the task as it is now.
@@ -129,23 +167,13 @@ class Replanner:
 
     def _rest(self, state: TaskState) -> list[RouteVisit] | None:
         """The visits of the route that are still to be done, or None if the state is not on the route."""
-        visits = list(self.route.visits)
-        loose = {v.object for v in visits if v.kind is VisitKind.PICK}
-        carried = {v.object for v in visits} - loose
-        done = 0
-        while (loose, carried) != (set(state.loose), set(state.carried)):
-            if done == len(visits):
-                return None
-            visit = visits[done]
-            done += 1
-            if visit.kind is VisitKind.PICK:
-                loose.remove(visit.object)
-                carried.add(visit.object)
-            else:
-                carried.remove(visit.object)
+        visits = self.route.visits
+        stops = left_of([(v.kind, v.object) for v in visits], state)
+        if stops is None:
+            return None
         if any(math.dist(at, self._planned[name]) > MOVED for name, at in state.loose.items()):
             return None
-        return visits[done:]
+        return list(visits[len(visits) - len(stops) :])
 
     def _snap(self, position: XY, max_distance: float = math.inf) -> XY:
         x, y = self.geodesics.navmesh.snap(position, max_distance)
