@@ -3,8 +3,8 @@
     pip install -e '.[learn]'
     python -m experiments.examples.behaviour_cloning
 
-A built-in participant demonstrates; a policy of Stable-Baselines3 is fitted to its actions, first on its own
-episodes and then on episodes in which the learner acts and is corrected (DAgger). The policy's share of delivered
+A built-in participant demonstrates; a policy of Stable-Baselines3 is fitted to its actions, on its own episodes and,
+with `--rounds`, on episodes in which the learner acts and is corrected (DAgger). The policy's share of delivered
 objects in episodes it never saw is printed before and after. It runs on a CPU in a few minutes.
 """
 
@@ -45,7 +45,7 @@ class Settings:
     """
 
     episodes: int = 80
-    rounds: int = 3
+    rounds: int = 0
     epochs: int = 15
     evaluation: int = 20
     seed: int = 0
