@@ -141,9 +141,10 @@ def draw_bins(
         pen.tile(canvas, entry.picture, x, top + px(1), px(TILE))
         width = rect.width - text_x - px(PADDING)
         lift = 0 if row.place else px(5)
-        canvas.text(
-            text_x, top + px(11) + lift, canvas.fit(entry.label, theme.LABEL, width), theme.LABEL, theme.TEXT
-        )
+        face = theme.LABEL
+        if canvas.text_width(entry.label, face) > width:
+            face = theme.Face(face.size - 1, face.weight)
+        canvas.text(text_x, top + px(11) + lift, canvas.fit(entry.label, face, width), face, theme.TEXT)
         for i, line in enumerate(row.place):
             canvas.text(text_x, top + px(11 + LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
         top += row.height
