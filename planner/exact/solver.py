@@ -17,7 +17,7 @@ from planner.exact.general import best_first
 from planner.exact.instance import Instance, make_instance, to_visits
 from planner.exact.multipliers import Bound, first_bound, grown
 from planner.exact.relaxation import fill, new_table, walk
-from planner.exact.warm import Warm, warm_bound
+from planner.exact.warm import Warm, warm_bound, warm_order
 from planner.greedy_solver import GreedySolver
 from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
@@ -29,7 +29,7 @@ TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
 SMALL_TABLE = 1 << 22  # bytes; filled in some 20 ms, so there is no need of a plan before it
 ANNEALING_MOVES = 20_000
 # A first plan with something known: some 20 ms.
-WARM_MOVES, WARM_EXACT, WARM_WIDTH = 3_000, 8, 600
+WARM_MOVES, WARM_EXACT, WARM_WIDTH = 3_000, 8, 800
 WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
 DEFAULT_WORK = 8_000_000  # states: some 5 s
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
@@ -173,7 +173,7 @@ class ExactSolver:
             upper, order = anneal(instance, seed, ANNEALING_MOVES)
             bound = first_bound(instance, int(upper))
         else:
-            first = np.array(warm.order, dtype=np.int64)
+            first = warm_order(instance, warm)
             upper, order = anneal_from(instance, seed, WARM_MOVES, first, *WARM_TEMPERATURES)
             bound = warm_bound(instance, warm.certificate, WARM_EXACT)
         upper, lower = int(upper), bound.root

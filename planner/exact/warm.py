@@ -7,9 +7,11 @@ later replan; only the table has to be filled anew, with the objects that are le
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
+from planner.exact.annealing import decode
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
 from planner.exact.relaxation import fill, new_table, walk
@@ -24,6 +26,7 @@ class Warm:
     Attributes:
         certificate: A relaxation with a price for each shipment.
         order: All shipments in the order in which a good tour may pick them.
+        astray: Shipments whose place in the order says nothing, because they lie elsewhere now or are new.
 
     Raises:
         ProblemError: The certificate is of another kind, or the two are not about the same shipments.
@@ -31,6 +34,7 @@ class Warm:
 
     certificate: Certificate
     order: tuple[int, ...]
+    astray: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.certificate.multipliers)
@@ -39,6 +43,18 @@ class Warm:
                 f"{self.certificate.proof.value} with {count} prices does not go with the order {self.order}; "
                 "give a relaxation and each shipment once"
             )
+
+
+def warm_order(instance: Instance, warm: Warm) -> NDArray[np.int64]:
+    """The known order, each object that is astray moved to where it lengthens the tour least."""
+    n = len(instance.home)
+    order = [k for k in warm.order if k not in warm.astray] + [k for k in warm.order if k in warm.astray]
+    costs = np.empty((n + 1, len(instance.bins) + 1), np.int32)
+    for k in warm.astray:
+        rest = [j for j in order if j != k]
+        ways = [[*rest[:t], k, *rest[t:]] for t in range(n)]
+        order = min(ways, key=lambda way: decode(instance, np.array(way, dtype=np.int64), 0, costs))
+    return np.array(order, dtype=np.int64)
 
 
 def warm_bound(instance: Instance, certificate: Certificate, most_exact: int) -> Bound:
