@@ -27,7 +27,8 @@ STATIC_BIT = 1
 OBJECT_BIT = 4
 
 PREFIX = "avatar/"
-BODY = "avatar/body"
+BASE = "avatar/base"  # walks; does not turn
+BODY = "avatar/body"  # turns on the base, and carries head and hands
 HEAD = "avatar/head"
 EYE = "avatar/eye"
 TRUNK = "avatar/trunk"
@@ -131,18 +132,19 @@ def _set_inertia(
 
 def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
     x, y, heading = start
-    body = spec.worldbody.add_body(name=BODY, pos=[x, y, 0.0], quat=_yaw_quaternion(heading))
-    _set_inertia(body, 70.0, (8.0, 8.0, 1.5), (0.0, 0.0, 0.9))
-    # Axes are given in the body's own frame, which starts turned by the heading.
-    c, s = math.cos(heading), math.sin(heading)
+    # The colliders sit on a base that does not turn: a contact a little off the axis would spin the body.
+    base = spec.worldbody.add_body(name=BASE, pos=[x, y, 0.0])
+    _set_inertia(base, 60.0, (8.0, 8.0, 1.5), (0.0, 0.0, 0.9))
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-    body.add_joint(name=PREFIX + "x", type=slide, axis=[c, -s, 0], ref=x)
-    body.add_joint(name=PREFIX + "y", type=slide, axis=[s, c, 0], ref=y)
+    base.add_joint(name=PREFIX + "x", type=slide, axis=[1, 0, 0], ref=x)
+    base.add_joint(name=PREFIX + "y", type=slide, axis=[0, 1, 0], ref=y)
+    body = base.add_body(name=BODY, quat=_yaw_quaternion(heading))
+    _set_inertia(body, 10.0, (2.0, 2.0, 1.5), (0.0, 0.0, 0.9))
     body.add_joint(name=PREFIX + "yaw", type=hinge, axis=[0, 0, 1], ref=_angle(spec, heading))
     for name, kv, force in (("x", 7000.0, 600.0), ("y", 7000.0, 600.0), ("yaw", 300.0, 150.0)):
         _add_actuator(spec, name, kp=0.0, kv=kv, force=force)
     cylinder: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "group": 4, "contype": 0, "mass": 0.0}
-    body.add_geom(
+    base.add_geom(
         name=TRUNK,
         size=[TRUNK_RADIUS, 0.84, 0],
         pos=[0, 0, 0.88],
@@ -155,7 +157,7 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
     )
     # Soft, and lower than any carried object: light things are pushed along the floor, never launched. It reaches
     # below the floor, so that it meets flat things with its side and never treads on them.
-    body.add_geom(
+    base.add_geom(
         name=FOOT,
         size=[TRUNK_RADIUS, 0.48, 0],
         pos=[0, 0, 0.18],

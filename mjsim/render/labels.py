@@ -12,7 +12,7 @@ from mjsim.scene import Scene
 
 BACKGROUND = -1
 HOUSE, PERSON, RECEPTACLE = "house", "person", "receptacle"
-_PERSON_BODY = "avatar/body"
+_PERSON_ROOT = "avatar/base"
 # Poses of the same geom by two ways of composing, m.
 _SAME = 1e-6
 
@@ -44,7 +44,7 @@ class Labels:
         instances = (HOUSE, PERSON, *keys, *scene.index.names)
         of_geom = np.zeros(model.ngeom + 1, np.int32)
         of_geom[-1] = BACKGROUND
-        person = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, _PERSON_BODY)
+        person = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, _PERSON_ROOT)
         if person >= 0:
             of_geom[:-1][model.body_rootid[model.geom_bodyid] == person] = 1
         for number, key in enumerate(keys, start=2):
