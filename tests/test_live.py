@@ -1,0 +1,269 @@
+"""Live replanning: a plan at once, better ones later, and no change of mind without a reason."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from planner.checker import check
+from planner.errors import ProblemError, UnreachableError
+from planner.exact.solver import ExactSolver
+from planner.exact.warm import Warm
+from planner.geodesics import Geodesics
+from planner.greedy_solver import nearest_first
+from planner.live import TIE, LiveReplanner
+from planner.navmesh import NavMesh
+from planner.plan import Plan, Status, VisitKind
+from planner.replanner import Replanner, left_of
+from planner.route import TaskState
+from planner.solver import SolveLimit, solver
+from planner.tour import pick, place, tour_length
+
+WALL = [
+    np.array([(3.9, 0), (4.1, 0), (4.1, 4), (3.9, 4)]),
+    np.array([(3.9, 5), (4.1, 5), (4.1, 8), (3.9, 8)]),
+]
+BINS = [(1.0, 7.0), (7.0, 7.0), (7.0, 1.0)]
+SEARCH = ExactSolver(table_bytes=0, passes=((2, 3_000), (6, 30_000)))
+
+
+@pytest.fixture(scope="module")
+def geodesics():
+    return Geodesics(NavMesh.build(WALL, (0, 0, 8, 8)))
+
+
+class Task:
+    """A task that is carried out visit by visit, with things going wrong."""
+
+    def __init__(self, geodesics, count, seed):
+        self.rng = np.random.default_rng(seed)
+        self.mesh = geodesics.navmesh
+        self.loose = {f"object_{k:02}": self.anywhere() for k in range(count)}
+        self.deliveries = {name: BINS[k % 3] for k, name in enumerate(self.loose)}
+        self.carried = []
+        self.position = self.anywhere()
+
+    def anywhere(self):
+        return tuple(map(float, self.mesh.sample(self.rng)))
+
+    @property
+    def state(self):
+        return TaskState(self.position, dict(self.loose), tuple(self.carried), self.deliveries)
+
+    def do(self, kind, name):
+        if kind is VisitKind.PICK:
+            self.position = self.loose.pop(name)
+            self.carried.append(name)
+        else:
+            self.position = self.deliveries[name]
+            self.carried.remove(name)
+
+    def misfortune(self):
+        """Something that was not planned; the person stands where it happened."""
+        kind = self.rng.integers(5)
+        if kind == 0 and self.carried:  # dropped
+            self.loose[self.carried.pop()] = self.anywhere()
+        elif kind == 1 and self.loose:  # kicked
+            self.loose[sorted(self.loose)[0]] = self.anywhere()
+        elif kind == 2:  # something new
+            name = f"new_{len(self.deliveries)}"
+            self.loose[name], self.deliveries[name] = self.anywhere(), BINS[0]
+        elif kind == 3 and len(self.loose) > 1:  # somebody else took it
+            del self.loose[sorted(self.loose)[-1]]
+        elif len(self.carried) < 2 and self.loose:  # another object than suggested
+            self.do(VisitKind.PICK, sorted(self.loose)[int(self.rng.integers(len(self.loose)))])
+        self.position = self.anywhere()
+
+
+class Script:
+    """A solver that hands out prepared orders of visits, the later ones only when told to."""
+
+    name = "script"
+
+    def __init__(self, *orders, bound=0.0, fail=None):
+        self.orders, self.bound, self.fail = orders, bound, fail
+        self.go = threading.Event()
+
+    def improve(self, problem, *, seed=0, limit=None):  # noqa: ARG002 - the interface of solvers
+        for k, order in enumerate(self.orders):
+            if k:
+                self.go.wait(10)
+            visits = order(problem)
+            cost = tour_length(problem.distances, problem.start, visits)
+            optimal = cost <= self.bound
+            status = Status.OPTIMAL if optimal else Status.FEASIBLE
+            yield Plan(tuple(visits), cost, cost if optimal else self.bound, status, 0.0)
+        if self.fail is not None:
+            raise self.fail
+
+
+def one_after_another(*shipments):
+    return lambda problem: [visit(problem, k) for k in shipments for visit in (pick, place)]
+
+
+def stops(route):
+    return [(v.kind, v.object) for v in route.visits]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_from_any_state_the_shown_route_ends_up_optimal(geodesics, seed):
+    task = Task(geodesics, 9, seed)
+    planner = SEARCH if seed % 2 else solver("exact")
+    with LiveReplanner(geodesics, planner) as guide:
+        guide.prepare(task.state)
+        for _ in range(12):
+            task.misfortune()
+            before = guide.replans
+            guide.update(task.state)
+            guide.wait()
+            guide.poll(task.state)
+            assert left_of(stops(guide.route), task.state) == stops(guide.route)
+            if guide.replans > before:  # else it follows the plan, though from another place
+                exact = solver("exact").solve(guide.problem(task.state))
+                assert guide.route.cost == pytest.approx(exact.cost, abs=TIE + 1e-3)
+                check(guide.problem(task.state), guide.route.plan)
+            if guide.route.next is not None:
+                task.do(*stops(guide.route)[0])
+        assert guide.replans >= 4
+
+
+def test_a_prepared_route_is_followed_to_its_end_without_a_change_of_mind(geodesics):
+    task = Task(geodesics, 8, 3)
+    with LiveReplanner(geodesics, SEARCH) as guide:
+        planned = guide.prepare(task.state)
+        assert planned.plan.status is Status.OPTIMAL
+        expected, walked = stops(planned), 0.0
+        for stop in expected:
+            assert stops(guide.route)[0] == stop
+            walked += guide.segment(task.position).geodesic_distance
+            task.do(*stop)
+            guide.update(task.state)
+            guide.wait()
+            assert guide.poll(task.state) is None
+        assert guide.replans == 0
+        assert walked == pytest.approx(planned.cost, abs=1e-6)
+
+
+@pytest.fixture
+def mirrored():
+    bin_ = (2.0, 6.0)
+    return TaskState((2.0, 2.0), {"left": (1.0, 2.0), "right": (3.0, 2.0)}, (), {"left": bin_, "right": bin_})
+
+
+def test_of_two_equal_tours_the_shown_one_stays_and_takes_over_the_proof(geodesics, mirrored):
+    script = Script(one_after_another(0, 1), one_after_another(1, 0))
+    script.bound = -1.0
+    with LiveReplanner(geodesics, script) as guide:
+        shown = guide.update(mirrored)
+        assert shown.plan.status is Status.FEASIBLE
+        script.bound = shown.cost + 1e-3
+        script.go.set()
+        guide.wait()
+        better = guide.poll(mirrored)
+        assert stops(better) == stops(shown)
+        assert better.plan.status is Status.OPTIMAL
+        assert better.plan.visits == shown.plan.visits
+        assert guide.poll(mirrored) is None
+
+
+def test_a_shorter_tour_is_shown_unless_it_is_too_late(geodesics):
+    state = TaskState(
+        (1.0, 1.0), {"near": (1.0, 2.0), "far": (1.0, 5.0)}, (), {"near": (1.0, 2.2), "far": (1.0, 5.2)}
+    )
+    for position, switches in (((1.0, 1.0), True), ((1.0, 5.5), False)):
+        script = Script(one_after_another(1, 0), one_after_another(0, 1))
+        with LiveReplanner(geodesics, script) as guide:
+            shown = guide.update(state)
+            assert guide.poll(state) is None
+            script.go.set()
+            guide.wait()
+            now = TaskState(position, state.loose, (), state.deliveries)
+            better = guide.poll(now)
+            if switches:
+                assert better.cost < shown.cost - TIE
+                assert better.next.object == "near"
+            assert guide.route.next.object == ("near" if switches else "far")
+
+
+def test_a_proof_that_begins_otherwise_than_what_was_done_is_asked_for_anew(geodesics, mirrored):
+    script = Script(one_after_another(0, 1), one_after_another(1, 0))
+    with LiveReplanner(geodesics, script) as guide:
+        guide.update(mirrored)
+        left = TaskState((1.0, 2.0), {"right": (3.0, 2.0)}, ("left",), mirrored.deliveries)
+        guide.update(left)
+        assert guide.replans == 0
+        script.orders = (lambda problem: nearest_first(problem),)
+        script.go.set()
+        guide.wait()
+        assert guide.poll(left) is None  # it said: first the right one
+        guide.wait()
+        guide.poll(left)
+        assert len(guide.route.visits) == 3
+        check(guide.problem(left), guide.route.plan)
+
+
+def test_nobody_waits_for_the_proof(geodesics, mirrored):
+    script = Script(one_after_another(0, 1), one_after_another(1, 0))
+    with LiveReplanner(geodesics, script) as guide:
+        shown = guide.update(mirrored)
+        assert guide.busy
+        for _ in range(100):
+            assert guide.poll(mirrored) is None
+        assert guide.update(mirrored).visits == shown.visits
+        assert guide.busy
+        script.go.set()
+
+
+def test_what_a_proof_dies_of_is_told(geodesics, mirrored):
+    with LiveReplanner(
+        geodesics, Script(one_after_another(0, 1), fail=ProblemError("no such thing"))
+    ) as guide:
+        guide.update(mirrored)
+        guide.wait()
+        with pytest.raises(ProblemError, match="no such thing"):
+            guide.poll(mirrored)
+
+
+def test_objects_out_of_reach_are_listed_by_name_and_the_guide_goes_on(geodesics):
+    task = Task(geodesics, 4, 0)
+    with LiveReplanner(geodesics, solver("exact")) as guide:
+        guide.prepare(task.state)
+        home = task.loose["object_01"]
+        task.loose["object_01"] = (20.0, 20.0)
+        with pytest.raises(UnreachableError) as caught:
+            guide.update(task.state)
+        assert caught.value.names == ("object_01",)
+        task.loose["object_01"] = home
+        assert len(guide.update(task.state).visits) == 8
+
+
+@pytest.mark.parametrize("name", ["ortools", "greedy"])
+def test_other_solvers_can_guide_live_too(geodesics, name):
+    task = Task(geodesics, 4, 1)
+    with LiveReplanner(geodesics, solver(name), limit=SolveLimit(work=20)) as guide:
+        route = guide.prepare(task.state, seconds=30)
+        check(guide.problem(task.state), route.plan)
+
+
+def test_what_is_known_must_be_about_the_same_objects(geodesics):
+    task = Task(geodesics, 16, 1)
+    guide = Replanner(geodesics, SEARCH)
+    problem = guide.problem(task.state)
+    plan = SEARCH.solve(problem)
+    order = tuple(v.shipment for v in plan.visits if v.kind is VisitKind.PICK)
+    known = Warm(plan.certificate, order)
+    first = next(SEARCH.improve(problem, warm=known))
+    check(problem, first)
+    assert first.cost == pytest.approx(plan.cost)
+    with pytest.raises(ProblemError, match="each shipment once"):
+        Warm(plan.certificate, order[1:])
+    del task.loose["object_00"]
+    with pytest.raises(ProblemError, match="16 shipments"):
+        next(SEARCH.improve(guide.problem(task.state), warm=known))
+
+
+def test_the_repeatable_replanner_never_changes_its_mind(geodesics):
+    task = Task(geodesics, 4, 0)
+    guide = Replanner(geodesics, solver("exact"))
+    guide.update(task.state)
+    assert guide.poll(task.state) is None
