@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import minimum_spanning_tree
 
 from planner.certificate import Certificate
 from planner.plan import Plan, Status, Visit, VisitKind
@@ -77,6 +76,8 @@ def tour_length(distances: NDArray[Any], start: int, visits: Sequence[Visit]) ->
 
 def spanning_bound(problem: RoutingProblem, metric: NDArray[np.int64]) -> int:
     """A tour connects all its locations, so it is no shorter than their minimum spanning tree; in units."""
+    from scipy.sparse.csgraph import minimum_spanning_tree  # takes longer to load than most tours to plan
+
     used = sorted(
         {problem.start, *problem.onboard}
         | {s.pickup for s in problem.shipments}

@@ -2,6 +2,7 @@
 
 import argparse
 import importlib.util
+import inspect
 import json
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +15,8 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 DESCRIPTION = """\
 Run a benchmark of the source checkout and print what it measured. Figures are ratios where they can be, so that they
 hold on another machine as well. A module in benchmarks/ is a benchmark when it defines measure() -> dict of JSON values
-and lines(result) -> lines of text."""
+and lines(result) -> lines of text; measure may take the keywords houses and quick, and picture(result, path) may draw
+the result."""
 
 
 def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
@@ -58,13 +60,40 @@ def add_parser(commands: Any) -> None:
         "name", metavar="NAME", help=f"benchmark: {', '.join(benchmark_names()) or 'none here'}"
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.add_argument("--quick", action="store_true", help="a smaller run, where the benchmark has one")
+    parser.add_argument("--houses", type=positive, metavar="N", help="houses, where the benchmark has many")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the result as well")
     parser.set_defaults(run=run)
+
+
+def positive(text: str) -> int:
+    """Parse a whole number above 0."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
+    return int(text)
+
+
+def options(module: ModuleType, arguments: argparse.Namespace) -> dict[str, Any]:
+    """Options that were given, as keywords of the benchmark's `measure`.
+
+    Raises:
+        ConfigError: The benchmark has no such option.
+    """
+    given = {name: getattr(arguments, name) for name in ("quick", "houses") if getattr(arguments, name)}
+    for name in given:
+        if name not in inspect.signature(module.measure).parameters:
+            raise ConfigError(f"benchmark {arguments.name} has no option --{name}; leave it out")
+    if arguments.picture is not None and not hasattr(module, "picture"):
+        raise ConfigError(f"benchmark {arguments.name} has no option --picture; leave it out")
+    return given
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
     module = benchmark(arguments.name)
-    result = module.measure()
+    result = module.measure(**options(module, arguments))
+    if arguments.picture is not None:
+        module.picture(result, arguments.picture)
     if arguments.json:
         print(json.dumps(result, indent=2))
     else:

@@ -19,7 +19,6 @@ from planner.exact.multipliers import Bound, first_bound, grown
 from planner.exact.relaxation import fill, new_table, walk
 from planner.exact.warm import Warm, warm_bound, warm_order
 from planner.greedy_solver import GreedySolver
-from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
@@ -151,6 +150,8 @@ class ExactSolver:
         found = best_first(problem, legs, metric, GENERAL_STATES)
         visits = found.visits
         if visits is None:
+            from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
+
             plan = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=limit.seconds))
             visits = list(plan.visits)
         certificate = Certificate(Proof.EXHAUSTIVE, found.bound)
@@ -188,16 +189,16 @@ class ExactSolver:
             if not deadline.over():
                 yield _by_table(instance)
             return
-        done = 0
+        done, rate = 0, max(1, len(instance.home) // 2)
         for size, wanted in self.passes:
-            # A pass expands about n / 2 times its width. Cut below the last one's, it would hardly help.
-            width = min(wanted, work // max(1, len(instance.home) // 2))
+            # A pass given up proves nothing, and one hardly wider than the last one little.
+            width = min(wanted, work // rate)
             if lower >= upper or width < min(wanted, done + 1) or deadline.over():
                 break
             bound = grown(bound, upper, size, deadline)
             result = beam_pass(bound, upper, width, work, deadline)
             work -= result.expanded
-            done = width
+            done, rate = width, max(1, -(-result.expanded // width))  # a wider pass expands fewer per width
             lower = max(lower, bound.root, result.lower)
             if result.actions is not None:
                 upper, actions = result.upper, result.actions
