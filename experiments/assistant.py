@@ -80,7 +80,10 @@ class Assistant:
                 self._visited(observation, event)
         if events:
             self._plan(observation)
-        elif self._path_is_stale(observation):
+            return
+        if self._replanner.pending:
+            self._improve(observation)
+        if self._path_is_stale(observation):
             self._show_way(observation)
 
     def say(self, key: str, time: float, object_name: str | None = None) -> None:
@@ -143,13 +146,28 @@ class Assistant:
             return
         if not first:
             self.say("replanned", observation.time)
+        self._log_plan(observation, self._route)
+
+    def _improve(self, observation: Observation) -> None:
+        """Take up a better plan for the same task, found in the background."""
+        better = self._replanner.poll(self._task_state(observation))
+        if better is None:
+            return
+        changed = self._route is None or better.visits != self._route.visits
+        self._route = better
+        self._log_plan(observation, better, improved=True)
+        if changed:
+            self._show_way(observation)
+
+    def _log_plan(self, observation: Observation, route: Route, **more: bool) -> None:
         self._log.append(
             observation.time,
             "plan",
-            cost_m=round(self._route.cost, 6),
-            lower_bound_m=round(self._route.plan.lower_bound, 6),
-            status=self._route.plan.status.value,
-            visits=[_as_json(v) for v in self._route.visits],
+            cost_m=round(route.cost, 6),
+            lower_bound_m=round(route.plan.lower_bound, 6),
+            status=route.plan.status.value,
+            visits=[_as_json(v) for v in route.visits],
+            **more,
         )
 
     def _task_state(self, observation: Observation) -> TaskState:

@@ -27,14 +27,31 @@ class LoggedPlans:
         self._taken = 0
         self._route: Route | None = None
 
+    @property
+    def pending(self) -> bool:
+        """Whether a better plan for the same task was logged now."""
+        return self._is_due and bool(self._plans[self._taken].get("improved", False))
+
+    def poll(self, state: TaskState) -> Route | None:
+        """The better plan that was logged now, if one was.
+
+        Raises:
+            ReplayError: It is no plan.
+        """
+        return self.update(state) if self.pending else None
+
+    @property
+    def _is_due(self) -> bool:
+        return self._taken < len(self._plans) and self._plans[self._taken]["t"] <= round(self.clock(), 6)
+
     def update(self, state: TaskState) -> Route:
         """The plan that was logged now, if one was, else what is left of the one before.
 
         Raises:
             ReplayError: The log has no plan at the start, or one that is none.
         """
-        if self._taken < len(self._plans) and self._plans[self._taken]["t"] <= round(self.clock(), 6):
-            self.replans += self._route is not None
+        if self._is_due:
+            self.replans += self._route is not None and not self._plans[self._taken].get("improved", False)
             self._route = _route(self._plans[self._taken], state)
             self._taken += 1
         if self._route is None:

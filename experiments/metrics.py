@@ -21,7 +21,7 @@ class Metrics:
         task_distance_m: Distance walked, m.
         completion_time_s: Time until the last object was delivered, or until the end if some are left, s.
         optimal_distance_m: Cost of the plan at the start, m.
-        replans: How often the plan was made anew after the first.
+        replans: How often the plan was made anew after the first, because the task was no longer as planned.
         refusals: Infeasible attempts.
         failures: Picks and places that were begun but did not succeed in the physics, and objects lost from a hand.
     """
@@ -63,7 +63,7 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
         task_distance_m=walked,
         completion_time_s=float(events[-1]["t"]),
         optimal_distance_m=float(plans[0]["cost_m"]) if plans else 0.0,
-        replans=max(len(plans) - 1, 0),
+        replans=max(sum(not p.get("improved", False) for p in plans) - 1, 0),
         refusals=sum(e["event"] == "attempt" and not e["applied"] for e in events),
         failures=sum(e["event"] in ("pick_failed", "place_failed", "grip_lost") for e in events),
     )

@@ -26,6 +26,7 @@ from experiments.video import VideoWriter
 from mjsim.errors import PhysicsError
 from mjsim.scene import Scene, compose
 from mjsim.world import World
+from planner.live import LiveReplanner
 from planner.replanner import Replanner
 from planner.solver import DEFAULT_SOLVER, solver
 
@@ -45,6 +46,8 @@ class TrialConfig:
         house: House name, or path of a catalogue.
         planner: Solver of the routing problem.
         time_limit: Simulated time after which the trial ends, s; None for a generous one.
+        live: Plan against the clock, with proofs in the background, as for a person. Such a run depends on how fast
+            the machine is; a replay of it shows the plans that were shown.
     """
 
     objects: int
@@ -54,6 +57,7 @@ class TrialConfig:
     house: str = "apartment"
     planner: str = DEFAULT_SOLVER
     time_limit: float | None = None
+    live: bool = False
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -155,7 +159,10 @@ def _simulate(
             target = folder / records.VIDEO
             video = stack.enter_context(VideoWriter(target, width=film.width, height=film.height))
             viewer = Filming(glasses, video)
-        session, world = prepare_session(config, house, scene, log, viewer)
+        replanner = None
+        if config.live:
+            replanner = stack.enter_context(LiveReplanner(house.geodesics, solver(config.planner)))
+        session, world = prepare_session(config, house, scene, log, viewer, replanner)
         try:
             ended: str | PhysicsError = session.run(on_progress)
         except PhysicsError as error:
@@ -168,7 +175,12 @@ def _simulate(
 
 
 def prepare_session(
-    config: TrialConfig, house: House, scene: Scene, log: EventLog, viewer: Viewer | None = None
+    config: TrialConfig,
+    house: House,
+    scene: Scene,
+    log: EventLog,
+    viewer: Viewer | None = None,
+    replanner: Replanner | None = None,
 ) -> tuple[Session, World]:
     """Make the world, the assistant and the participant of a trial, ready to run.
 
@@ -178,6 +190,7 @@ def prepare_session(
         scene: The composed episode.
         log: Takes the events.
         viewer: Sees every control step, or None.
+        replanner: Plans for the assistant; None for one whose plans repeat.
     """
     episode = scene.episode
     order_rng, user_rng = (
@@ -199,7 +212,7 @@ def prepare_session(
         house,
         episode,
         assistance=config.assistance,
-        replanner=Replanner(house.geodesics, solver(config.planner)),
+        replanner=replanner or Replanner(house.geodesics, solver(config.planner)),
         order=order,
         log=log,
     )

@@ -128,6 +128,11 @@ class LiveReplanner(Replanner):
         """Whether a search is going on."""
         return self._thread is not None and self._thread.is_alive()
 
+    @property
+    def pending(self) -> bool:
+        """Whether the search has found something since the last `poll`."""
+        return self._proof is not None and not self._proof.found.empty()
+
     def wait(self, seconds: float | None = None) -> None:
         """Wait until the search is over, at most so long; for the time before a task begins, and for tests."""
         if self._thread is not None:

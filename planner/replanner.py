@@ -110,6 +110,11 @@ class Replanner:
         self._planned = dict(state.loose)
         return self._route
 
+    @property
+    def pending(self) -> bool:
+        """Whether `poll` has something to look at; it never has for this replanner."""
+        return False
+
     def poll(self, state: TaskState) -> Route | None:  # noqa: ARG002 - nothing goes on behind the scenes
         """A better route than the one shown, if one was found meanwhile; this replanner finds none."""
         return None

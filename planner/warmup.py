@@ -6,9 +6,11 @@ Run once after installing: `python -m planner.warmup`.
 import numpy as np
 
 from planner.exact.solver import ExactSolver
+from planner.exact.warm import Warm
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 from planner.problem import RoutingProblem, Shipment
+from planner.regret import regrets
 
 
 def compile_kernels() -> None:
@@ -17,6 +19,11 @@ def compile_kernels() -> None:
     Geodesics(navmesh).shortest_path((0.5, 0.5), (2.5, 2.5))
     for table_bytes in (ExactSolver.table_bytes, 0):  # the full table, and the search
         ExactSolver(table_bytes=table_bytes).solve(_tour())
+        regrets(_tour(), ExactSolver(table_bytes=table_bytes))
+    searching = ExactSolver(table_bytes=0)
+    plan = next(searching.improve(_tour()))
+    if plan.certificate is not None:  # a first tour from what is known, as in live replanning
+        next(searching.improve(_tour(), warm=Warm(plan.certificate, tuple(range(12)))))
 
 
 def _tour() -> RoutingProblem:
