@@ -17,7 +17,7 @@ CONDITIONS = ("none", "highlight", "optimal")
 SHOTS = (
     Shot("optimal", TrialConfig(objects=12, assistance="optimal", seed=SEED), after(0.4)),
     Shot("optimal_carrying", TrialConfig(objects=12, assistance="optimal", seed=SEED), carrying_two),
-    Shot("highlight", TrialConfig(objects=12, assistance="highlight", seed=0), after(3.0)),
+    Shot("highlight", TrialConfig(objects=12, assistance="highlight", seed=SEED), after(1.3)),
     Shot("none", TrialConfig(objects=12, assistance="none", seed=0), after(6.0)),
 )
 SHEET = "contact_sheet.png"

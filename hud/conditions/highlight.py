@@ -21,4 +21,4 @@ def hud_state(view: TaskView) -> HudState:
     markers = tuple(
         m for o in loose for m in flagpole(o.position, low=math.dist(o.position[:2], view.position) < CLOSE)
     )
-    return assemble(view, "Objects to put away", random_order_rows(view, detail), markers)
+    return assemble(view, "To put away", random_order_rows(view, detail), markers)

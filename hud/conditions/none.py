@@ -11,4 +11,4 @@ def hud_state(view: TaskView) -> HudState:
     def detail(thing: TaskObject) -> str:
         return f"→ {view.receptacle(thing.receptacle).label}"
 
-    return assemble(view, "Objects to put away", random_order_rows(view, detail))
+    return assemble(view, "To put away", random_order_rows(view, detail))
