@@ -160,10 +160,11 @@ class Assistant:
             self._show_way(observation)
 
     def _log_plan(self, observation: Observation, route: Route, **more: bool) -> None:
+        # Cost and bound are those of the state that the plan was made for; a better plan comes a little later.
         self._log.append(
             observation.time,
             "plan",
-            cost_m=round(route.cost, 6),
+            cost_m=round(route.plan.cost, 6),
             lower_bound_m=round(route.plan.lower_bound, 6),
             status=route.plan.status.value,
             visits=[_as_json(v) for v in route.visits],

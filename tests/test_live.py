@@ -1,10 +1,15 @@
 """Live replanning: a plan at once, better ones later, and no change of mind without a reason."""
 
+import json
 import threading
 
 import numpy as np
 import pytest
 
+from experiments import records
+from experiments.cli import main
+from experiments.logged_plans import LoggedPlans
+from experiments.trial import TrialConfig, run_trial
 from planner.checker import check
 from planner.errors import ProblemError, UnreachableError
 from planner.exact.solver import ExactSolver
@@ -260,6 +265,37 @@ def test_what_is_known_must_be_about_the_same_objects(geodesics):
     del task.loose["object_00"]
     with pytest.raises(ProblemError, match="16 shipments"):
         next(SEARCH.improve(guide.problem(task.state), warm=known))
+
+
+def test_a_live_trial_logs_each_plan_shown_and_its_replay_shows_them(tmp_path):
+    run = tmp_path / "run"
+    config = TrialConfig(objects=16, assistance="optimal", seed=4, time_limit=8.0, live=True)
+    metrics = run_trial(config, run, topdown=False)
+    plans = json.loads((run / records.PLAN).read_text())
+    assert metrics["replans"] == sum(not plan.get("improved", False) for plan in plans) - 1
+    for plan in plans:
+        assert plan["lower_bound_m"] <= plan["cost_m"] + 1e-9
+    assert main(["replay", str(run)]) == 0
+
+
+def test_a_better_plan_that_was_logged_is_handed_out_when_it_was_shown(mirrored):
+    def logged(t, order, **more):
+        visits = [[kind, name] for name in order for kind in ("pick", "place")]
+        numbers = {"cost_m": 9.0, "lower_bound_m": 8.0, "status": "feasible"}
+        return {"t": t, "event": "plan", "visits": visits, **numbers, **more}
+
+    now = [0.0]
+    first, second = ("left", "right"), ("right", "left")
+    plans = LoggedPlans([logged(0.0, first), logged(1.0, second, improved=True)], lambda: now[0])
+    assert plans.update(mirrored).next.object == "left"
+    now[0] = 0.5
+    assert not plans.pending
+    assert plans.poll(mirrored) is None
+    now[0] = 1.0
+    assert plans.pending
+    assert plans.poll(mirrored).next.object == "right"
+    assert not plans.pending
+    assert plans.replans == 0
 
 
 def test_the_repeatable_replanner_never_changes_its_mind(geodesics):
