@@ -79,7 +79,9 @@ class Episode:
                 )
         for placed in self.objects:
             if not all(math.isfinite(v) for v in (*placed.point, *placed.position, *placed.quaternion)):
-                raise EpisodeError(f"pose of {placed.name} is not finite: {placed.position} {placed.quaternion}")
+                raise EpisodeError(
+                    f"pose of {placed.name} is not finite: {placed.position} {placed.quaternion}"
+                )
 
     def to_json(self) -> str:
         """Serialise with full float precision, keys in a fixed order."""
@@ -98,7 +100,9 @@ class Episode:
             raise EpisodeError(f"episode is not JSON: {error}") from error
         if not isinstance(raw, dict) or raw.get("format") != FORMAT_VERSION:
             found = raw.get("format") if isinstance(raw, dict) else type(raw).__name__
-            raise EpisodeError(f"episode format {found!r} is not {FORMAT_VERSION}; sample it anew with this version")
+            raise EpisodeError(
+                f"episode format {found!r} is not {FORMAT_VERSION}; sample it anew with this version"
+            )
         try:
             return cls(
                 house=str(raw["house"]),

@@ -233,7 +233,9 @@ class World:
         person = self._person
         if isinstance(action, Pick):
             hand = self._hand_for(item)
-            return _Motion(pick(person, hand, item, self._carrying.place_for), action, hand, item, result.receptacle)
+            return _Motion(
+                pick(person, hand, item, self._carrying.place_for), action, hand, item, result.receptacle
+            )
         hand = person.held.index(item)
         receptacle = self.scene.receptacles[str(result.receptacle)]
         return _Motion(place(person, hand, item, receptacle), action, hand, item, receptacle.key)

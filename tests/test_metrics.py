@@ -7,7 +7,13 @@ from experiments.metrics import compute_metrics
 
 
 def visit(t, *, deviated=False, alternatives=1, geodesic=1.0):
-    return {"t": t, "event": "visit", "deviated": deviated, "alternatives": alternatives, "geodesic_m": geodesic}
+    return {
+        "t": t,
+        "event": "visit",
+        "deviated": deviated,
+        "alternatives": alternatives,
+        "geodesic_m": geodesic,
+    }
 
 
 def log(*events, end=20.0, reason="all delivered"):
