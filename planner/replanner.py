@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from planner.errors import NotNavigableError, PlannerError, UnreachableError
 from planner.geodesics import Geodesics, ShortestPath
-from planner.plan import Plan, VisitKind
+from planner.plan import Plan, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
+from planner.regret import RADIUS, Regret, regrets
 from planner.route import XY, Route, RouteVisit, TaskState
 from planner.solver import SolveLimit, Solver
 
@@ -21,11 +22,13 @@ MOVED = 0.3  # m; an object that was pushed farther than this since it was plann
 
 def named(plan: Plan, names: Sequence[str], state: TaskState) -> list[Stop]:
     """The visits of a plan by name; `names` are those of its shipments, `state` is what it was made for."""
-    stops = []
-    for visit in plan.visits:
-        name = names[visit.shipment] if visit.shipment is not None else state.carried[visit.onboard or 0]
-        stops.append((visit.kind, name))
-    return stops
+    return [name_of(visit, names, state) for visit in plan.visits]
+
+
+def name_of(visit: Visit, names: Sequence[str], state: TaskState) -> Stop:
+    """A visit by name; `names` are those of the problem's shipments, `state` is what it was made for."""
+    name = names[visit.shipment] if visit.shipment is not None else state.carried[visit.onboard or 0]
+    return visit.kind, name
 
 
 def left_of(stops: Sequence[Stop], state: TaskState) -> list[Stop] | None:
@@ -169,6 +172,21 @@ class Replanner:
             ProblemError: More is carried than the capacity allows.
         """
         return self._problem(state, self._spots(state))[0]
+
+    def regrets(self, state: TaskState, *, radius: float = RADIUS) -> dict[Stop, Regret]:
+        """What each possible next visit costs compared with the best one, the best first.
+
+        Args:
+            state: The task as it is now.
+            radius: Regrets up to here are wanted exactly, m; see :func:`planner.regret.regrets`.
+
+        Raises:
+            UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
+            ProblemError: More is carried than the capacity allows, or the radius is negative.
+        """
+        problem, names = self._problem(state, self._spots(state))
+        found = regrets(problem, self.solver, seed=self.seed, limit=self.limit, radius=radius)
+        return {name_of(regret.visit, names, state): regret for regret in found}
 
     def _rest(self, state: TaskState) -> list[RouteVisit] | None:
         """The visits of the route that are still to be done, or None if the state is not on the route."""
