@@ -8,7 +8,7 @@ import pytest
 
 from experiments import records
 from experiments.cli import main
-from experiments.logged_plans import LoggedPlans
+from experiments.replaying.logged_plans import LoggedPlans
 from experiments.trial import TrialConfig, run_trial
 from planner.checker import check
 from planner.errors import ProblemError, UnreachableError

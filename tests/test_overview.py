@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.glasses import FilmConfig
-from experiments.overview import Overview, camera_path
+from experiments.replaying.overview import Overview, camera_path
 from mjsim.footprint import Footprint
 from mjsim.world import World
 

@@ -17,8 +17,8 @@ from experiments.errors import RecordError, ReplayError
 from experiments.glasses import FilmConfig
 from experiments.house import House
 from experiments.records import read_arrays, read_events, read_json
-from experiments.replay import ReplayFilm, replay
-from experiments.run_record import load_run
+from experiments.replaying.replay import ReplayFilm, replay
+from experiments.replaying.run_record import load_run
 from experiments.trial import TrialConfig, run_trial
 from mjsim.errors import PhysicsError
 

@@ -11,8 +11,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from experiments.commands.options import assistance_help, frame_size
 from experiments.errors import ConfigError, ReplayError
 from experiments.glasses import FilmConfig
-from experiments.overview import CAMERAS, FIRST_PERSON
-from experiments.replay import ReplayFilm, ReplayReport, replay
+from experiments.replaying.overview import CAMERAS, FIRST_PERSON
+from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
 from mjsim.render import PROFILES
 
 DESCRIPTION = """\

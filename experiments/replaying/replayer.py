@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from experiments.assistant import Assistant
 from experiments.errors import RecordError, ReplayError
 from experiments.house import House
-from experiments.logged_plans import LoggedPlans
 from experiments.participants.base import Percept
 from experiments.recording import Recording, provenance
 from experiments.records import Event, EventLog
-from experiments.run_record import Fault, RunRecord
+from experiments.replaying.logged_plans import LoggedPlans
+from experiments.replaying.run_record import Fault, RunRecord
 from experiments.session import INTERRUPTED, PHYSICS_ERROR, Session, Viewer
 from mjsim.actions import Action, EventKind, WorldEvent
 from mjsim.errors import PhysicsError, StateError

@@ -9,11 +9,11 @@ from experiments import records
 from experiments.errors import ConfigError, RecordError
 from experiments.glasses import FilmConfig, Filming, Glasses
 from experiments.house import House
-from experiments.overview import CAMERAS, FIRST_PERSON, Overview, camera_path
 from experiments.records import read_json
-from experiments.replay_check import first_fault
-from experiments.replayer import Replayer, fault_error
-from experiments.run_record import RunRecord, load_run
+from experiments.replaying.check import first_fault
+from experiments.replaying.overview import CAMERAS, FIRST_PERSON, Overview, camera_path
+from experiments.replaying.replayer import Replayer, fault_error
+from experiments.replaying.run_record import RunRecord, load_run
 from experiments.session import Viewer
 from experiments.video import VideoWriter
 from mjsim.files import replacing

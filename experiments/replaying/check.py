@@ -10,8 +10,8 @@ from experiments import records
 from experiments.errors import RecordError
 from experiments.metrics import compute_metrics
 from experiments.records import Event, read_json
-from experiments.replayer import WORLD_EVENTS, Replayer
-from experiments.run_record import PER_STEP, Fault, RunRecord
+from experiments.replaying.replayer import WORLD_EVENTS, Replayer
+from experiments.replaying.run_record import PER_STEP, Fault, RunRecord
 from experiments.session import INTERRUPTED, PHYSICS_ERROR
 
 # What the physics alone decides. Plans and visits are the assistant's; the log's hashes vouch for them.
