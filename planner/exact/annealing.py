@@ -162,22 +162,24 @@ def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArr
         j += 1
     kind = uniform(state)
     low, high = min(i, j), max(i, j)
-    candidate[:] = order
+    for k in range(n):  # loops rather than slices: they compile much faster
+        candidate[k] = order[k]
     if kind < 0.25:
         candidate[i], candidate[j] = order[j], order[i]
     elif kind < 0.5:
         for k in range(low, high + 1):
             candidate[k] = order[low + high - k]
     elif i < j:
-        candidate[i:j] = order[i + 1 : j + 1]
+        for k in range(i, j):
+            candidate[k] = order[k + 1]
         candidate[j] = order[i]
     else:
-        candidate[j + 1 : i + 1] = order[j:i]
+        for k in range(j, i):
+            candidate[k + 1] = order[k]
         candidate[j] = order[i]
     return low
 
 
-@kernel
 def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64]]:
     """Simulated annealing from the order of the indices; see `anneal_from`."""
     return anneal_from(inst, seed, moves, np.arange(inst.home.size), HOT, COLD)
@@ -216,7 +218,9 @@ def anneal_from(
     for _ in range(moves):
         temperature *= cooling
         low = propose(order, candidate, state)
-        trial_costs[:low] = costs[:low]
+        for t in range(low):
+            for d in range(m + 1):
+                trial_costs[t, d] = costs[t, d]
         trial = decode(inst, candidate, low, trial_costs)
         if trial <= cost or uniform(state) < np.exp((cost - trial) / temperature):
             cost = trial
@@ -224,5 +228,6 @@ def anneal_from(
             costs, trial_costs = trial_costs, costs
             if cost < best:
                 best = cost
-                best_order[:] = order
+                for k in range(n):
+                    best_order[k] = order[k]
     return best, best_order

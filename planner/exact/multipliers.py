@@ -123,15 +123,19 @@ def improve(
     n = inst.home.size
     actions = np.empty(2 * n + 2, np.int64)
     current = multipliers.copy()
-    kept = np.rint(multipliers).astype(np.int32)
+    kept = np.empty(n, np.int32)
+    for j in range(n):  # loops rather than slices: they compile much faster
+        kept[j] = np.rint(multipliers[j])
     direction = np.zeros(n)
     best, failures = -1, 0
     for k in range(steps):
-        table.multipliers[:] = np.rint(current).astype(np.int32)
+        for j in range(n):
+            table.multipliers[j] = np.rint(current[j])
         value, surplus = _evaluate(inst, table, actions)
         if value > best:
             best, failures = value, 0
-            kept[:] = table.multipliers
+            for j in range(n):
+                kept[j] = table.multipliers[j]
         else:
             failures += 1
             if failures == PATIENCE:
@@ -146,8 +150,11 @@ def improve(
         for j in range(n):
             direction[j] = scale * surplus[j] + MOMENTUM * direction[j]
             current[j] += direction[j]
-    if (table.multipliers != kept).any():
-        table.multipliers[:] = kept
+    changed = False
+    for j in range(n):
+        changed |= table.multipliers[j] != kept[j]
+        table.multipliers[j] = kept[j]
+    if changed:
         fill(inst, table)
     return best, step
 
