@@ -20,8 +20,9 @@ from planner.problem import RoutingProblem
 from planner.solver import SolveLimit, solver
 from planner.tour import UNIT, integer_metric
 
-# What a planner makes of a problem: length of its tour in m, its lower bound in m or None, whether it is proven.
-Answer = tuple[float, float | None, bool]
+# What a planner makes of a problem: length of its tour in m (None: found none), its lower bound in m if it gives one,
+# whether it is proven.
+Answer = tuple[float | None, float | None, bool]
 Method = Callable[[RoutingProblem], Answer]
 
 
@@ -85,7 +86,7 @@ def by_pyvrp(problem: RoutingProblem, seconds: float) -> Answer:
     for s in problem.shipments:
         model.add_shipment(places[s.pickup], places[s.delivery], amount=1)
     result = model.solve(MaxRuntime(seconds), display=False)
-    return (result.cost() * UNIT if result.is_feasible() else float("inf")), None, False
+    return (result.cost() * UNIT if result.is_feasible() else None), None, False
 
 
 def by_vroom(problem: RoutingProblem) -> Answer:
@@ -104,7 +105,7 @@ def by_vroom(problem: RoutingProblem) -> Answer:
             amount=vroom.Amount([1]),
         )
     found = task.solve(exploration_level=5, nb_threads=1, timeout=timedelta(seconds=60))
-    return (found.summary.cost * UNIT if not found.summary.unassigned else float("inf")), None, False
+    return (found.summary.cost * UNIT if not found.summary.unassigned else None), None, False
 
 
 if __name__ == "__main__":
