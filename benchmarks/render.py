@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 
 from experiments.conditions import TaskBoard
+from experiments.examples.environment_speed import SETTINGS, steps_per_second
 from experiments.house import House
 from hud.compose import Compositor
 from hud.conditions import condition
@@ -83,6 +84,7 @@ def measure() -> dict[str, Any]:
         "default_quality": default,
         "default_quality_authored_lights": authored,
         "hud": hud,
+        "environment": measure_environment(),
         **headline,
     }
 
@@ -104,6 +106,9 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     yield f"  only those of the house that do: {authored['ms']:.0f} ms, {result['authored_over_fast']:.1f} x fast"
     hud = result["hud"]
     yield f"HUD: {hud['steady_ms']:.2f} ms per frame, {hud['first_ms']:.1f} ms the first time"
+    yield "Gymnasium environment, random actions, steps per core-second:"
+    for name, rate in result["environment"].items():
+        yield f"  {name}: {rate:.0f}"
     for label, key, relation, bound in TARGETS:
         holds = result[key] <= bound if relation == "<=" else result[key] >= bound
         yield f"{label}: {result[key]:.2f} ({relation} {bound:g}: {'holds' if holds else 'MISSED'})"
@@ -237,6 +242,11 @@ def measure_hud(subject: Subject, frames: int = 200) -> dict[str, Any]:
     first = draw(0)
     steady = [draw(number) for number in range(1, frames)]
     return {"first_ms": 1e3 * first, "steady_ms": 1e3 * float(np.mean(steady))}
+
+
+def measure_environment(seconds: float = 2.0) -> dict[str, float]:
+    """Steps per core-second of the Gymnasium environment without and with pixels."""
+    return {name: steps_per_second(SETTINGS[name], seconds)[0] for name in ("state", "state, rgb 128 x 96")}
 
 
 @contextmanager

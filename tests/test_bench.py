@@ -48,7 +48,7 @@ def test_the_render_benchmark_measures_positive_times_and_judges_them() -> None:
     result = {
         "renderer": "r", "gl": "v", "clock": "CPU time", "views": 9, "geoms": 3, "frames": [row], "hud": hud,
         "default_quality": quality, "default_quality_authored_lights": quality, "authored_over_fast": 20.0,
-        "with_hud_ratio": 1.2, "default_over_fast": 20.0, "hud_steady_ms": 0.5,
+        "environment": {"state": 1600.0}, "with_hud_ratio": 1.2, "default_over_fast": 20.0, "hud_steady_ms": 0.5,
     }  # fmt: skip
     verdicts = [line.rpartition(": ")[2].rstrip(")") for line in module.lines(result)][-3:]
     assert verdicts == ["MISSED", "holds", "holds"]
