@@ -13,7 +13,7 @@ from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
 from mjsim.observation import Observation
-from mjsim.render import Renderer, gl_info, render_house_map, render_pictures
+from mjsim.render import Renderer, render_house_map, render_pictures
 from mjsim.scene import Scene
 from mjsim.world import World
 
@@ -42,7 +42,6 @@ class Glasses:
     """
 
     def __init__(self, scene: Scene, house: House, film: FilmConfig) -> None:
-        self.renderer_name = gl_info().renderer
         self._renderer = Renderer(scene.model, width=film.width, height=film.height, profile=film.profile)
         self._house = house
         self._pictures = render_pictures(house.catalogue)

@@ -24,6 +24,7 @@ from experiments.records import EventLog
 from experiments.session import Progress, Session, Viewer
 from experiments.video import VideoWriter
 from mjsim.errors import PhysicsError
+from mjsim.render import gl_info
 from mjsim.scene import Scene, compose
 from mjsim.world import World
 from planner.live import LiveReplanner
@@ -124,7 +125,9 @@ def run_trial(
             "ended": ran.ended,
             **dataclasses.asdict(compute_metrics(ran.log.events, arrays["position"])),
             **_health(ran.world, arrays),
-            **ran.shown,
+            "frames_sha256": ran.frames_sha256,
+            # Named wherever anything was drawn, if only the floor plan.
+            "renderer": gl_info().renderer if film or topdown else None,
             "wall_s": round(time.perf_counter() - started, 3),
         }
         records.write_json(folder / records.METRICS, metrics)
@@ -133,13 +136,13 @@ def run_trial(
 
 @dataclass(frozen=True, eq=False)
 class _Ran:
-    """A session that is over: why it ended, or how the physics failed, and what the film was."""
+    """A session that is over: why it ended, or how the physics failed, and the hash of the film's frames."""
 
     session: Session
     world: World
     log: EventLog
     ended: str | PhysicsError
-    shown: dict[str, Any]
+    frames_sha256: str | None
 
 
 def _simulate(
@@ -153,7 +156,7 @@ def _simulate(
     """Run the session of a trial; log and video are complete in `folder` afterwards."""
     with ExitStack() as stack:
         log = stack.enter_context(EventLog(folder / records.EVENTS))
-        glasses = video = viewer = None
+        video = viewer = None
         if film is not None:
             glasses = stack.enter_context(Glasses(scene, house, film))
             target = folder / records.VIDEO
@@ -167,11 +170,7 @@ def _simulate(
             ended: str | PhysicsError = session.run(on_progress)
         except PhysicsError as error:
             ended = error
-    shown = {
-        "frames_sha256": video.frames_sha256 if video else None,
-        "renderer": glasses.renderer_name if glasses else None,
-    }
-    return _Ran(session, world, log, ended, shown)
+    return _Ran(session, world, log, ended, video.frames_sha256 if video else None)
 
 
 def prepare_session(
