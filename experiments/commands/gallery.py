@@ -6,11 +6,10 @@ from typing import Any
 
 from rich.console import Console
 
-from experiments.commands.options import frame_size
+from experiments.commands.options import add_frame
 from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
 from experiments.glasses import FilmConfig
 from experiments.trial import TrialConfig
-from mjsim.render import PROFILES
 
 SEED = 7
 CONDITIONS = ("none", "highlight", "optimal")
@@ -36,15 +35,7 @@ def add_parser(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the pictures")
-    parser.add_argument(
-        "--size", type=frame_size, default=(960, 720), metavar="WxH", help="frame size (960x720)"
-    )
-    parser.add_argument(
-        "--profile",
-        default="quality",
-        metavar="NAME",
-        help=f"render profile: {', '.join(PROFILES)} (quality)",
-    )
+    add_frame(parser, size=(960, 720), profile="quality")
     parser.add_argument(
         "--contact-sheet",
         action="store_true",

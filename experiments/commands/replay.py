@@ -8,12 +8,11 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.commands.options import assistance_help, frame_size
+from experiments.commands.options import add_frame, assistance_help
 from experiments.errors import ConfigError, ReplayError
 from experiments.glasses import FilmConfig
 from experiments.replaying.overview import CAMERAS, FIRST_PERSON
 from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
-from mjsim.render import PROFILES
 
 DESCRIPTION = """\
 Simulate a recorded run again and verify, at every control step, that the state of the physics is the recorded one to
@@ -56,12 +55,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--assistance", metavar="NAME", help=f"show the glasses of another {assistance_help()} (as recorded)"
     )
-    parser.add_argument(
-        "--size", type=frame_size, default=(640, 480), metavar="WxH", help="frame size (640x480)"
-    )
-    parser.add_argument(
-        "--profile", default="fast", metavar="NAME", help=f"render profile: {', '.join(PROFILES)} (fast)"
-    )
+    add_frame(parser)
     parser.set_defaults(run=run)
 
 
