@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 from mjsim.errors import ActionError
 
+FIDELITIES = ("full", "windows", "event")
+
 
 @dataclass(frozen=True)
 class WorldOptions:
-    """Limits of walking, reach and grip.
+    """Limits of walking, reach and grip, and how much of it all is physics.
 
     Attributes:
         control_timestep: Duration of one `World.step`, s; a multiple of the model's timestep.
@@ -26,9 +28,12 @@ class WorldOptions:
         settle_time: How long a released object may take to come to rest, s.
         settle_speed: Slower than this is at rest, m/s.
         volume_margin: How far outside of a receptacle's volume a centre still counts as inside, m.
+        fidelity: `full`, everything in physics; `windows`, physics while something is picked or placed, and
+            kinematic walking in between; `event`, kinematic throughout, but for the fall of what is let go
+            (docs/fidelity.md).
 
     Raises:
-        ActionError: A value is not a positive finite number.
+        ActionError: A value is not a positive finite number, or there is no such fidelity.
     """
 
     control_timestep: float = 0.04
@@ -45,9 +50,14 @@ class WorldOptions:
     settle_time: float = 2.5
     settle_speed: float = 0.05
     volume_margin: float = 0.005
+    fidelity: str = "full"
 
     def __post_init__(self) -> None:
+        if self.fidelity not in FIDELITIES:
+            raise ActionError(f"no fidelity {self.fidelity!r}; choose one of {', '.join(FIDELITIES)}")
         for field in dataclasses.fields(self):
+            if field.name == "fidelity":
+                continue
             value = getattr(self, field.name)
             if not (math.isfinite(value) and value > 0):
                 raise ActionError(f"WorldOptions.{field.name} must be a positive number, got {value!r}")

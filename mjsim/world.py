@@ -1,11 +1,13 @@
 """The world: one person, one house, stepped at a fixed control rate with contact physics."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mjsim import avatar
 from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick, Place, WorldEvent
@@ -23,6 +25,7 @@ from mjsim.recording import StateHash, WorldState, set_physics, take_physics
 from mjsim.rig import Rig
 from mjsim.rules import resolve_pick, resolve_place
 from mjsim.scene import Scene
+from mjsim.stretch import Stretch
 
 # A delivered object may be shoved a little by the next one; farther out than this it is out.
 _DISLODGED_MARGIN = 0.03
@@ -193,6 +196,47 @@ class World:
         self._watch_grips()
         self._watch_deliveries()
         return StepResult(self.observation(), result, tuple(self._events))
+
+    def walk(self, moves: ArrayLike) -> Stretch:
+        """Take one control step per row, as `step(Move(*row))` would; stops early after a step with events.
+
+        Args:
+            moves: Columns forward, left (m/s), turn and look (rad/s), shape (n, 4).
+
+        Raises:
+            ActionError: A pick or place is under way, or the moves have another shape or are not finite.
+            PhysicsError: As in `step`.
+        """
+        rows = np.asarray(moves, dtype=np.float64)
+        if self.busy:
+            raise ActionError("a pick or place is under way; `finish` it before walking")
+        if rows.ndim != 2 or rows.shape[1] != 4 or not np.isfinite(rows).all():
+            raise ActionError(f"moves must be finite numbers of shape (n, 4), got shape {rows.shape}")
+        return self._stretch(Move(*row) for row in rows.tolist())
+
+    def finish(self) -> Stretch:
+        """Step with `IDLE` until no pick or place is under way; no step at all when none is.
+
+        As `walk`, it stops early after a step with events; where one happened besides, the world is busy still.
+
+        Raises:
+            PhysicsError: As in `step`.
+        """
+        return self._stretch(iter(lambda: IDLE if self.busy else None, None))
+
+    def _stretch(self, actions: Iterable[Action]) -> Stretch:
+        observations: list[Observation] = []
+        hashes: list[int] = []
+        events: tuple[WorldEvent, ...] = ()
+        for action in actions:
+            result = self.step(action)
+            observations.append(result.observation)
+            hashes.append(self.state_hash())
+            events = result.events
+            if events:
+                break
+        last = observations[-1] if observations else self.observation()
+        return Stretch.of(observations, hashes, last, events)
 
     def observation(self) -> Observation:
         """The present state."""

@@ -1,0 +1,60 @@
+"""Many control steps as one value."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.actions import WorldEvent
+from mjsim.observation import Observation
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """What n control steps brought; row i is the state after step i, as single steps would have observed it.
+
+    Attributes:
+        positions: The person's floor positions, m, shape (n, 2).
+        headings: Yaw of the body, rad, shape (n,).
+        pitches: Pitch of the head, rad, shape (n,).
+        object_positions: Object origins, m, shape (n, k, 3).
+        object_quaternions: Orientations wxyz, shape (n, k, 4).
+        state_hashes: `World.state_hash` after each step, shape (n,).
+        observation: State after the last step.
+        events: What happened; only the last step can have events.
+    """
+
+    positions: NDArray[np.float64]
+    headings: NDArray[np.float64]
+    pitches: NDArray[np.float64]
+    object_positions: NDArray[np.float64]
+    object_quaternions: NDArray[np.float64]
+    state_hashes: NDArray[np.uint64]
+    observation: Observation
+    events: tuple[WorldEvent, ...]
+
+    def __len__(self) -> int:
+        return len(self.headings)
+
+    @classmethod
+    def of(
+        cls,
+        observations: list[Observation],
+        state_hashes: list[int],
+        last: Observation,
+        events: tuple[WorldEvent, ...],
+    ) -> "Stretch":
+        """Stack the observations after each step; `last` stands for them where there are none."""
+        count, objects = len(observations), len(last.object_names)
+        return cls(
+            positions=np.array([o.position for o in observations]).reshape(count, 2),
+            headings=np.array([o.heading for o in observations]),
+            pitches=np.array([o.pitch for o in observations]),
+            object_positions=np.array([o.object_positions for o in observations]).reshape(count, objects, 3),
+            object_quaternions=np.array([o.object_quaternions for o in observations]).reshape(
+                count, objects, 4
+            ),
+            state_hashes=np.array(state_hashes, np.uint64),
+            observation=last,
+            events=events,
+        )
