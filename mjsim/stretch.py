@@ -14,6 +14,7 @@ class Stretch:
     """What n control steps brought; row i is the state after step i, as single steps would have observed it.
 
     Attributes:
+        times: Simulated time, s, shape (n,).
         positions: The person's floor positions, m, shape (n, 2).
         headings: Yaw of the body, rad, shape (n,).
         pitches: Pitch of the head, rad, shape (n,).
@@ -24,6 +25,7 @@ class Stretch:
         events: What happened; only the last step can have events.
     """
 
+    times: NDArray[np.float64]
     positions: NDArray[np.float64]
     headings: NDArray[np.float64]
     pitches: NDArray[np.float64]
@@ -47,6 +49,7 @@ class Stretch:
         """Stack the observations after each step; `last` stands for them where there are none."""
         count, objects = len(observations), len(last.object_names)
         return cls(
+            times=np.array([o.time for o in observations]),
             positions=np.array([o.position for o in observations]).reshape(count, 2),
             headings=np.array([o.heading for o in observations]),
             pitches=np.array([o.pitch for o in observations]),
