@@ -23,6 +23,8 @@ TEXTS: Final = MappingProxyType(
         "pick_failed": (_NO, "The {object} slipped. Try again from a little closer."),
         "place_failed": (_NO, "The {object} did not stay in the {receptacle}. Try again."),
         "grip_lost": (_NO, "You dropped the {object} on the way."),
+        "ejected": (_NO, "The {object} flew off."),
+        "tunnelled": (_NO, "The {object} slipped through a gap."),
         "dislodged": (_NO, "The {object} fell out of the {receptacle}."),
         "busy": (_NO, "One moment: your hands are still moving."),
         "nothing_in_reach": (_NO, "Nothing in reach. Walk closer to an object or a bin."),

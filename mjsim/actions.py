@@ -99,7 +99,7 @@ class ActionResult:
 
 
 class EventKind(enum.Enum):
-    """What happened in the physics; the outcome of a begun motion or of bad luck."""
+    """What happened in the physics: the outcome of a begun motion, bad luck, or an escape (docs/health.md)."""
 
     PICKED = "picked"
     PICK_FAILED = "pick_failed"
@@ -107,6 +107,8 @@ class EventKind(enum.Enum):
     PLACE_FAILED = "place_failed"
     GRIP_LOST = "grip_lost"
     DISLODGED = "dislodged"
+    EJECTED = "ejected"
+    TUNNELLED = "tunnelled"
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,6 @@ class Carrying:
         """Whether a hand has for too long been stretched off its load, or held back by it; counts this step."""
         person = self._person
         error = person.grips.error(hand)
-        person.monitor.max_weld_error = max(person.monitor.max_weld_error, error)
         held_back = float(np.linalg.norm(person.rig.hands[hand] - person.rig.hand_targets[hand]))
         strained = error > person.options.grip_error or held_back > _MOST_HELD_BACK
         self._strained[hand] = self._strained[hand] + 1 if strained else 0

@@ -1,5 +1,7 @@
 """Hands hold objects by welds between a hand's site and a grip site of the object."""
 
+import math
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -66,10 +68,25 @@ class Grips:
             self._data.eq_active[self._welds[hand, closed[0], closed[1]]] = 0
             self._closed[hand] = None
 
+    @property
+    def gripped(self) -> tuple[int, ...]:
+        """Objects that are welded to a hand."""
+        return tuple(closed[0] for closed in self._closed if closed is not None)
+
     def error(self, hand: int) -> float:
         """How far the weld of a hand is stretched, m; 0 when it holds nothing."""
         closed = self._closed[hand]
         return 0.0 if closed is None else self.gap(hand, *closed)
+
+    def errors(self, hand: int) -> tuple[float, float]:
+        """How far the weld of a hand is stretched, m, and twisted, rad; NaN when it holds nothing."""
+        closed = self._closed[hand]
+        if closed is None:
+            return math.nan, math.nan
+        hand_site, site = self._hand_sites[hand], self._sites[closed]
+        # The trace of the rotation from one to the other is 1 + 2 cos(angle).
+        cosine = 0.5 * (float(self._data.site_xmat[hand_site] @ self._data.site_xmat[site]) - 1.0)
+        return self.gap(hand, *closed), math.acos(min(1.0, max(-1.0, cosine)))
 
     def memory(self) -> list[list[int] | None]:
         """Object and grip that each hand holds, JSON-ready; the welds themselves are part of the physics."""

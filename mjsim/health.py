@@ -1,84 +1,204 @@
-"""Whether the physics is well: warnings, penetration, weld errors and settling times."""
+"""Whether the physics is well: warnings, penetration, weld errors, settling times, ejections and tunnelling.
 
-import dataclasses
-from dataclasses import dataclass, field
+`docs/health.md` defines every term. What cannot be trusted any further is a `PhysicsError`; what can be is counted,
+and reported as an event.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from mjsim.actions import EventKind
 from mjsim.errors import PhysicsError
+from mjsim.escapes import MOVED_DISTANCE, Escapes, Releases
+from mjsim.grips import Grips
+from mjsim.options import WorldOptions
+from mjsim.rig import Rig
+from mjsim.scene import Scene
+from mjsim.survey import ESCAPING, NOT_FINITE, WARNED, survey
+
+Pair = tuple[float, float]
+_Latest = tuple[float, float, Pair, Pair, float]
+
+_NOTHING: Pair = (math.nan, math.nan)
+_KICK = 2.0  # times the walking speed: a light thing that bounces off somebody who walks into it
+_FALL = 5.6  # m/s, from the height at which things are carried
+
+
+@dataclass(frozen=True)
+class HealthSample:
+    """The physics at the end of one control step.
+
+    Attributes:
+        penetration_m: Deepest overlap of an object with anything but the person, m. The person's foot is left out
+            because it is soft on purpose: it pushes and never launches.
+        trunk_penetration_m: Deepest overlap of the person's trunk with the house, m.
+        weld_error_m: Distance between each hand and the grip that it carries, m; NaN where it carries nothing.
+        weld_error_rad: Angle between each hand and the grip that it carries, rad; NaN where it carries nothing.
+        settle_s: Time from release to rest of an object that has come to rest in this step, the longest if there
+            are several, s; NaN if there is none.
+    """
+
+    penetration_m: float = 0.0
+    trunk_penetration_m: float = 0.0
+    weld_error_m: Pair = _NOTHING
+    weld_error_rad: Pair = _NOTHING
+    settle_s: float = math.nan
 
 
 @dataclass(frozen=True)
 class Health:
-    """Extremes since the last reset.
+    """Extremes and counts since the last reset.
 
     Attributes:
-        max_penetration_m: Deepest overlap of an object with anything but the person, m, sampled once per control
-            step. The person's foot is left out because it is soft on purpose: it pushes and never launches.
-        max_trunk_penetration_m: Deepest overlap of the person's trunk with the house, m.
-        max_weld_error_m: Largest distance between a hand and the grip it carries, m, alignment after a grip
-            left out.
+        max_penetration_m: Largest `HealthSample.penetration_m`.
+        max_trunk_penetration_m: Largest `HealthSample.trunk_penetration_m`.
+        max_weld_error_m: Largest `HealthSample.weld_error_m`; 0 if nothing was carried.
+        max_weld_error_rad: Largest `HealthSample.weld_error_rad`; 0 if nothing was carried.
         settle_times: Seconds from each release to rest, in order.
-        max_settle_time: The longest of them, s; 0 when nothing was released.
+        ejections: Objects that flew off, out of the house, or faster than anything can fall or be kicked.
+        tunnellings: Objects that passed through something solid.
         warnings: Number of MuJoCo warnings; any one ends the simulation with a `PhysicsError`.
     """
 
     max_penetration_m: float = 0.0
     max_trunk_penetration_m: float = 0.0
     max_weld_error_m: float = 0.0
+    max_weld_error_rad: float = 0.0
     settle_times: tuple[float, ...] = ()
+    ejections: int = 0
+    tunnellings: int = 0
     warnings: int = 0
 
     @property
     def max_settle_time(self) -> float:
-        """Longest time from a release to rest, s."""
+        """Longest time from a release to rest, s; 0 when nothing was released."""
         return max(self.settle_times, default=0.0)
 
 
-@dataclass
 class HealthMonitor:
-    """Accumulates `Health` over control steps."""
+    """Looks at the physics after every control step."""
 
-    foot: int
-    trunk: int
-    max_penetration: float = 0.0
-    max_trunk_penetration: float = 0.0
-    max_weld_error: float = 0.0
-    settle_times: list[float] = field(default_factory=list)
+    def __init__(self, scene: Scene, options: WorldOptions, rig: Rig, grips: Grips) -> None:
+        index = scene.index
+        self._index, self._rig, self._grips = index, rig, grips
+        self._limits = (
+            np.array([MOVED_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
+        )
+        self._marks = np.zeros(len(index.names), np.uint8)
+        self._escapes = Escapes(scene)
+        self._releases = Releases(scene)
+        self.reset()
 
-    def check(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    @property
+    def sample(self) -> HealthSample:
+        """What the latest control step was like."""
+        return HealthSample(*self._latest)
+
+    def reset(self) -> None:
+        """Forget everything; the state is that of the beginning."""
+        self._deepest = self._deepest_trunk = self._stretched = self._twisted = 0.0
+        self._settle_times: list[float] = []
+        self._latest: _Latest = (0.0, 0.0, _NOTHING, _NOTHING, math.nan)
+        self._escapes.reset(self._rig.data)
+        self._releases.reset()
+
+    def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
         """Record this control step.
+
+        Args:
+            held: Object that each hand carries.
+
+        Returns:
+            Escapes of objects, each with the object's number.
 
         Raises:
             PhysicsError: MuJoCo warned, or a position or velocity is not finite.
         """
-        if data.warning.number.any():
-            raise PhysicsError(_warning_text(data))
-        if not np.isfinite(np.dot(data.qvel, data.qvel) + np.dot(data.qpos, data.qpos)):
-            raise PhysicsError(_not_finite_text(model, data))
-        if data.ncon:
-            geoms, depth = data.contact.geom, -data.contact.dist
-            trunk = (geoms == self.trunk).any(axis=1)
-            person = trunk | (geoms == self.foot).any(axis=1)
-            self.max_penetration = max(self.max_penetration, float(depth.max(where=~person, initial=0.0)))
-            deepest = float(depth.max(where=trunk, initial=0.0))
-            self.max_trunk_penetration = max(self.max_trunk_penetration, deepest)
+        data = self._rig.data
+        escaping, deepest, trunk = self._survey(data)
+        self._deepest, self._deepest_trunk = max(self._deepest, deepest), max(self._deepest_trunk, trunk)
+        lengths, angles = self._weld_errors(held)
+        gripped = self._grips.gripped
+        settle = math.nan
+        if gripped or self._releases.any:
+            settled = self._releases.follow(data, gripped, self._marks)
+            self._settle_times += settled
+            settle = max(settled, default=math.nan)
+        self._latest = (deepest, trunk, lengths, angles, settle)
+        if not escaping and not self._releases.falling:
+            return ()
+        return self._escapes.find(data, self._marks, self._releases, gripped)
 
     def memory(self) -> dict[str, Any]:
         """Everything accumulated, JSON-ready."""
-        return dataclasses.asdict(self)
+        deepest, trunk, lengths, angles, settle = self._latest
+        return {
+            "extremes": [self._deepest, self._deepest_trunk, self._stretched, self._twisted],
+            "settle_times": list(self._settle_times),
+            "latest": _plain((deepest, trunk, *lengths, *angles, settle)),
+            "escapes": self._escapes.memory(),
+            "releases": self._releases.memory(),
+        }
 
-    def snapshot(self, data: mujoco.MjData) -> Health:
+    def recall(self, memory: dict[str, Any]) -> None:
+        """Take over what `memory` gave."""
+        self._deepest, self._deepest_trunk, self._stretched, self._twisted = map(float, memory["extremes"])
+        self._settle_times = [float(t) for t in memory["settle_times"]]
+        values = [math.nan if v is None else float(v) for v in memory["latest"]]
+        deepest, trunk, left, right, left_angle, right_angle, settle = values
+        self._latest = (deepest, trunk, (left, right), (left_angle, right_angle), settle)
+        self._escapes.recall(memory["escapes"])
+        self._releases.recall(memory["releases"])
+
+    def snapshot(self) -> Health:
         """The extremes as a value."""
         return Health(
-            max_penetration_m=self.max_penetration,
-            max_trunk_penetration_m=self.max_trunk_penetration,
-            max_weld_error_m=self.max_weld_error,
-            settle_times=tuple(self.settle_times),
-            warnings=int(data.warning.number.sum()),
+            max_penetration_m=self._deepest,
+            max_trunk_penetration_m=self._deepest_trunk,
+            max_weld_error_m=self._stretched,
+            max_weld_error_rad=self._twisted,
+            settle_times=tuple(self._settle_times),
+            ejections=self._escapes.ejections,
+            tunnellings=self._escapes.tunnellings,
+            warnings=int(self._rig.data.warning.number.sum()),
         )
+
+    def _survey(self, data: mujoco.MjData) -> tuple[bool, float, float]:
+        """Whether any object may be escaping, and overlaps of objects and of the trunk, m; marks every object."""
+        index, rig, contact = self._index, self._rig, data.contact
+        state, deepest, trunk = survey(
+            data.qpos, data.qvel, data.xipos, contact.geom, contact.dist, data.warning.number,
+            index.bodies, index.dofs, index.geom_owner, rig.trunk, rig.foot,
+            self._limits, self._escapes.anchors, self._marks,
+        )  # fmt: skip
+        if state == WARNED:
+            raise PhysicsError(_warning_text(data))
+        if state == NOT_FINITE:
+            raise PhysicsError(_not_finite_text(rig.model, data))
+        return state == ESCAPING, deepest, trunk
+
+    def _weld_errors(self, held: Sequence[int | None]) -> tuple[Pair, Pair]:
+        left, right = held
+        if left is None and right is None:
+            return _NOTHING, _NOTHING
+        (first, first_angle), (second, second_angle) = (
+            _NOTHING if item is None else self._grips.errors(hand) for hand, item in enumerate(held)
+        )
+        # NaN loses every comparison.
+        for length, angle in ((first, first_angle), (second, second_angle)):
+            self._stretched = length if length > self._stretched else self._stretched
+            self._twisted = angle if angle > self._twisted else self._twisted
+        return (first, second), (first_angle, second_angle)
+
+
+def _plain(values: tuple[float, ...]) -> list[float | None]:
+    """NaN as None: JSON has no NaN."""
+    return [None if math.isnan(value) else value for value in values]
 
 
 def _warning_text(data: mujoco.MjData) -> str:

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.escapes import REST_STEPS
 from mjsim.person import Motion, Person, Steps, minimum_jerk, wrap
 from mjsim.receptacles import ReceptacleGeometry
 from mjsim.sight import first_hit
@@ -24,7 +25,6 @@ _DESCENT_SPEED = 0.5
 _TOUCH = 0.0005
 _OVERLAP = 0.001
 _RAISE = 0.003
-_REST_STEPS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +211,7 @@ def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry
     """Withdraw the hand upwards and wait until the object rests."""
     rig, options = person.rig, person.options
     still, lifted = 0, 0
-    for step in range(1, person.steps(options.settle_time) + 1):
+    for _ in range(person.steps(options.settle_time)):
         if lifted < 4:
             rig.hand_targets[hand, 2] += 0.035
             lifted += 1
@@ -221,7 +221,6 @@ def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry
         yield
         quiet = person.speed(item) < options.settle_speed or person.asleep(item)
         still = still + 1 if quiet else 0
-        if still >= _REST_STEPS:
-            person.monitor.settle_times.append((step - _REST_STEPS) * person.dt)
+        if still >= REST_STEPS:
             return receptacle.contains(person.center(item), options.volume_margin)
     return False

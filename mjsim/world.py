@@ -14,7 +14,7 @@ from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick, Pla
 from mjsim.carrying import Carrying
 from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.grips import Grips
-from mjsim.health import Health, HealthMonitor
+from mjsim.health import Health, HealthMonitor, HealthSample
 from mjsim.inventory import LEFT, RIGHT, Inventory
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
@@ -82,7 +82,8 @@ class World:
         self.data = mujoco.MjData(scene.model)
         rig = Rig(scene, self.data, self.options.control_timestep)
         grips = Grips(scene, self.data, rig)
-        self._person = Person(scene, self.options, self.data, rig, grips, HealthMonitor(rig.foot, rig.trunk))
+        monitor = HealthMonitor(scene, self.options, rig, grips)
+        self._person = Person(scene, self.options, self.data, rig, grips, monitor)
         self._carrying = Carrying(self._person)
         self._motion: _Motion | None = None
         self._hash = StateHash(scene.model)
@@ -101,7 +102,12 @@ class World:
     @property
     def health(self) -> Health:
         """Extremes of the physics since the last reset."""
-        return self._person.monitor.snapshot(self.data)
+        return self._person.monitor.snapshot()
+
+    @property
+    def health_sample(self) -> HealthSample:
+        """What the physics was like in the latest control step."""
+        return self._person.monitor.sample
 
     @property
     def busy(self) -> bool:
@@ -113,9 +119,9 @@ class World:
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_forward(self.model, self.data)
         person = self._person
-        person.monitor = HealthMonitor(person.rig.foot, person.rig.trunk)
         person.rig.reset()
         person.grips.reset()
+        person.monitor.reset()
         person.hand_velocities = np.zeros((2, 3))
         self._carrying.reset()
         self._end_motion()
@@ -165,7 +171,7 @@ class World:
         self._events = []
         try:
             memory = json.loads(state.memory)
-            person.monitor = HealthMonitor(**memory["health"])
+            person.monitor.recall(memory["health"])
             person.rig.recall(memory["rig"])
             person.grips.recall(memory["grips"])
             person.hand_velocities = np.array(memory["hand_velocities"])
@@ -192,7 +198,8 @@ class World:
             self._run_motion(self._motion)
         self._carrying.update(self._held_posture())
         self._person.rig.advance()
-        self._person.monitor.check(self.model, self.data)
+        for kind, item in self._person.monitor.check(self._person.held):
+            self._report(kind, item)
         self._watch_grips()
         self._watch_deliveries()
         return StepResult(self.observation(), result, tuple(self._events))

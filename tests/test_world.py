@@ -273,8 +273,10 @@ def test_a_pulled_object_slips_out_of_the_hand(make: Make) -> None:
     world = make((1.5, 2.0, 0.0), ("cube", 2.1, 2.0))
     do(world, Pick())
     body = int(world.scene.index.bodies[0])
-    world.data.xfrc_applied[body, :3] = (0.0, 0.0, -300.0)
-    events = run(world, [IDLE] * 15)
+    world.data.xfrc_applied[body, :3] = (0.0, 0.0, -100.0)
+    events: list[WorldEvent] = []
+    while not events and world.data.time < 10.0:
+        events = run(world, [IDLE])
     world.data.xfrc_applied[:] = 0.0
     assert [(e.kind, e.object) for e in events] == [(EventKind.GRIP_LOST, "o0")]
     run(world, [IDLE] * 40)
@@ -348,7 +350,10 @@ def test_an_object_knocked_out_of_its_receptacle_is_loose_again(make: Make) -> N
     address = int(world.scene.index.qpos[0])
     world.data.qpos[address : address + 3] = (1.5, 2.0, 0.3)
     events = run(world, [IDLE] * 25)
-    assert [(e.kind, e.object, e.receptacle) for e in events] == [(EventKind.DISLODGED, "o0", "crate")]
+    assert [(e.kind, e.object, e.receptacle) for e in events] == [
+        (EventKind.TUNNELLED, "o0", None),  # this hand reaches through walls
+        (EventKind.DISLODGED, "o0", "crate"),
+    ]
     assert world.observation().object_status == (ObjectStatus.LOOSE,)
 
 
