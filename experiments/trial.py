@@ -47,8 +47,9 @@ class TrialConfig:
         house: House name, or path of a catalogue.
         planner: Solver of the routing problem.
         time_limit: Simulated time after which the trial ends, s; None for a generous one.
-        live: Plan against the clock, with proofs in the background, as for a person. Such a run depends on how fast
-            the machine is; a replay of it shows the plans that were shown.
+        live: Plan against the clock, with proofs in the background, as for a person; what takes long is done before
+            the clock starts. Such a run depends on how fast the machine is; a replay of it shows the plans that were
+            shown.
     """
 
     objects: int
@@ -215,6 +216,8 @@ def prepare_session(
         order=order,
         log=log,
     )
+    if config.live:
+        assistant.familiarise(world.observation())
     session = Session(
         world,
         assistant,

@@ -113,6 +113,15 @@ class Replanner:
         self._planned = dict(state.loose)
         return self._route
 
+    def prepare(self, state: TaskState, *, seconds: float | None = None) -> Route:  # noqa: ARG002 - it never waits
+        """Plan the task before its clock starts.
+
+        Args:
+            state: The task at its start.
+            seconds: Longest wait for proofs in the background, if the replanner makes them.
+        """
+        return self.plan(state)
+
     @property
     def pending(self) -> bool:
         """Whether `poll` has something to look at; it never has for this replanner."""

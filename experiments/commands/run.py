@@ -32,7 +32,13 @@ Run one trial: a simulated person tidies a disorganized apartment under an assis
   events.jsonl     everything that happened          plan.json      every plan that was made
   trajectory.npz   poses and actions, 25 per second  topdown.png    floor plan with planned and walked path
   video.mp4        what the person saw
-Equal options and seeds give equal frames and files (but for the wall time in metrics.json)."""
+Equal options and seeds give equal frames and files (but for the wall time in metrics.json).
+
+With --live the assistant plans as it does beside a person. Before the clock starts, while a person would look
+around, it plans the task and proves the plan. After a deviation it shows a plan within some 50 ms and goes on looking
+for a shorter one in a thread; no control step waits for that. What is found depends on the machine, so such a run does
+not repeat; events.jsonl and plan.json hold every plan that was shown ("improved": found later for the same task, no
+replan), and `mjsim replay` shows these."""
 
 
 def add_parser(commands: Any) -> None:
@@ -54,6 +60,11 @@ def add_parser(commands: Any) -> None:
     add_house(parser)
     add_planner(parser)
     parser.add_argument(
+        "--live",
+        action="store_true",
+        help="plan against the clock, with proofs in the background, as for a person (see above)",
+    )
+    parser.add_argument(
         "--time-limit", type=float, metavar="S", help="simulated seconds after which the trial ends"
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run directory to write")
@@ -72,6 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         house=arguments.house,
         planner=arguments.planner,
         time_limit=arguments.time_limit,
+        live=arguments.live,
     )
     film = None if arguments.no_video else FilmConfig(arguments.size[0], arguments.size[1], arguments.profile)
     console = Console(stderr=True)
