@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from hud import panels
+from hud import checklist, panels
 from hud.canvas import Patch, Rect
 from hud.errors import FrameError
 from hud.layout import Layout, arrange, pointer_rect
 from hud.minimap import Kind, draw_base, draw_mark, marks
 from hud.options.minimap import FLOORPLAN
-from hud.panels import Pen, Pictures
+from hud.pen import Pen
 from hud.state import HudState, MiniMap
-from hud.text import Typeface
+from hud.stencils import Pictures, Stencils
 
 POINTER_STEPS = 72  # drawn directions of the pointer, 5 degrees apart
 
@@ -41,8 +41,8 @@ class Compositor:
                 raise FrameError(
                     f"picture {key!r} must be uint8 (s, s, 4), got {picture.dtype} {picture.shape}"
                 )
-        self._pictures = dict(pictures)
-        self._face = Typeface()
+        self._stencils = Stencils(dict(pictures))
+        self._pen = Pen(self._stencils, 1.0)
         self._layout: tuple[object, Layout] | None = None
         self._patches: dict[str, tuple[object, Patch]] = {}
 
@@ -63,7 +63,9 @@ class Compositor:
             raise FrameError(f"frame must be uint8 (H, W, 3), got {frame.dtype} {frame.shape}")
         layout = self.layout(state, frame.shape[1], frame.shape[0])
         out = np.array(frame, dtype=np.uint8, order="C", copy=True)
-        pen = Pen(self._face, layout.unit, self._pictures)
+        if self._pen.unit != layout.unit:
+            self._pen = Pen(self._stencils, layout.unit)
+        pen = self._pen
         for name, rect in layout.panels().items():
             key, draw = _part(name, rect, state, layout)
             patch = self._patch(name, (layout.unit, rect.width, rect.height, key), draw, pen)
@@ -84,7 +86,7 @@ class Compositor:
         """
         key = (width, height, _without_what_moves(state))
         if self._layout is None or self._layout[0] != key:
-            self._layout = (key, arrange(key[2], width, height, self._face))
+            self._layout = (key, arrange(key[2], width, height, self._stencils.face))
         found = self._layout[1]
         if state.pointer is None:
             return found
@@ -136,8 +138,8 @@ def _part(name: str, rect: Rect, state: HudState, layout: Layout) -> tuple[objec
     if name == "checklist":
         items = state.checklist[layout.first : layout.stop]
         hidden = (layout.first, len(state.checklist) - layout.stop)
-        args = (state.checklist_title, items, layout.rows, hidden, panels.count_text(state.checklist))
-        return args, lambda pen: panels.draw_checklist(pen, rect, *args)
+        args = (state.checklist_title, items, layout.rows, hidden, checklist.count_text(state.checklist))
+        return args, lambda pen: checklist.draw_checklist(pen, rect, *args)
     if name == "bins":
         shown, more = state.bins[: len(layout.bin_rows)], len(state.bins) - len(layout.bin_rows)
         return (shown, more), lambda pen: panels.draw_bins(pen, rect, shown, layout.bin_rows, more)

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from hud import theme
-from hud.canvas import Canvas, Patch, Rect
-from hud.panels import Pen
+from hud.canvas import Patch, Rect
+from hud.pen import Pen
 from hud.rows import MAP_INSET
 from hud.state import MiniMap, Vec2
 from hud.theme import Rgb
@@ -45,7 +45,7 @@ def draw_base(pen: Pen, rect: Rect, picture_key: str, bounds: tuple[float, float
     """The panel with the house in it, greyer than life, so that what is drawn on top stands out for everybody."""
     canvas = pen.panel(rect)
     area = _Plan(bounds, rect, pen.unit).area
-    picture = pen.pictures.get(picture_key)
+    picture = pen.stencils.pictures.get(picture_key)
     if picture is not None:
         size = (area.width, area.height)
         scaled = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.float32)
@@ -78,7 +78,7 @@ def marks(rect: Rect, minimap: MiniMap, unit: float) -> tuple[Mark, ...]:
 def draw_mark(pen: Pen, kind: Kind, step: int) -> Patch:
     """The stamp of a mark."""
     half = math.ceil(REACH[kind] * pen.unit)
-    canvas = Canvas(2 * half + 1, 2 * half + 1, pen.face, pen.unit)
+    canvas = pen.canvas(2 * half + 1, 2 * half + 1)
     centre = half + 0.5
     for radius, colour in DISCS[kind]:
         canvas.circle(centre, centre, radius * pen.unit, colour)

@@ -1,130 +1,12 @@
-"""Drawing of each panel: values in, a patch out."""
+"""Drawing of the panels that say little at a time: values in, a patch out. The task list is in `hud.checklist`."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from hud import theme
-from hud.canvas import Canvas, Patch, Rect
-from hud.rows import (
-    EMPTY_WIDTH,
-    GAP,
-    HEADER,
-    LINE,
-    NUMBER,
-    PADDING,
-    SLOT_WIDTH,
-    TARGET,
-    TILE,
-    BinRow,
-    ListRow,
-)
-from hud.state import BinEntry, ChecklistItem, InventorySlot, Message, MessageKind
-from hud.text import Typeface
-
-Pictures = Mapping[str, NDArray[np.uint8]]
-
-
-@dataclass(frozen=True, eq=False)
-class Pen:
-    """What every panel is drawn with."""
-
-    face: Typeface
-    unit: float
-    pictures: Pictures
-
-    def panel(self, rect: Rect, radius: float = 8.0) -> Canvas:
-        """A canvas of the size of `rect` with the dark rounded background."""
-        canvas = Canvas(rect.width, rect.height, self.face, self.unit)
-        whole = Rect(0, 0, rect.width, rect.height)
-        canvas.rounded(whole, radius * self.unit, theme.PANEL, theme.PANEL_OPACITY)
-        canvas.rounded(whole, radius * self.unit, theme.EDGE, theme.EDGE_OPACITY, line=max(1.0, self.unit))
-        return canvas
-
-    def tile(self, canvas: Canvas, key: str | None, x: int, y: int, size: int, opacity: float = 1.0) -> None:
-        """A picture on a light rounded tile; an unknown key leaves the tile empty."""
-        canvas.rounded(Rect(x, y, size, size), 4.0 * self.unit, theme.TILE, 0.94 * opacity)
-        picture = self.pictures.get(key) if key is not None else None
-        if picture is not None:
-            inset = canvas.px(1)
-            canvas.picture(picture, x + inset, y + inset, size - 2 * inset, opacity)
-
-
-def count_text(items: tuple[ChecklistItem, ...]) -> str:
-    """What is left of a list, or which step of a numbered one is next."""
-    left = sum(not item.done for item in items)
-    if any(item.number is not None for item in items):
-        return f"step {len(items) - left + 1} / {len(items)}" if left else "done"
-    return f"{left} left" if left else "none left"
-
-
-def draw_checklist(
-    pen: Pen,
-    rect: Rect,
-    title: str,
-    items: tuple[ChecklistItem, ...],
-    rows: tuple[ListRow, ...],
-    hidden: tuple[int, int],
-    count: str,
-) -> Patch:
-    """The task list: the items that fit, how many are hidden before and after them, and a count beside the title."""
-    canvas = pen.panel(rect)
-    x, width = canvas.px(PADDING + 2), rect.width - 2 * canvas.px(PADDING + 2)
-    taken = canvas.text_width(count, theme.DETAIL) + canvas.px(GAP)
-    canvas.text(x, canvas.px(17), canvas.fit(title, theme.TITLE, width - taken), theme.TITLE, theme.TEXT)
-    canvas.text(rect.width - x - taken + canvas.px(GAP), canvas.px(17), count, theme.DETAIL, theme.QUIET)
-    top = canvas.px(HEADER)
-    for item, row in zip(items, rows, strict=True):
-        _checklist_row(pen, canvas, item, row, top)
-        top += row.height
-    notes = (f"{hidden[0]} above" if hidden[0] else "", f"+{hidden[1]} more" if hidden[1] else "")
-    footer = canvas.fit(" · ".join(note for note in notes if note), theme.DETAIL, width)
-    canvas.text(x, rect.height - canvas.px(PADDING), footer, theme.DETAIL, theme.QUIET)
-    return canvas.patch()
-
-
-def _checklist_row(pen: Pen, canvas: Canvas, item: ChecklistItem, row: ListRow, top: int) -> None:
-    px = canvas.px
-    side = px(TILE)
-    if item.current:
-        area = Rect(px(3), top, canvas.width - 2 * px(3), row.height)
-        canvas.rounded(area, 5.0 * pen.unit, theme.ACCENT, 0.16)
-        canvas.rounded(
-            Rect(px(2), top + px(4), px(3), row.height - 2 * px(4)), 1.5 * pen.unit, theme.ACCENT, 1.0
-        )
-    x = px(PADDING + 2)
-    if item.number is not None:
-        label = str(item.number)
-        right = x + px(NUMBER) - px(3)
-        face = theme.LABEL if item.current else theme.DETAIL
-        canvas.text(right - canvas.text_width(label, face), top + px(19), label, face, theme.QUIET)
-        x += px(NUMBER)
-    pen.tile(canvas, item.picture, x, top + px(3), side, 0.5 if item.done else 1.0)
-    if item.target_picture is not None:
-        small = px(TARGET)
-        left = canvas.width - px(PADDING) - small
-        pen.tile(canvas, item.target_picture, left, top + px(5), small, 0.4 if item.done else 1.0)
-    _row_text(canvas, item, row, x + side + px(GAP), top)
-
-
-def _row_text(canvas: Canvas, item: ChecklistItem, row: ListRow, x: int, top: int) -> None:
-    px = canvas.px
-    face = theme.ITEM_CURRENT if item.current else theme.ITEM
-    if canvas.text_width(item.text, face) > row.text_width:
-        face = theme.Face(theme.DETAIL.size, face.weight)
-    line = canvas.fit(item.text, face, row.text_width)
-    baseline = top + (px(13) if row.detail else px(19))
-    drawn = canvas.text(x, baseline, line, face, theme.DONE if item.done else theme.TEXT)
-    if item.done and drawn > 0:
-        y = baseline - px(4.5)
-        canvas.shape([(x - px(1), y), (x + drawn + px(1), y)], theme.TEXT, line=max(1.0, 1.2 * px(1)))
-    for i, detail in enumerate(row.detail):
-        canvas.text(
-            x, top + px(26 + LINE * i), detail, theme.DETAIL, theme.DONE if item.done else theme.QUIET
-        )
+from hud.canvas import Patch, Rect
+from hud.pen import Pen
+from hud.rows import EMPTY_WIDTH, GAP, HEADER, LINE, PADDING, SLOT_WIDTH, TILE, BinRow
+from hud.state import BinEntry, InventorySlot, Message, MessageKind
 
 
 def draw_bins(
@@ -153,7 +35,7 @@ def draw_bins(
 
 def draw_inventory(pen: Pen, rect: Rect, slots: tuple[InventorySlot, InventorySlot]) -> Patch:
     """Two hands, at the left and the right end: a picture and a name each, or a word that it is empty."""
-    canvas = Canvas(rect.width, rect.height, pen.face, pen.unit)
+    canvas = pen.canvas(rect.width, rect.height)
     px = canvas.px
     for i, (slot, hand) in enumerate(zip(slots, ("Left hand", "Right hand"), strict=True)):
         held = slot.label is not None
@@ -242,7 +124,7 @@ def draw_clock(pen: Pen, rect: Rect, text: str) -> Patch:
 
 def draw_pointer(pen: Pen, rect: Rect, angle: float) -> Patch:
     """A disc with an arrow in direction `angle`, rad, counter-clockwise from the right."""
-    canvas = Canvas(rect.width, rect.height, pen.face, pen.unit)
+    canvas = pen.canvas(rect.width, rect.height)
     centre, u = rect.width / 2.0, pen.unit
     canvas.circle(centre, centre, 16.5 * u, theme.TEXT, 0.9)
     canvas.circle(centre, centre, 15.0 * u, theme.PANEL, 0.9)

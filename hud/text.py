@@ -1,5 +1,7 @@
 """Text: measuring, shortening, wrapping and rasterising with the font that OpenCV carries inside."""
 
+import functools
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +15,13 @@ class Typeface:
 
     def __init__(self) -> None:
         self._face = cv2.FontFace(BUILT_IN_FONT)
+        self._width = functools.lru_cache(4096)(self._measure)
 
     def width(self, text: str, size: int, weight: int) -> int:
         """Width of a line, px."""
+        return self._width(text, size, weight)
+
+    def _measure(self, text: str, size: int, weight: int) -> int:
         if not text:
             return 0
         left, _, width, _ = cv2.getTextSize((0, 0), text, (0, 0), self._face, size, weight)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hud import sample, theme
+from hud import checklist, sample, theme
 from hud.canvas import Rect
 from hud.compose import Compositor, compose
 from hud.conditions import condition
@@ -56,13 +56,33 @@ def test_a_strided_frame_gives_the_same_picture() -> None:
 def test_what_a_compositor_drew_before_does_not_matter() -> None:
     pictures = sample.pictures()
     kept = Compositor(pictures)
-    for size in (SIZES[0], SIZES[1], SIZES[0]):
+    for size in (SIZES[0], SIZES[1], (1366, 768), SIZES[0]):
         frame = sample.backdrop(*size)
         for count, steps in ((6, 3), (24, 9), (6, 4), (6, 3)):
             for name in ("none", "highlight", "optimal"):
                 view = sample.task(count, steps=steps, message=message("hands_full", opacity=0.2 * steps))
                 state = condition(name)(dataclasses.replace(view, clock=float(steps)))
                 assert np.array_equal(kept.compose(frame, state), compose(frame, state, pictures))
+
+
+def test_a_step_forward_draws_no_more_rows_than_it_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[str] = []
+    row = checklist._row
+
+    def spy(*args: object, item: ChecklistItem, **rest: object) -> None:
+        drawn.append(item.text)
+        row(*args, item=item, **rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(checklist, "_row", spy)
+    kept = Compositor(sample.pictures())
+    frame = sample.backdrop(640, 480)
+    for steps in range(20, 24):
+        drawn.clear()
+        kept.compose(frame, optimal(24, steps))
+    assert 2 <= len(drawn) <= 4, "the step done, the next one, and those that came into sight"
+    drawn.clear()
+    kept.compose(frame, dataclasses.replace(optimal(24, 23), clock=500.0))
+    assert not drawn
 
 
 PARTS = {

@@ -13,8 +13,9 @@ from hud.canvas import Rect
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.errors import FrameError
-from hud.layout import Layout, window
+from hud.layout import Layout
 from hud.messages import TEXTS, message
+from hud.rows import window
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, MiniMap, Pointer
 from hud.text import Typeface
 

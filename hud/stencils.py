@@ -1,0 +1,91 @@
+"""What panels are drawn with, made once and kept: outlines, lines of text, pictures, panel backgrounds.
+
+Drawing the same things again is most of the work of a HUD. Everything here depends on its arguments alone, so that
+keeping it changes no pixel; each kind is kept in a table of limited size.
+"""
+
+import functools
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hud.text import Typeface
+
+Floats = NDArray[np.float32]
+Pictures = Mapping[str, NDArray[np.uint8]]
+
+
+class Stencil(NamedTuple):
+    """Coverage 0..1, shape (h, w), and the column and row of its upper left corner, px, relative to an origin."""
+
+    mask: Floats
+    x: int
+    y: int
+
+
+class Scaled(NamedTuple):
+    """A picture in its size: colours times opacity, 0..1, shape (3, s, s), and opacity, 0..1, shape (s, s)."""
+
+    colours: Floats
+    opacity: Floats
+
+
+class Stencils:
+    """A typeface, pictures, and what was made of them so far.
+
+    Args:
+        pictures: RGBA pictures, uint8 (s, s, 4), straight alpha, by key. Must not change.
+    """
+
+    def __init__(self, pictures: Pictures) -> None:
+        self.face = Typeface()
+        self.pictures = pictures
+        self.text = functools.lru_cache(512)(self._text)
+        self.scaled = functools.lru_cache(128)(self._scaled)
+        self.rounded = functools.lru_cache(64)(rounded)
+        self.disc = functools.lru_cache(64)(disc)
+
+    def _text(self, text: str, size: int, weight: int) -> Stencil:
+        """A line of text; the origin is where its baseline begins."""
+        mask, baseline = self.face.stamp(text, size, weight)
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if not len(rows):
+            return Stencil(np.zeros((0, 0), np.float32), 0, 0)
+        inked = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        share = np.asarray(inked / np.float32(255.0), dtype=np.float32)
+        return Stencil(share, int(columns[0]) - 1, int(rows[0]) - baseline)
+
+    def _scaled(self, key: str, size: int) -> Scaled | None:
+        """The picture of that key at `size` px; None when there is none."""
+        picture = self.pictures.get(key)
+        if picture is None:
+            return None
+        straight = picture.astype(np.float32) / np.float32(255.0)
+        straight[..., :3] *= straight[..., 3:]
+        method = cv2.INTER_AREA if size <= picture.shape[0] else cv2.INTER_LINEAR
+        planes = np.moveaxis(cv2.resize(straight, (size, size), interpolation=method), 2, 0)
+        return Scaled(np.ascontiguousarray(planes[:3]), np.ascontiguousarray(planes[3]))
+
+
+def rounded(width: int, height: int, radius: float, line: float) -> Floats:
+    """Coverage (height, width) of a rounded rectangle, or with `line` > 0 of its outline of that width, px."""
+    ys, xs = np.mgrid[0:height, 0:width].astype(np.float32) + np.float32(0.5)
+    dx = np.abs(xs - width / 2) - (width / 2 - radius)
+    dy = np.abs(ys - height / 2) - (height / 2 - radius)
+    distance = np.hypot(np.maximum(dx, 0), np.maximum(dy, 0)) + np.minimum(np.maximum(dx, dy), 0) - radius
+    mask = np.clip(0.5 - distance, 0, 1)
+    if line > 0:
+        mask = mask - np.clip(0.5 - distance - line, 0, 1)
+    return np.asarray(mask, dtype=np.float32)
+
+
+def disc(x: float, y: float, radius: float) -> Stencil:
+    """A smooth-edged disc with its middle at column `x`, row `y`, px."""
+    left, top, side = math.floor(x - radius) - 1, math.floor(y - radius) - 1, math.ceil(2 * radius) + 3
+    ys, xs = np.mgrid[0:side, 0:side].astype(np.float32) + np.float32(0.5)
+    distance = np.hypot(xs + left - x, ys + top - y)
+    return Stencil(np.asarray(np.clip(radius + 0.5 - distance, 0, 1), dtype=np.float32), left, top)
