@@ -20,11 +20,11 @@ from mjsim.scene import Scene
 Motion = Generator[None, None, bool]
 Steps = Generator[None, None, None]
 
-_TURN_GAIN = 6.0  # 1/s
-_FACE_TIMEOUT = 3.0  # s
-_POSTURE_GAIN = 7.0  # 1/s
-_POSTURE_SPEED = 1.5  # m/s
-_POSTURE_ACCELERATION = 8.0  # m/s^2
+TURN_GAIN = 6.0  # 1/s
+FACE_TIMEOUT = 3.0  # s
+POSTURE_GAIN = 7.0  # 1/s
+POSTURE_SPEED = 1.5  # m/s
+POSTURE_ACCELERATION = 8.0  # m/s^2
 
 
 @dataclass(eq=False)
@@ -68,10 +68,10 @@ class Person:
         if distance < 0.0005:
             self.hand_velocities[hand] = 0.0
             return
-        wanted = offset * (min(_POSTURE_GAIN * distance, _POSTURE_SPEED) / distance)
+        wanted = offset * (min(POSTURE_GAIN * distance, POSTURE_SPEED) / distance)
         change = wanted - self.hand_velocities[hand]
         size = float(np.linalg.norm(change))
-        allowed = _POSTURE_ACCELERATION * self.dt
+        allowed = POSTURE_ACCELERATION * self.dt
         self.hand_velocities[hand] += change * (min(1.0, allowed / size) if size else 0.0)
         targets[hand] += self.hand_velocities[hand] * self.dt
 
@@ -122,7 +122,7 @@ class Person:
 
     def turn_towards(self, error: float) -> None:
         """Slew the yaw rate so that a heading error, rad, decays without overshoot."""
-        self.turn_at(_TURN_GAIN * error)
+        self.turn_at(TURN_GAIN * error)
 
     def glance(self, point: NDArray[np.float64]) -> None:
         """Move the head's pitch towards a point of the house frame."""
@@ -139,7 +139,7 @@ class Person:
         self, point: NDArray[np.float64], heading: float | None = None, tolerance: float = 0.35
     ) -> Steps:
         """Stand still and turn to a point, or to an exact heading while glancing at the point."""
-        for _ in range(self.steps(_FACE_TIMEOUT)):
+        for _ in range(self.steps(FACE_TIMEOUT)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
             standing = float(np.linalg.norm(self.rig.planar_velocity)) < 0.1
             if abs(error) < tolerance and standing and abs(self.rig.turn_rate) < 0.5:

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from mjsim.person import Motion, Person, Steps, minimum_jerk
 
-_REACH_TIME = 0.44
-_APPROACH_TIME = 0.4  # longest wait for the hand to arrive after the reach
-_ALIGN_TIME = 0.12
-_LIFT_TIME = 0.64
+REACH_TIME = 0.44
+APPROACH_TIME = 0.4  # longest wait for the hand to arrive after the reach
+ALIGN_TIME = 0.12
+LIFT_TIME = 0.64
 _SHIFT = 0.2  # share of a movement by which one of its two parts leads the other
 _CLOSE_ENOUGH = 0.012
 
@@ -35,7 +35,7 @@ def pick(
     person.moving_hand = hand
     grip = grips.nearest_grip(hand, item)
     yield from _reach(person, hand, item, grip)
-    for _ in range(person.steps(_APPROACH_TIME)):
+    for _ in range(person.steps(APPROACH_TIME)):
         if grips.gap(hand, item, grip) < _CLOSE_ENOUGH:
             break
         rig.hand_targets[hand] = rig.to_body(grips.point(item, grip))
@@ -54,7 +54,7 @@ def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
     """Over the object first, then down to it; the goal is followed while it moves."""
     rig = person.rig
     start = rig.hand_targets[hand].copy()
-    count = person.steps(_REACH_TIME)
+    count = person.steps(REACH_TIME)
     for k in range(1, count + 1):
         goal = rig.to_body(person.grips.point(item, grip))
         rig.hand_targets[hand] = lead_blend(start, goal, k / count, leading="across")
@@ -66,9 +66,9 @@ def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) ->
     """Straight up first, so that nothing low is brushed, then back to the body."""
     rig = person.rig
     start = rig.hand_targets[hand].copy()
-    for _ in range(person.steps(_ALIGN_TIME)):
+    for _ in range(person.steps(ALIGN_TIME)):
         yield
-    count = person.steps(_LIFT_TIME)
+    count = person.steps(LIFT_TIME)
     for k in range(1, count + 1):
         rig.hand_targets[hand] = lead_blend(start, goal, k / count, leading="up")
         person.look_towards(pitch)

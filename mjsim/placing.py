@@ -16,12 +16,12 @@ from mjsim.sight import first_hit
 Vector = NDArray[np.float64]
 
 _WALL_GAP = 0.012
-_HOVER_GAP = 0.03
-_RELEASE_GAP = 0.002
+HOVER_GAP = 0.03
+RELEASE_GAP = 0.002
 _PROBE_ABOVE = 0.2
 _PROBES = 5
-_HAND_SPEED = 0.9
-_DESCENT_SPEED = 0.5
+HAND_SPEED = 0.9
+DESCENT_SPEED = 0.5
 _TOUCH = 0.0005
 _OVERLAP = 0.001
 _RAISE = 0.003
@@ -51,13 +51,13 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry) 
     """
     rig = person.rig
     pitch = rig.pitch_target
-    yield from person.face(receptacle.center, heading=_square_heading(person, receptacle), tolerance=0.04)
+    yield from person.face(receptacle.center, heading=square_heading(person, receptacle), tolerance=0.04)
     person.moving_hand = hand
     corners = object_corners(person.scene.model, person.scene.index.geoms(person.scene.index.names[item]))
     footprint = _footprint(person, hand, item, receptacle, corners)
     slots = fill_slots(person, item, receptacle, footprint)
     slot = slots[0]
-    clear = max(float(receptacle.half_size[2]), *(s.fill for s in slots)) + _HOVER_GAP
+    clear = max(float(receptacle.half_size[2]), *(s.fill for s in slots)) + HOVER_GAP
     yield from _travel(person, hand, receptacle, np.array([*slot.hand, clear - footprint.low[2]]))
     footprint = _footprint(person, hand, item, receptacle, corners)
     yield from _descend(person, hand, item, receptacle, slot, footprint)
@@ -91,7 +91,7 @@ def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
     return np.asarray(box[:3] + signs * box[3:])
 
 
-def _square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
+def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
     """Heading along a side of the receptacle that is nearest to looking at it: held things fit in squarely."""
     rig = person.rig
     towards = rig.heading + rig.bearing(receptacle.center)
@@ -158,7 +158,7 @@ def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Ve
         if up_first:
             goal = np.array([start[0], start[1], max(start[2], goal[2])])
         distance = float(np.linalg.norm(goal - start))
-        count = 0 if distance < 0.005 else person.steps(0.12 + distance / _HAND_SPEED)
+        count = 0 if distance < 0.005 else person.steps(0.12 + distance / HAND_SPEED)
         for k in range(1, count + 1):
             if not up_first:
                 goal = _hand_in_body(person, receptacle, hover)
@@ -181,9 +181,9 @@ def _descend(
     rig = person.rig
     start = rig.hand_targets[hand].copy()
     goal = _hand_in_body(
-        person, receptacle, np.array([*slot.hand, slot.fill + _RELEASE_GAP - footprint.low[2]])
+        person, receptacle, np.array([*slot.hand, slot.fill + RELEASE_GAP - footprint.low[2]])
     )
-    count = person.steps(0.12 + abs(goal[2] - start[2]) / _DESCENT_SPEED)
+    count = person.steps(0.12 + abs(goal[2] - start[2]) / DESCENT_SPEED)
     for k in range(1, count + 1):
         rig.hand_targets[hand] = start + minimum_jerk(k / count) * (goal - start)
         yield
