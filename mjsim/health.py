@@ -1,32 +1,12 @@
-"""Whether the physics is well: warnings, penetration, weld errors, settling times, ejections and tunnelling.
-
-`docs/health.md` defines every term. What cannot be trusted any further is a `PhysicsError`; what can be is counted,
-and reported as an event.
-"""
+"""The health of the physics as values; `docs/health.md` defines every term."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
-
-import mujoco
-import numpy as np
-
-from mjsim.actions import EventKind
-from mjsim.errors import PhysicsError
-from mjsim.escapes import MOVED_DISTANCE, Escapes, Releases
-from mjsim.grips import Grips
-from mjsim.options import WorldOptions
-from mjsim.rig import Rig
-from mjsim.scene import Scene
-from mjsim.survey import ESCAPING, NOT_FINITE, WARNED, survey
 
 Pair = tuple[float, float]
-_Latest = tuple[float, float, Pair, Pair, float]
 
-_NOTHING: Pair = (math.nan, math.nan)
-_KICK = 2.0  # times the walking speed: a light thing that bounces off somebody who walks into it
-_FALL = 5.6  # m/s, from the height at which things are carried
+NOTHING: Pair = (math.nan, math.nan)
 
 
 @dataclass(frozen=True)
@@ -45,9 +25,21 @@ class HealthSample:
 
     penetration_m: float = 0.0
     trunk_penetration_m: float = 0.0
-    weld_error_m: Pair = _NOTHING
-    weld_error_rad: Pair = _NOTHING
+    weld_error_m: Pair = NOTHING
+    weld_error_rad: Pair = NOTHING
     settle_s: float = math.nan
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """Seven numbers in the order of the attributes, left hand before right."""
+        overlaps = (self.penetration_m, self.trunk_penetration_m)
+        return (*overlaps, *self.weld_error_m, *self.weld_error_rad, self.settle_s)
+
+    @classmethod
+    def of_row(cls, row: Sequence[float]) -> "HealthSample":
+        """The sample of a `row`."""
+        deepest, trunk, left, right, left_angle, right_angle, settle = row
+        return cls(deepest, trunk, (left, right), (left_angle, right_angle), settle)
 
 
 @dataclass(frozen=True)
@@ -80,142 +72,4 @@ class Health:
         return max(self.settle_times, default=0.0)
 
 
-class HealthMonitor:
-    """Looks at the physics after every control step."""
-
-    def __init__(self, scene: Scene, options: WorldOptions, rig: Rig, grips: Grips) -> None:
-        index = scene.index
-        self._index, self._rig, self._grips = index, rig, grips
-        self._limits = (
-            np.array([MOVED_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
-        )
-        self._marks = np.zeros(len(index.names), np.uint8)
-        self._escapes = Escapes(scene)
-        self._releases = Releases(scene)
-        self.reset()
-
-    @property
-    def sample(self) -> HealthSample:
-        """What the latest control step was like."""
-        return HealthSample(*self._latest)
-
-    def reset(self) -> None:
-        """Forget everything; the state is that of the beginning."""
-        self._deepest = self._deepest_trunk = self._stretched = self._twisted = 0.0
-        self._settle_times: list[float] = []
-        self._latest: _Latest = (0.0, 0.0, _NOTHING, _NOTHING, math.nan)
-        self._escapes.reset(self._rig.data)
-        self._releases.reset()
-
-    def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
-        """Record this control step.
-
-        Args:
-            held: Object that each hand carries.
-
-        Returns:
-            Escapes of objects, each with the object's number.
-
-        Raises:
-            PhysicsError: MuJoCo warned, or a position or velocity is not finite.
-        """
-        data = self._rig.data
-        escaping, deepest, trunk = self._survey(data)
-        self._deepest, self._deepest_trunk = max(self._deepest, deepest), max(self._deepest_trunk, trunk)
-        lengths, angles = self._weld_errors(held)
-        gripped = self._grips.gripped
-        settle = math.nan
-        if gripped or self._releases.any:
-            settled = self._releases.follow(data, gripped, self._marks)
-            self._settle_times += settled
-            settle = max(settled, default=math.nan)
-        self._latest = (deepest, trunk, lengths, angles, settle)
-        if not escaping and not self._releases.falling:
-            return ()
-        return self._escapes.find(data, self._marks, self._releases, gripped)
-
-    def memory(self) -> dict[str, Any]:
-        """Everything accumulated, JSON-ready."""
-        deepest, trunk, lengths, angles, settle = self._latest
-        return {
-            "extremes": [self._deepest, self._deepest_trunk, self._stretched, self._twisted],
-            "settle_times": list(self._settle_times),
-            "latest": _plain((deepest, trunk, *lengths, *angles, settle)),
-            "escapes": self._escapes.memory(),
-            "releases": self._releases.memory(),
-        }
-
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Take over what `memory` gave."""
-        self._deepest, self._deepest_trunk, self._stretched, self._twisted = map(float, memory["extremes"])
-        self._settle_times = [float(t) for t in memory["settle_times"]]
-        values = [math.nan if v is None else float(v) for v in memory["latest"]]
-        deepest, trunk, left, right, left_angle, right_angle, settle = values
-        self._latest = (deepest, trunk, (left, right), (left_angle, right_angle), settle)
-        self._escapes.recall(memory["escapes"])
-        self._releases.recall(memory["releases"])
-
-    def snapshot(self) -> Health:
-        """The extremes as a value."""
-        return Health(
-            max_penetration_m=self._deepest,
-            max_trunk_penetration_m=self._deepest_trunk,
-            max_weld_error_m=self._stretched,
-            max_weld_error_rad=self._twisted,
-            settle_times=tuple(self._settle_times),
-            ejections=self._escapes.ejections,
-            tunnellings=self._escapes.tunnellings,
-            warnings=int(self._rig.data.warning.number.sum()),
-        )
-
-    def _survey(self, data: mujoco.MjData) -> tuple[bool, float, float]:
-        """Whether any object may be escaping, and overlaps of objects and of the trunk, m; marks every object."""
-        index, rig, contact = self._index, self._rig, data.contact
-        state, deepest, trunk = survey(
-            data.qpos, data.qvel, data.xipos, contact.geom, contact.dist, data.warning.number,
-            index.bodies, index.dofs, index.geom_owner, rig.trunk, rig.foot,
-            self._limits, self._escapes.anchors, self._marks,
-        )  # fmt: skip
-        if state == WARNED:
-            raise PhysicsError(_warning_text(data))
-        if state == NOT_FINITE:
-            raise PhysicsError(_not_finite_text(rig.model, data))
-        return state == ESCAPING, deepest, trunk
-
-    def _weld_errors(self, held: Sequence[int | None]) -> tuple[Pair, Pair]:
-        left, right = held
-        if left is None and right is None:
-            return _NOTHING, _NOTHING
-        (first, first_angle), (second, second_angle) = (
-            _NOTHING if item is None else self._grips.errors(hand) for hand, item in enumerate(held)
-        )
-        # NaN loses every comparison.
-        for length, angle in ((first, first_angle), (second, second_angle)):
-            self._stretched = length if length > self._stretched else self._stretched
-            self._twisted = angle if angle > self._twisted else self._twisted
-        return (first, second), (first_angle, second_angle)
-
-
-def _plain(values: tuple[float, ...]) -> list[float | None]:
-    """NaN as None: JSON has no NaN."""
-    return [None if math.isnan(value) else value for value in values]
-
-
-def _warning_text(data: mujoco.MjData) -> str:
-    kinds = np.flatnonzero(data.warning.number)
-    found = ", ".join(
-        f"{mujoco.mjtWarning(int(k)).name} (detail {int(data.warning.lastinfo[k])})" for k in kinds
-    )
-    return (
-        f"MuJoCo warned at t = {data.time:.3f} s: {found}. The state is no longer trustworthy; reset the world, and "
-        "replay the recorded actions up to this time to look at the cause"
-    )
-
-
-def _not_finite_text(model: mujoco.MjModel, data: mujoco.MjData) -> str:
-    bad = np.flatnonzero(~np.isfinite(data.qvel))
-    where = model.body(int(model.dof_bodyid[bad[0]])).name if bad.size else "a position"
-    return (
-        f"the state is not finite at t = {data.time:.3f} s, first at {where!r}; reset the world, and replay the "
-        "recorded actions up to this time to look at the cause"
-    )
+QUIET = HealthSample()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mjsim import avatar
 from mjsim.actions import Move
 from mjsim.grips import Grips
-from mjsim.health import HealthMonitor
+from mjsim.monitoring import HealthMonitor
 from mjsim.options import WorldOptions
 from mjsim.rig import Rig
 from mjsim.scene import Scene

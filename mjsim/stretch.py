@@ -21,6 +21,7 @@ class Stretch:
         object_positions: Object origins, m, shape (n, k, 3).
         object_quaternions: Orientations wxyz, shape (n, k, 4).
         state_hashes: `World.state_hash` after each step, shape (n,).
+        health: Rows of `HealthSample` after each step, shape (n, 7).
         observation: State after the last step.
         events: What happened; only the last step can have events.
     """
@@ -32,6 +33,7 @@ class Stretch:
     object_positions: NDArray[np.float64]
     object_quaternions: NDArray[np.float64]
     state_hashes: NDArray[np.uint64]
+    health: NDArray[np.float64]
     observation: Observation
     events: tuple[WorldEvent, ...]
 
@@ -45,6 +47,7 @@ class Stretch:
         state_hashes: list[int],
         last: Observation,
         events: tuple[WorldEvent, ...],
+        health: list[tuple[float, ...]],
     ) -> "Stretch":
         """Stack the observations after each step; `last` stands for them where there are none."""
         count, objects = len(observations), len(last.object_names)
@@ -58,6 +61,7 @@ class Stretch:
                 count, objects, 4
             ),
             state_hashes=np.array(state_hashes, np.uint64),
+            health=np.array(health, np.float64).reshape(count, 7),
             observation=last,
             events=events,
         )

@@ -14,8 +14,9 @@ from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick, Pla
 from mjsim.carrying import Carrying
 from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.grips import Grips
-from mjsim.health import Health, HealthMonitor, HealthSample
+from mjsim.health import Health, HealthSample
 from mjsim.inventory import LEFT, RIGHT, Inventory
+from mjsim.monitoring import HealthMonitor
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
 from mjsim.person import Motion, Person
@@ -234,16 +235,18 @@ class World:
     def _stretch(self, actions: Iterable[Action]) -> Stretch:
         observations: list[Observation] = []
         hashes: list[int] = []
+        health: list[tuple[float, ...]] = []
         events: tuple[WorldEvent, ...] = ()
         for action in actions:
             result = self.step(action)
             observations.append(result.observation)
             hashes.append(self.state_hash())
+            health.append(self.health_sample.row)
             events = result.events
             if events:
                 break
         last = observations[-1] if observations else self.observation()
-        return Stretch.of(observations, hashes, last, events)
+        return Stretch.of(observations, hashes, last, events, health)
 
     def observation(self) -> Observation:
         """The present state."""
