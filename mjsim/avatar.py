@@ -172,11 +172,16 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
 
 
 def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, force: float) -> None:
-    """A servo: velocity where kp is 0, else position with damping."""
+    """A servo: velocity where kp is 0, else position with damping.
+
+    Its activation is what it is told, its control how fast that changes: several steps of the physics follow a ramp.
+    """
     spec.add_actuator(
         name=PREFIX + joint,
         target=PREFIX + joint,
         trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        dyntype=mujoco.mjtDyn.mjDYN_INTEGRATOR,
+        actearly=True,  # the first step follows the ramp as the others do
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         gainprm=[kp or kv] + [0.0] * 9,

@@ -1,7 +1,7 @@
 """How far a point at carrying height is from walls and furniture: a signed distance field over the floor."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from mjsim.footprint import footprint
+from mjsim.kernels import kernel
 
 _BORDER = 0.4  # m of grid around the rooms
 
@@ -22,12 +23,17 @@ class ClearanceField:
         resolution: Cell size, m.
         distance: Distance of each cell's centre, m, positive outside, shape (nx, ny).
         gradient: Direction of increasing distance, shape (nx, ny, 2).
+        frame: Origin x, y and resolution, m, for kernels, shape (3,).
     """
 
     origin: tuple[float, float]
     resolution: float
     distance: NDArray[np.float64]
     gradient: NDArray[np.float64]
+    frame: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frame", np.array([*self.origin, self.resolution]))
 
     @classmethod
     def from_model(
@@ -54,16 +60,27 @@ class ClearanceField:
 
     def at(self, x: float, y: float) -> tuple[float, float, float]:
         """Distance at a point, m, interpolated, and the direction (x, y) away from the nearest geom."""
-        u = (x - self.origin[0]) / self.resolution
-        v = (y - self.origin[1]) / self.resolution
-        i = min(max(int(u), 0), self.distance.shape[0] - 2)
-        j = min(max(int(v), 0), self.distance.shape[1] - 2)
-        a, b = min(max(u - i, 0.0), 1.0), min(max(v - j, 0.0), 1.0)
-        d = self.distance
-        low = (1 - a) * float(d[i, j]) + a * float(d[i + 1, j])
-        high = (1 - a) * float(d[i, j + 1]) + a * float(d[i + 1, j + 1])
-        away = self.gradient[i + round(a), j + round(b)]
-        return (1 - b) * low + b * high, float(away[0]), float(away[1])
+        return clearance_at(x, y, self.distance, self.gradient, self.frame)
+
+
+@kernel
+def clearance_at(
+    x: float,
+    y: float,
+    distance: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    frame: NDArray[np.float64],
+) -> tuple[float, float, float]:
+    """What `ClearanceField.at` gives, from the field's arrays."""
+    u = (x - frame[0]) / frame[2]
+    v = (y - frame[1]) / frame[2]
+    i = min(max(int(u), 0), distance.shape[0] - 2)
+    j = min(max(int(v), 0), distance.shape[1] - 2)
+    a, b = min(max(u - i, 0.0), 1.0), min(max(v - j, 0.0), 1.0)
+    low = (1 - a) * distance[i, j] + a * distance[i + 1, j]
+    high = (1 - a) * distance[i, j + 1] + a * distance[i + 1, j + 1]
+    near_i, near_j = i + int(a > 0.5), j + int(b > 0.5)
+    return (1 - b) * low + b * high, gradient[near_i, near_j, 0], gradient[near_i, near_j, 1]
 
 
 def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:

@@ -13,6 +13,7 @@ from mjsim.actions import Move
 from mjsim.grips import Grips
 from mjsim.monitoring import HealthMonitor
 from mjsim.options import WorldOptions
+from mjsim.postures import move_hand
 from mjsim.rig import Rig
 from mjsim.scene import Scene
 
@@ -22,9 +23,6 @@ Steps = Generator[None, None, None]
 
 TURN_GAIN = 6.0  # 1/s
 FACE_TIMEOUT = 3.0  # s
-POSTURE_GAIN = 7.0  # 1/s
-POSTURE_SPEED = 1.5  # m/s
-POSTURE_ACCELERATION = 8.0  # m/s^2
 
 
 @dataclass(eq=False)
@@ -62,18 +60,8 @@ class Person:
 
     def move_hand(self, hand: int, goal: NDArray[np.float64]) -> None:
         """Move a hand's target towards a position (3,) in the body frame, slower as it comes near."""
-        targets = self.rig.hand_targets
-        offset = goal - targets[hand]
-        distance = float(np.linalg.norm(offset))
-        if distance < 0.0005:
-            self.hand_velocities[hand] = 0.0
-            return
-        wanted = offset * (min(POSTURE_GAIN * distance, POSTURE_SPEED) / distance)
-        change = wanted - self.hand_velocities[hand]
-        size = float(np.linalg.norm(change))
-        allowed = POSTURE_ACCELERATION * self.dt
-        self.hand_velocities[hand] += change * (min(1.0, allowed / size) if size else 0.0)
-        targets[hand] += self.hand_velocities[hand] * self.dt
+        x, y, z = goal.tolist()
+        move_hand(self.rig.hand_targets, self.hand_velocities, hand, x, y, z, self.dt)
 
     def retire(self, hand: int) -> None:
         """Move an empty hand towards its rest."""
@@ -94,19 +82,23 @@ class Person:
 
     def walk(self, move: Move) -> None:
         """Slew the body's velocity and the head towards what is asked, within the limits."""
-        o, rig = self.options, self.rig
-        wanted = np.array([move.forward, move.left])
-        speed = float(np.linalg.norm(wanted))
+        o, motion = self.options, self.rig.motion
+        forward, left = move.forward, move.left
+        speed = math.hypot(forward, left)
         if speed > o.max_speed:
-            wanted *= o.max_speed / speed
-        change = wanted - rig.velocity
-        size = float(np.linalg.norm(change))
+            forward, left = forward * (o.max_speed / speed), left * (o.max_speed / speed)
+        before_f, before_l = float(motion[0]), float(motion[1])
+        change_f, change_l = forward - before_f, left - before_l
+        size = math.hypot(change_f, change_l)
         allowed = o.acceleration * self.dt
-        rig.velocity = wanted if size <= allowed else rig.velocity + change * (allowed / size)
+        if size > allowed:
+            forward = before_f + change_f * (allowed / size)
+            left = before_l + change_l * (allowed / size)
+        motion[0], motion[1] = forward, left
         self.turn_at(move.turn)
         look = _clip(move.look, o.max_look)
         if look:
-            rig.look_at_pitch(rig.pitch_target + look * self.dt)
+            self.rig.look_at_pitch(self.rig.pitch_target + look * self.dt)
 
     def turn_at(self, rate: float) -> None:
         """Slew the yaw rate towards `rate`, rad/s."""
@@ -117,8 +109,8 @@ class Person:
     def brake(self) -> None:
         """Slew the walk to a stand; turning and looking are left to the motion."""
         o, rig = self.options, self.rig
-        size = float(np.linalg.norm(rig.velocity))
-        rig.velocity = rig.velocity * (max(0.0, size - o.acceleration * self.dt) / size if size else 0.0)
+        size = math.hypot(rig.motion[0], rig.motion[1])
+        rig.motion[:2] *= max(0.0, size - o.acceleration * self.dt) / size if size else 0.0
 
     def turn_towards(self, error: float) -> None:
         """Slew the yaw rate so that a heading error, rad, decays without overshoot."""
@@ -126,8 +118,8 @@ class Person:
 
     def glance(self, point: NDArray[np.float64]) -> None:
         """Move the head's pitch towards a point of the house frame."""
-        offset = point - self.rig.eye
-        wanted = math.atan2(offset[2], float(np.hypot(offset[0], offset[1])))
+        x, y, z = (point - self.rig.eye).tolist()
+        wanted = math.atan2(z, math.hypot(x, y))
         self.look_towards(wanted)
 
     def look_towards(self, pitch: float) -> None:
@@ -141,15 +133,14 @@ class Person:
         """Stand still and turn to a point, or to an exact heading while glancing at the point."""
         for _ in range(self.steps(FACE_TIMEOUT)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
-            standing = float(np.linalg.norm(self.rig.planar_velocity)) < 0.1
+            standing = self.rig.speed < 0.1
             if abs(error) < tolerance and standing and abs(self.rig.turn_rate) < 0.5:
                 break
             self.brake()
             self.turn_towards(error if abs(error) > 0.5 * tolerance else 0.0)
             self.glance(point)
             yield
-        self.rig.velocity = np.zeros(2)
-        self.rig.turn = 0.0
+        self.rig.motion[:3] = 0.0
 
 
 def wrap(angle: float) -> float:

@@ -111,7 +111,7 @@ def test_hands_hold_still_against_gravity(small_scene: Scene, data: mujoco.MjDat
         name = model.actuator(actuator).name
         joint = model.joint(name)
         if name.split("/")[-1] not in ("x", "y", "yaw") or name.count("/") == 2:
-            data.ctrl[actuator] = before[joint.qposadr[0]]
+            data.act[model.actuator_actadr[actuator]] = before[joint.qposadr[0]]
     mujoco.mj_step(model, data, 500)
     mine = [joint_address(model, f"{hand}/{axis}") for hand in avatar.HANDS for axis in "xyz"]
     assert data.qpos[mine] == pytest.approx(before[mine], abs=1e-6)

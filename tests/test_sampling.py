@@ -213,7 +213,7 @@ def test_composed_episode_is_at_rest(episodes: dict[tuple[int, int], Episode], c
     touched = scene.index.geom_owner[data.contact.geom].ravel()
     assert set(range(24)) <= set(touched.tolist())  # none floats
     # Hold the servos, or the hands leave for the origin.
-    data.ctrl[:] = [
+    data.act[scene.model.actuator_actadr] = [
         scene.model.qpos0[scene.model.jnt_qposadr[scene.model.actuator_trnid[i, 0]]]
         * (scene.model.actuator_biasprm[i, 1] != 0)
         for i in range(scene.model.nu)
