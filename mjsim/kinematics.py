@@ -184,6 +184,15 @@ def walk(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait, floor: Floor
 ) -> None:
     """One control step of walking, turning and looking, as `Move(forward, left, turn, look)` asks."""
+    command(body, forward, left, turn, look, gait)
+    advance(body, gait, floor)
+
+
+@kernel
+def command(
+    body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait
+) -> None:
+    """Slew the commands towards what `Move(forward, left, turn, look)` asks; `advance` carries them out."""
     speed = math.sqrt(forward * forward + left * left)
     if speed > gait.max_speed:
         forward, left = forward * (gait.max_speed / speed), left * (gait.max_speed / speed)
@@ -192,7 +201,6 @@ def walk(
     look = min(gait.max_look, max(-gait.max_look, look))
     if look != 0.0:
         look_at(body, body[LOOK] + look * gait.dt, gait)
-    advance(body, gait, floor)
 
 
 @kernel

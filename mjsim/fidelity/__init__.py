@@ -1,0 +1,15 @@
+"""How much of a world is physics: tiers that share one interface (docs/fidelity.md)."""
+
+from mjsim.fidelity.full import Full
+from mjsim.fidelity.tier import Tier
+from mjsim.options import WorldOptions
+from mjsim.scene import Scene
+
+__all__ = ["Tier", "make_tier"]
+
+_TIERS: dict[str, type[Full]] = {"full": Full}
+
+
+def make_tier(scene: Scene, options: WorldOptions) -> Tier:
+    """The tier that the options name, not yet reset."""
+    return _TIERS[options.fidelity](scene, options)

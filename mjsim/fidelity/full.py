@@ -1,0 +1,265 @@
+"""Everything in physics: walking, reaching, carrying, letting go."""
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim import avatar
+from mjsim.actions import IDLE, Action, ActionResult, Move, Pick, Place
+from mjsim.carrying import Carrying
+from mjsim.errors import ActionError, StateError
+from mjsim.fidelity.ledger import Ledger
+from mjsim.fidelity.tier import by_steps
+from mjsim.grips import Grips
+from mjsim.health import Health, HealthSample
+from mjsim.inventory import LEFT, RIGHT
+from mjsim.monitoring import HealthMonitor
+from mjsim.observation import ObjectStatus, Observation
+from mjsim.options import WorldOptions
+from mjsim.person import Motion, Person
+from mjsim.picking import pick
+from mjsim.placing import place
+from mjsim.recording import StateHash, WorldState, set_physics, take_physics
+from mjsim.rig import Rig
+from mjsim.rules import resolve_pick, resolve_place
+from mjsim.scene import Scene
+from mjsim.stretch import Stretch
+
+# A delivered object may be shoved a little by the next one; farther out than this it is out.
+_DISLODGED_MARGIN = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A pick or place under way."""
+
+    steps: Motion
+    action: Pick | Place
+    hand: int
+    item: int
+    receptacle: str | None
+
+
+class Full:
+    """The tier `full`; other tiers use its parts where they need physics.
+
+    Attributes:
+        data: The state of the physics.
+        ledger: Who holds what, what is put away, what happened in the latest control step.
+        person: The body in this physics.
+        carrying: How it keeps what it holds off the house.
+    """
+
+    def __init__(self, scene: Scene, options: WorldOptions) -> None:
+        self.scene = scene
+        self.data = mujoco.MjData(scene.model)
+        self.ledger = Ledger(scene)
+        rig = Rig(scene, self.data, options.control_timestep)
+        grips = Grips(scene, self.data, rig)
+        monitor = HealthMonitor(scene, options, rig, grips)
+        self.person = Person(scene, options, self.data, rig, grips, monitor, held=self.ledger.held)
+        self.carrying = Carrying(self.person)
+        self._motion: _Motion | None = None
+        self._hash = StateHash(scene.model)
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return float(self.data.time)
+
+    @property
+    def busy(self) -> bool:
+        """Whether a pick or place is under way."""
+        return self._motion is not None
+
+    @property
+    def health(self) -> Health:
+        """Extremes of the physics since the last reset."""
+        return self.person.monitor.snapshot()
+
+    @property
+    def health_sample(self) -> HealthSample:
+        """What the physics was like in the latest control step."""
+        return self.person.monitor.sample
+
+    def reset(self) -> None:
+        """Return to the episode's beginning."""
+        mujoco.mj_resetData(self.scene.model, self.data)
+        mujoco.mj_forward(self.scene.model, self.data)
+        person = self.person
+        person.rig.reset()
+        person.grips.reset()
+        person.monitor.reset()
+        self.carrying.reset()
+        self._end_motion()
+        self.ledger.reset()
+
+    def step(self, action: Action) -> ActionResult | None:
+        """Advance by one control step."""
+        result = self.resolve(action, busy=self.busy)
+        if result is not None and result.applied:
+            self.begin(result)
+        self.advance(action if isinstance(action, Move) else IDLE)
+        return result
+
+    def walk(self, moves: NDArray[np.float64]) -> Stretch:
+        """One control step per row (n, 4), until a step brings events."""
+        return by_steps(self, (Move(*row) for row in moves.tolist()))
+
+    def finish(self) -> Stretch:
+        """Idle until no pick or place is under way, or a step brings events."""
+        return by_steps(self, iter(lambda: IDLE if self.busy else None, None))
+
+    def resolve(self, action: Action, *, busy: bool) -> ActionResult | None:
+        """Decide on a pick or place from the state of the physics; None for a move.
+
+        Raises:
+            ActionError: `action` is not an action.
+        """
+        if isinstance(action, Move):
+            return None
+        if isinstance(action, Pick):
+            return resolve_pick(self.person, action, self.ledger.inventory, self.ledger.status, busy=busy)
+        if isinstance(action, Place):
+            return resolve_place(self.person, action, self.ledger.inventory, busy=busy)
+        raise ActionError(f"expected a Move, Pick or Place, got {action!r}")
+
+    def hand_for(self, result: ActionResult) -> tuple[int, int]:
+        """Hand and object of a pick or place that is feasible: for a pick the free hand, or that on its side."""
+        item = self.scene.index.position_of(str(result.object))
+        if isinstance(result.action, Place):
+            return self.ledger.held.index(item), item
+        free = self.ledger.inventory.free_hands
+        if len(free) == 1:
+            return free[0], item
+        return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item
+
+    def begin(self, result: ActionResult) -> None:
+        """Begin a feasible pick or place."""
+        hand, item = self.hand_for(result)
+        if isinstance(result.action, Pick):
+            steps = pick(self.person, hand, item, self.carrying.place_for)
+        else:
+            steps = place(self.person, hand, item, self.scene.receptacles[str(result.receptacle)])
+        self._motion = _Motion(steps, result.action, hand, item, result.receptacle)
+
+    def advance(self, move: Move) -> None:
+        """One control step of physics, walking or with the motion under way.
+
+        Raises:
+            PhysicsError: MuJoCo warned or the state is not finite.
+        """
+        self.ledger.events = []
+        if self._motion is None:
+            self.person.walk(move)
+        else:
+            self._run_motion(self._motion)
+        self.carrying.update(self._held_posture())
+        self.person.rig.advance()
+        for kind, item in self.person.monitor.check(self.person.held):
+            self.ledger.report(self.time, kind, item)
+        self._watch_grips()
+        self.watch_deliveries()
+
+    def observation(self) -> Observation:
+        """The present state."""
+        rig, index = self.person.rig, self.scene.index
+        positions, quaternions = index.poses(self.data.qpos)
+        return Observation(
+            time=self.time,
+            position=rig.position,
+            heading=rig.heading,
+            pitch=rig.pitch,
+            eye=rig.eye,
+            velocity=rig.planar_velocity,
+            object_names=index.names,
+            object_positions=positions,
+            object_quaternions=quaternions,
+            object_status=tuple(self.ledger.status),
+            hands=self.ledger.inventory.hands,
+            busy=self.busy,
+        )
+
+    def state_hash(self) -> int:
+        """64 bits that differ whenever the state of the physics differs (up to chance)."""
+        return self._hash.of(self.data)
+
+    def state(self) -> WorldState:
+        """Everything from which `restore` goes on."""
+        person = self.person
+        memory: dict[str, Any] = {
+            "rig": person.rig.memory(),
+            "grips": person.grips.memory(),
+            "carrying": self.carrying.memory(),
+            "health": person.monitor.memory(),
+            "hand_velocities": person.hand_velocities.tolist(),
+            **self.ledger.memory(),
+        }
+        return WorldState(take_physics(self.scene.model, self.data), json.dumps(memory))
+
+    def restore(self, state: WorldState) -> None:
+        """Go on from a state.
+
+        Raises:
+            StateError: It does not fit.
+        """
+        person = self.person
+        set_physics(self.scene.model, self.data, state.physics)
+        self._end_motion()
+        try:
+            memory = json.loads(state.memory)
+            person.monitor.recall(memory["health"])
+            person.rig.recall(memory["rig"])
+            person.grips.recall(memory["grips"])
+            person.hand_velocities = np.array(memory["hand_velocities"])
+            self.carrying.recall(memory["carrying"])
+            self.ledger.recall(memory)
+        except (KeyError, TypeError, ValueError) as error:
+            raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
+
+    def watch_deliveries(self) -> None:
+        """Report what has left its receptacle."""
+        for item, status in enumerate(self.ledger.status):
+            if status is not ObjectStatus.DELIVERED or self.person.asleep(item):
+                continue
+            key = self.scene.episode.targets[self.scene.index.names[item]]
+            if not self.scene.receptacles[key].contains(self.person.center(item), _DISLODGED_MARGIN):
+                self.ledger.dislodged(self.time, item)
+
+    def _run_motion(self, motion: _Motion) -> None:
+        try:
+            next(motion.steps)
+            return
+        except StopIteration as finished:
+            success = bool(finished.value)
+        self._end_motion()
+        if isinstance(motion.action, Pick):
+            self.ledger.picked(self.time, motion.hand, motion.item, success)
+        else:
+            self.ledger.placed(self.time, motion.item, motion.receptacle, success)
+
+    def _end_motion(self) -> None:
+        self.person.hand_velocities = np.zeros((2, 3))
+        self._motion = None
+        self.person.moving_hand = None
+
+    def _held_posture(self) -> tuple[float, float, float]:
+        """Held things are drawn in to turn, and kept out of the way of a reaching hand."""
+        if self._motion is None:
+            return avatar.CARRY
+        return avatar.TUCKED if self.person.moving_hand is None else avatar.ASIDE
+
+    def _watch_grips(self) -> None:
+        motion = self._motion
+        for hand, item in enumerate(self.person.held):
+            if item is None or not self.carrying.slipped(hand):
+                continue
+            self.person.grips.open(hand)
+            self.ledger.lost(self.time, item)
+            if motion is not None and motion.hand == hand:
+                motion.steps.close()
+                self._end_motion()

@@ -1,0 +1,104 @@
+"""What a world needs of the tier of fidelity that it runs in."""
+
+from collections.abc import Iterable
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.actions import Action, ActionResult, WorldEvent
+from mjsim.fidelity.ledger import Ledger
+from mjsim.health import Health, HealthSample
+from mjsim.observation import Observation
+from mjsim.recording import WorldState
+from mjsim.stretch import Stretch
+
+
+class Tier(Protocol):
+    """One way to advance a household by control steps.
+
+    Attributes:
+        ledger: Who holds what, what is put away, what happened in the latest control step.
+    """
+
+    ledger: Ledger
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """The state for rendering and rays, in step with the tier's own."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        ...
+
+    @property
+    def busy(self) -> bool:
+        """Whether a pick or place is under way."""
+        ...
+
+    @property
+    def health(self) -> Health:
+        """Extremes of the physics since the last reset."""
+        ...
+
+    @property
+    def health_sample(self) -> HealthSample:
+        """What the physics was like in the latest control step."""
+        ...
+
+    def reset(self) -> None:
+        """Return to the episode's beginning."""
+        ...
+
+    def step(self, action: Action) -> ActionResult | None:
+        """Advance by one control step; events are in the ledger then."""
+        ...
+
+    def walk(self, moves: NDArray[np.float64]) -> Stretch:
+        """One control step per row (n, 4), until a step brings events; not while busy."""
+        ...
+
+    def finish(self) -> Stretch:
+        """Idle until no pick or place is under way, or a step brings events."""
+        ...
+
+    def observation(self) -> Observation:
+        """The present state."""
+        ...
+
+    def state_hash(self) -> int:
+        """64 bits that differ whenever the state differs (up to chance)."""
+        ...
+
+    def state(self) -> WorldState:
+        """Everything from which `restore` goes on; not while busy."""
+        ...
+
+    def restore(self, state: WorldState) -> None:
+        """Go on from a state.
+
+        Raises:
+            StateError: It does not fit.
+        """
+        ...
+
+
+def by_steps(tier: Tier, actions: Iterable[Action]) -> Stretch:
+    """One control step per action, until a step brings events."""
+    observations: list[Observation] = []
+    hashes: list[int] = []
+    health: list[tuple[float, ...]] = []
+    events: tuple[WorldEvent, ...] = ()
+    for action in actions:
+        tier.step(action)
+        observations.append(tier.observation())
+        hashes.append(tier.state_hash())
+        health.append(tier.health_sample.row)
+        events = tuple(tier.ledger.events)
+        if events:
+            break
+    last = observations[-1] if observations else tier.observation()
+    return Stretch.of(observations, hashes, last, events, health)
