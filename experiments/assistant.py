@@ -1,5 +1,6 @@
 """The assistant: sees the whole house, plans, judges each visit against its plan, and fills the glasses."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from experiments.conditions import TaskBoard
 from experiments.house import House
 from experiments.participants.base import Guidance
-from experiments.participants.walking import path_length, point_along, project
+from experiments.participants.walking import first_astray, project, rest_of
 from experiments.records import EventLog
 from hud.conditions import condition
 from hud.projection import CameraView
@@ -60,6 +61,7 @@ class Assistant:
         self._replanner = replanner
         self._log = log
         self._board = TaskBoard(house, episode, order)
+        self._number = {placed.name: i for i, placed in enumerate(episode.objects)}
         self._deliveries = {
             name: _xy(house.receptacles[key].approach) for name, key in episode.targets.items()
         }
@@ -89,7 +91,27 @@ class Assistant:
         if self._replanner.pending:
             self._improve(observation)
         if self._path_is_stale(observation):
-            self._show_way(observation)
+            self._show_way(observation, observation.position)
+
+    @property
+    def expecting(self) -> bool:
+        """Whether a better plan may turn up at any moment, so that every control step has to be observed."""
+        return self._replanner.pending
+
+    def walked(self, positions: NDArray[np.float64], observation: Observation) -> None:
+        """Take note of a walk on which nothing happened and nothing moved, as `observe` of each step would.
+
+        Args:
+            positions: Where the person was after every control step, m, shape (n, 2).
+            observation: State at the end.
+        """
+        first = 0
+        while self._path is not None and first < len(positions):
+            astray = first_astray(self._path, positions, first, OFF_THE_PATH)
+            if astray < 0:
+                return
+            self._show_way(observation, positions[astray])
+            first = astray + 1
 
     def say(self, key: str, time: float, object_name: str | None = None) -> None:
         """Put a message about an event or a refusal into the message bar."""
@@ -105,11 +127,11 @@ class Assistant:
 
     def guidance(self, observation: Observation) -> Guidance | None:
         """The next step and the way to it; None when all is done."""
-        path = self._ahead(observation)
         visit = self._route.next if self._route else None
-        if path is None or visit is None:
+        if self._path is None or visit is None:
             return None
-        return Guidance(visit.kind.value, visit.object, path, self._goal(observation, visit))
+        ahead, goal = rest_of(self._path, *observation.position), self._goal(observation, visit)
+        return Guidance(visit.kind.value, visit.object, ahead, goal, way=self._path)
 
     def _visited(self, observation: Observation, event: WorldEvent) -> None:
         kind = VISIT_KIND[event.kind]
@@ -146,7 +168,7 @@ class Assistant:
         before = self._replanner.replans
         first = self._route is None
         self._route = self._replanner.update(self._task_state(observation))
-        self._show_way(observation)
+        self._show_way(observation, observation.position)
         if not first and self._replanner.replans == before:
             return
         if not first:
@@ -162,7 +184,7 @@ class Assistant:
         self._route = better
         self._log_plan(observation, better, improved=True)
         if changed:
-            self._show_way(observation)
+            self._show_way(observation, observation.position)
 
     def _log_plan(self, observation: Observation, route: Route, **more: bool) -> None:
         # Cost and bound are those of the state that the plan was made for; a better plan comes a little later.
@@ -186,7 +208,7 @@ class Assistant:
         )
 
     def _position_of(self, observation: Observation, name: str) -> NDArray[np.float64]:
-        return observation.object_positions[observation.object_names.index(name), :2]
+        return observation.object_positions[self._number[name], :2]
 
     def _goal(self, observation: Observation, visit: RouteVisit) -> NDArray[np.float64]:
         """Where a visit happens: the object itself, or the middle of the receptacle, m, (2,)."""
@@ -194,31 +216,25 @@ class Assistant:
             return self._position_of(observation, visit.object)
         return self._house.receptacles[self._episode.targets[visit.object]].center[:2]
 
-    def _show_way(self, observation: Observation) -> None:
+    def _show_way(self, observation: Observation, start: NDArray[np.float64]) -> None:
         visit = self._route.next if self._route else None
         self._path = None
         if visit is not None:
             self._path_goal = self._goal(observation, visit).copy()
             target = self._path_goal if visit.kind is VisitKind.PICK else self._deliveries[visit.object]
-            self._path = self._house.geodesics.shortest_path(observation.position, target).points
+            self._path = self._house.geodesics.shortest_path(start, target).points
 
     def _path_is_stale(self, observation: Observation) -> bool:
         visit = self._route.next if self._route else None
         if self._path is None or visit is None:
             return False
-        strayed = project(self._path, observation.position)[1] > OFF_THE_PATH
-        return strayed or float(np.linalg.norm(self._goal(observation, visit) - self._path_goal)) > MOVED
+        x, y = observation.position
+        strayed = project(self._path, x, y)[1] > OFF_THE_PATH
+        return strayed or math.dist(self._goal(observation, visit), self._path_goal) > MOVED
 
     def _ahead(self, observation: Observation) -> NDArray[np.float64] | None:
         """What is left of the shown way, from the point of it nearest to the person, m, (k, 2)."""
-        if self._path is None:
-            return None
-        arc, _ = project(self._path, observation.position)
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self._path, axis=0), axis=1))])
-        rest = self._path[along > arc + 1e-9]
-        if path_length(self._path) - arc < 1e-9:
-            return self._path[-1:]
-        return np.vstack([point_along(self._path, arc), rest])
+        return None if self._path is None else rest_of(self._path, *observation.position)
 
 
 def _xy(point: NDArray[np.float64]) -> XY:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,11 @@ class KnownHouse:
     bins: Mapping[str, Point]
     approaches: Mapping[str, Point]
     viewpoints: Mapping[str, NDArray[np.float64]]
+
+    @cached_property
+    def outline(self) -> NDArray[np.float64]:
+        """Edges of where one can walk: x, y of one end and of the other, m, shape (e, 4)."""
+        return self.navmesh.outline()
 
     def path(self, start: Point, goal: Point) -> NDArray[np.float64]:
         """Floor points of the shortest way, m, shape (k, 2).

@@ -16,6 +16,8 @@ from mjsim.observation import Observation
 from mjsim.recording import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint
 from mjsim.world import World
 
+FAR_OFF = 1000  # control steps, where no checkpoint is to come
+
 
 class Recording:
     """Accompanies a session: hashes each control step, and takes the world through checkpoints.
@@ -61,6 +63,19 @@ class Recording:
         self._log_size.append(self._log.size)
         self._log_hash.append(self._log.hash)
         self._state_hash.append(self._world.state_hash())
+
+    def extend(self, state_hashes: NDArray[np.uint64]) -> None:
+        """Record the states before actions during which nothing was logged, shape (n,)."""
+        self._state_hash += state_hashes.tolist()
+        self._log_size += [self._log.size] * len(state_hashes)
+        self._log_hash += [self._log.hash] * len(state_hashes)
+
+    @property
+    def steps_to_checkpoint(self) -> int:
+        """Control steps that can be taken at once before the next checkpoint is due, 1 or more."""
+        if self._steps_given is None:
+            return max(1, self._last + self._period - self.step)
+        return min((step - self.step for step in self._steps_given if step > self.step), default=FAR_OFF)
 
     def save(self, path: Path, actions: NDArray[np.float64]) -> None:
         """Write a compressed NPZ, whole or not at all.

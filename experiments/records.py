@@ -19,9 +19,11 @@ from experiments.errors import RecordError
 from mjsim.actions import Action, Move, Pick, Place
 from mjsim.errors import ActionError
 from mjsim.files import replacing, write_text_atomically
+from mjsim.health import HealthSample
 from mjsim.observation import ObjectStatus, Observation
+from mjsim.stretch import Stretch
 
-LOG_FORMAT = 2  # 1 had neither state hashes nor checkpoints
+LOG_FORMAT = 3  # 2 had no health of the physics, 1 neither state hashes nor checkpoints
 EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
     "events.jsonl",
@@ -32,7 +34,29 @@ EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "topdown.png",
     "video.mp4",
 )
+# Columns of `HealthSample.row`, and how many numbers each has.
+HEALTH = {
+    "penetration_m": 1,
+    "trunk_penetration_m": 1,
+    "weld_error_m": 2,
+    "weld_error_rad": 2,
+    "settle_s": 1,
+}
 STATUS_CODE = {ObjectStatus.LOOSE: 0, ObjectStatus.CARRIED: 1, ObjectStatus.DELIVERED: 2}
+
+COLUMNS = (
+    "time",
+    "position",
+    "heading",
+    "pitch",
+    "hands",
+    "object_position",
+    "object_quaternion",
+    "object_status",
+    "action",
+    "health",
+)
+KINDS: Mapping[str, type] = {"hands": np.int16, "object_status": np.int8}  # the others are float64
 
 Event = Mapping[str, Any]
 
@@ -95,58 +119,83 @@ class LogDigest:
 
 
 class Trajectory:
-    """Poses and actions of every control step.
+    """Poses, actions and the health of the physics of every control step.
 
     Arrays (T steps, n objects): `time` (T,) s; `position` (T, 2) m; `heading`, `pitch` (T,) rad; `hands` (T, 2)
     object index or -1; `object_position` (T, n, 3) m; `object_quaternion` (T, n, 4) wxyz; `object_status` (T, n)
     0 loose, 1 carried, 2 delivered; `action` (T, 6): kind (0 move, 1 pick, 2 place), object index or -1, then
-    forward, left (m/s), turn, look (rad/s). Row t is the state before action t. An object index of n + i means the
-    i-th of `unknown_objects`: names that were asked for and that the house does not have.
+    forward, left (m/s), turn, look (rad/s). `penetration_m`, `trunk_penetration_m`, `settle_s` (T,), `weld_error_m` and
+    `weld_error_rad` (T, 2) are those of `HealthSample`, NaN where there is none. Row t is the state before action t. An
+    object index of n + i means the i-th of `unknown_objects`: names that were asked for and that the house does not
+    have.
     """
 
     def __init__(self, object_names: Sequence[str]) -> None:
         self._index = {name: i for i, name in enumerate(object_names)}
         self._unknown: list[str] = []
         self._rows: list[tuple[Any, ...]] = []
+        self._blocks: list[dict[str, NDArray[Any]]] = []
+        self._hands: tuple[tuple[str | None, ...], list[int]] = ((), [])
+        self._status: tuple[tuple[ObjectStatus, ...], list[int]] = ((), [])
 
-    def append(self, observation: Observation, action: Action) -> None:
+    def append(self, observation: Observation, action: Action, health: HealthSample) -> None:
         """Add one control step."""
-        o = observation
-        hands = [-1 if name is None else self._index[name] for name in o.hands]
-        status = [STATUS_CODE[s] for s in o.object_status]
-        self._rows.append(
-            (
-                o.time,
-                o.position,
-                o.heading,
-                o.pitch,
-                hands,
-                o.object_positions,
-                o.object_quaternions,
-                status,
-                self._encode(action),
-            )
-        )
+        self._rows.append((*self._poses(observation), self._encode(action), health.row))
+
+    def extend(
+        self, observation: Observation, health: HealthSample, stretch: Stretch, moves: NDArray[np.float64]
+    ) -> None:
+        """Add the control steps of a stretch.
+
+        Args:
+            observation: State before its first step.
+            health: The physics before its first step.
+            stretch: What came of it; nothing is picked up or let go before its last step.
+            moves: Forward, left, turn and look of every step, shape (n, 4).
+        """
+        self._close_block()
+        count = len(stretch)
+        first = dict(zip(COLUMNS, (*self._poses(observation), None, health.row), strict=True))
+        rows = {
+            "time": stretch.times,
+            "position": stretch.positions,
+            "heading": stretch.headings,
+            "pitch": stretch.pitches,
+            "object_position": stretch.object_positions,
+            "object_quaternion": stretch.object_quaternions,
+            "health": stretch.health,
+        }
+        # A row of the stretch is the state after its action, one of the trajectory the state before it.
+        block = {n: np.concatenate([np.asarray(first[n])[None], r[:-1]]) for n, r in rows.items()}
+        for name in ("hands", "object_status"):
+            block[name] = np.tile(np.asarray(first[name], KINDS[name]), (count, 1))
+        block["action"] = np.hstack([np.tile([0.0, -1.0], (count, 1)), moves])
+        self._blocks.append(block)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Everything so far, as arrays by name."""
-        names = (
-            "time",
-            "position",
-            "heading",
-            "pitch",
-            "hands",
-            "object_position",
-            "object_quaternion",
-            "object_status",
-            "action",
-        )
-        kinds: dict[str, type] = {"hands": np.int16, "object_status": np.int8}
-        columns: list[Sequence[Any]] = list(zip(*self._rows, strict=True)) or [()] * len(names)
-        arrays: dict[str, NDArray[Any]] = {
-            n: np.asarray(c, dtype=kinds.get(n, np.float64)) for n, c in zip(names, columns, strict=True)
-        }
+        self._close_block()
+        blocks = self._blocks or [_block([])]
+        arrays = {name: np.concatenate([block[name] for block in blocks]) for name in COLUMNS}
+        columns = arrays.pop("health").reshape(-1, sum(HEALTH.values()))
+        ends = np.cumsum(list(HEALTH.values()))
+        for (name, width), part in zip(HEALTH.items(), np.split(columns, ends[:-1], axis=1), strict=True):
+            arrays[name] = part if width > 1 else part[:, 0]
         return {**arrays, "unknown_objects": np.array(self._unknown, dtype=np.str_)}
+
+    def _poses(self, o: Observation) -> tuple[Any, ...]:
+        """All columns but the last two."""
+        if o.hands != self._hands[0]:
+            self._hands = o.hands, [-1 if name is None else self._index[name] for name in o.hands]
+        if o.object_status != self._status[0]:
+            self._status = o.object_status, [STATUS_CODE[s] for s in o.object_status]
+        seen = o.object_positions, o.object_quaternions, self._status[1]
+        return o.time, o.position, o.heading, o.pitch, self._hands[1], *seen
+
+    def _close_block(self) -> None:
+        if self._rows:
+            self._blocks.append(_block(self._rows))
+            self._rows = []
 
     def save(self, path: Path) -> None:
         """Write a compressed NPZ, whole or not at all."""
@@ -173,6 +222,12 @@ class Trajectory:
         if name not in self._unknown:
             self._unknown.append(name)
         return len(self._index) + self._unknown.index(name)
+
+
+def _block(rows: Sequence[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
+    """Rows of a trajectory as arrays by column."""
+    columns: list[Sequence[Any]] = list(zip(*rows, strict=True)) or [()] * len(COLUMNS)
+    return {n: np.asarray(c, dtype=KINDS.get(n, np.float64)) for n, c in zip(COLUMNS, columns, strict=True)}
 
 
 def decode_action(row: NDArray[np.float64], names: Sequence[str]) -> Action:

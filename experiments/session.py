@@ -1,21 +1,23 @@
 """The one loop: observe, show, let the user act, step the world. A script, a person and a replay all run in it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.assistant import Assistant
+from experiments.assistant import OFF_THE_PATH, Assistant
 from experiments.errors import SessionError
-from experiments.participants.base import NEARBY, Participant, Percept
+from experiments.lockstep import Finish, Play, Request, Walk, drive
+from experiments.participants.base import Foreseeing, Guidance, Outlook, Participant, Percept, Things
 from experiments.recording import Recording
 from experiments.records import EventLog, Trajectory
 from hud.state import HudState
-from mjsim.actions import IDLE, Action, ActionResult
+from mjsim.actions import IDLE, Action, ActionResult, WorldEvent
 from mjsim.errors import PhysicsError
 from mjsim.observation import ObjectStatus, Observation
+from mjsim.stretch import Stretch
 from mjsim.visibility import visible_objects
 from mjsim.world import StepResult, World
 
@@ -26,6 +28,7 @@ ALL_DELIVERED, TIME_LIMIT, INTERRUPTED, PHYSICS_ERROR = (
     "physics error",
 )
 AFTERGLOW = 1.6  # s the session goes on after the last delivery, so that the person sees that all is done
+LONGEST_MOTION = 30.0  # s; no pick or place takes as long
 
 
 class Viewer(Protocol):
@@ -45,6 +48,9 @@ class Progress:
     total: int
 
 
+OnProgress = Callable[[Progress], None]
+
+
 class Session:
     """One trial from the start pose until everything is delivered or the time is up.
 
@@ -57,6 +63,8 @@ class Session:
         time_limit: Simulated time after which the session ends, s.
         viewer: Sees every control step, or None.
         recording: Hashes every control step; None for one that decides on checkpoints by itself.
+        foresight: Take many control steps at once where nobody has to see each of them: the fidelity is not `full`,
+            the participant foresees its moves, and there is no viewer. The run is the same without.
 
     Attributes:
         trajectory: Poses and actions so far.
@@ -74,6 +82,7 @@ class Session:
         time_limit: float,
         viewer: Viewer | None = None,
         recording: Recording | None = None,
+        foresight: bool = True,
     ) -> None:
         self._world = world
         self._assistant = assistant
@@ -84,24 +93,37 @@ class Session:
         self._viewer = viewer
         self._shown: frozenset[str] = frozenset()
         self._recorded_until = 0.0
+        self._foreseeing: Foreseeing | None = None
+        if foresight and viewer is None and world.options.fidelity != "full":
+            self._foreseeing = participant if isinstance(participant, Foreseeing) else None
+        self._minded: tuple[tuple[ObjectStatus, ...], NDArray[np.bool_]] = ((), np.zeros(0, np.bool_))
         self.trajectory = Trajectory(world.scene.index.names)
         self.recording = recording or Recording(world, log)
 
-    def run(self, on_progress: Callable[[Progress], None] = lambda _: None) -> str:
+    def run(self, on_progress: OnProgress = lambda _: None) -> str:
         """Run from the start to the end; returns why it ended: `all delivered`, `time limit` or `interrupted`.
 
         Raises:
             SessionError: The participant needs guidance that the assistance condition does not show.
             PhysicsError: The physics failed; the log says when.
         """
+        return drive(self.play(on_progress), self._world)
+
+    def resume(self, observation: Observation, on_progress: OnProgress = lambda _: None) -> str:
+        """Run to the end from where the world and the assistant are now; returns and raises as `run` does."""
+        return drive(self._play_on(observation, on_progress), self._world)
+
+    def play(self, on_progress: OnProgress = lambda _: None) -> Play:
+        """Run as a generator: yields what the world is to do and takes what came of it; returns as `run` does.
+
+        A `PhysicsError` or `KeyboardInterrupt` that comes of it is thrown in.
+        """
         observation = self._world.reset()
         self._assistant.begin(observation)
-        return self.resume(observation, on_progress)
+        return (yield from self._play_on(observation, on_progress))
 
-    def resume(
-        self, observation: Observation, on_progress: Callable[[Progress], None] = lambda _: None
-    ) -> str:
-        """Run to the end from where the world and the assistant are now; returns and raises as `run` does."""
+    def _play_on(self, observation: Observation, on_progress: OnProgress) -> Play:
+        self._now = observation
         self._shown = frozenset(m.role for m in self._assistant.hud_state(observation).markers)
         if not self._participant.needs <= self._shown:
             raise SessionError(
@@ -109,62 +131,107 @@ class Session:
                 f"{sorted(self._shown) or 'none'}; choose another --user or --assistance"
             )
         try:
-            observation, reason = self._until_done(observation, on_progress)
+            reason = yield from self._until_done(on_progress)
         except KeyboardInterrupt:
             # What has been done so far is kept and measured, as it would be for a person who stops early.
-            observation, reason = self._world.observation(), INTERRUPTED
+            reason = INTERRUPTED
         except PhysicsError as error:
             self._log.append(self._recorded_until, "end", reason=PHYSICS_ERROR, error=str(error))
             raise
-        self._log.append(observation.time, "end", reason=reason)
+        self._log.append(self._now.time, "end", reason=reason)
         return reason
 
-    def _until_done(
-        self, observation: Observation, on_progress: Callable[[Progress], None]
-    ) -> tuple[Observation, str]:
+    def _until_done(self, on_progress: OnProgress) -> Play:
         answer: ActionResult | None = None
-        total = len(observation.object_names)
-        while observation.time < self._time_limit - 1e-9:
-            observation = self.recording.pass_checkpoint(observation)
-            self._film(observation)
-            action = self._participant.act(self._percept(observation, answer))
-            self._record(observation, action)
-            step = self._world.step(action)
-            observation, answer = step.observation, step.result
-            self._take_note(step)
-            delivered = len(observation.names_with(ObjectStatus.DELIVERED))
-            on_progress(Progress(observation.time, delivered, total))
+        total = len(self._now.object_names)
+        delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
+        while self._now.time < self._time_limit - 1e-9:
+            self._now = self.recording.pass_checkpoint(self._now)
+            self._film()
+            percept = self._percept(answer)
+            foreseen = None if self._foreseeing is None else self._foresee(self._foreseeing, percept)
+            if foreseen is not None:
+                answer, events = None, (yield from self._stride(foreseen))
+            else:
+                answer, events = yield from self._step(self._participant.act(percept))
+            if events:
+                delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
+            on_progress(Progress(self._now.time, delivered, total))
             if delivered == total:
-                self._assistant.say("finished", observation.time)
-                self._record(observation, IDLE)
-                self._glow(observation)
-                return observation, ALL_DELIVERED
-        self._record(observation, IDLE)
-        return observation, TIME_LIMIT
+                self._assistant.say("finished", self._now.time)
+                self._record(IDLE)
+                yield from self._glow()
+                return ALL_DELIVERED
+        self._record(IDLE)
+        return TIME_LIMIT
 
-    def _record(self, observation: Observation, action: Action) -> None:
-        self._recorded_until = observation.time
-        self.recording.append()
-        self.trajectory.append(observation, action)
-
-    def _glow(self, observation: Observation) -> None:
-        """Let the viewer see the end for a moment; nothing of it is measured."""
-        if self._viewer is None:
-            return
-        until = observation.time + AFTERGLOW
-        while observation.time < until:
-            self._film(observation)
-            observation = self._world.step(IDLE).observation
-
-    def _take_note(self, step: StepResult) -> None:
-        observation = step.observation
+    def _step(
+        self, action: Action
+    ) -> Generator[Request, StepResult | Stretch, tuple[ActionResult | None, tuple[WorldEvent, ...]]]:
+        """One control step, observed by everybody."""
+        self._record(action)
+        step = cast(StepResult, (yield action))
+        self._now = step.observation
         if step.result is not None:
-            self._note_attempt(observation.time, step.result)
-        for event in step.events:
+            self._note_attempt(self._now.time, step.result)
+        self._take_note(step.events)
+        return step.result, step.events
+
+    def _foresee(self, participant: Foreseeing, percept: Percept) -> Walk | Finish | None:
+        """Many control steps at once, or None where each has to be observed."""
+        left = int((self._time_limit - percept.time) / self._world.control_timestep) - 1
+        if self._assistant.expecting or (percept.answer is not None and not percept.answer.applied):
+            return None
+        if percept.busy:
+            return Finish() if left * self._world.control_timestep > LONGEST_MOTION else None
+        limit = min(left, self.recording.steps_to_checkpoint)
+        if limit < 1:
+            return None
+        body, gait, floor = getattr(self._world, "walker")  # noqa: B009
+        moves = participant.foresee(percept, Outlook(body, gait, floor, limit, stray=OFF_THE_PATH))
+        return Walk(moves) if len(moves) else None
+
+    def _stride(
+        self, request: Walk | Finish
+    ) -> Generator[Request, StepResult | Stretch, tuple[WorldEvent, ...]]:
+        """Many control steps, recorded as if they had been observed one by one."""
+        self._recorded_until = self._now.time
+        self.recording.append()
+        health = self._world.health_sample
+        stretch = cast(Stretch, (yield request))
+        count = len(stretch)
+        moves = request.moves[:count] if isinstance(request, Walk) else np.zeros((count, 4))
+        self.recording.extend(stretch.state_hashes[:-1])
+        self.trajectory.extend(self._now, health, stretch, moves)
+        self._now = stretch.observation
+        if isinstance(request, Walk):
+            if self._foreseeing is not None:
+                self._foreseeing.went(count)
+            quiet = count - 1 if stretch.events else count
+            self._assistant.walked(stretch.positions[:quiet], self._now)
+        if stretch.events or isinstance(request, Finish):
+            self._take_note(stretch.events)
+        return stretch.events
+
+    def _record(self, action: Action) -> None:
+        self._recorded_until = self._now.time
+        self.recording.append()
+        self.trajectory.append(self._now, action, self._world.health_sample)
+
+    def _glow(self) -> Generator[Request, StepResult | Stretch, None]:
+        """Let the viewer see the end for a moment; nothing of it is measured."""
+        end = self._now
+        while self._viewer is not None and self._now.time < end.time + AFTERGLOW:
+            self._film()
+            self._now = cast(StepResult, (yield IDLE)).observation
+        self._now = end
+
+    def _take_note(self, events: tuple[WorldEvent, ...]) -> None:
+        for event in events:
             self._log.append(event.time, event.kind.value, object=event.object, receptacle=event.receptacle)
-        self._assistant.observe(observation, step.events)
-        for event in step.events:
-            self._assistant.say(event.kind.value, observation.time, event.object)
+        self._assistant.observe(self._now, events)
+        for event in events:
+            self._assistant.say(event.kind.value, self._now.time, event.object)
 
     def _note_attempt(self, time: float, result: ActionResult) -> None:
         kind = type(result.action).__name__.lower()
@@ -175,11 +242,13 @@ class Session:
         if refusal is not None:
             self._assistant.say(refusal, time, result.object)
 
-    def _film(self, observation: Observation) -> None:
+    def _film(self) -> None:
         if self._viewer is not None:
-            self._viewer.show(self._world, observation, self._assistant)
+            self._viewer.show(self._world, self._now, self._assistant)
 
-    def _percept(self, observation: Observation, answer: ActionResult | None) -> Percept:
+    def _percept(self, answer: ActionResult | None) -> Percept:
+        observation = self._now
+
         def hud() -> HudState:
             return self._assistant.hud_state(observation)
 
@@ -191,33 +260,36 @@ class Session:
             loose = set(observation.names_with(ObjectStatus.LOOSE))
             return {name: _position_of(observation, name) for name in seen if name in loose}
 
+        def guidance() -> Guidance | None:
+            return self._assistant.guidance(observation) if "goal" in self._shown else None
+
+        def flagpoles() -> dict[str, NDArray[np.float64]]:
+            if "flagpole" not in self._shown:
+                return {}
+            return {n: _position_of(observation, n) for n in observation.names_with(ObjectStatus.LOOSE)}
+
         return Percept(
             time=observation.time,
             position=observation.position,
             heading=observation.heading,
             hands=observation.hands,
             busy=observation.busy,
-            hud=hud,
-            guidance=self._assistant.guidance(observation) if "goal" in self._shown else None,
-            flagpoles=self._flagpoles(observation),
             targets=self._targets,
             answer=answer,
-            nearby=self._nearby(observation),
+            things=self._things(observation),
+            hud=hud,
             look=look,
+            find_guidance=guidance,
+            find_flagpoles=flagpoles,
         )
 
-    def _nearby(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
-        gaps = np.linalg.norm(observation.object_positions[:, :2] - observation.position, axis=1)
-        return {
-            observation.object_names[i]: observation.object_positions[i, :2]
-            for i in np.flatnonzero(gaps < NEARBY)
-            if observation.object_status[i] is ObjectStatus.LOOSE
-        }
-
-    def _flagpoles(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
-        if "flagpole" not in self._shown:
-            return {}
-        return {n: _position_of(observation, n) for n in observation.names_with(ObjectStatus.LOOSE)}
+    def _things(self, observation: Observation) -> Things:
+        status, minded = self._minded
+        if observation.object_status != status:
+            status = observation.object_status
+            minded = np.array([s is ObjectStatus.LOOSE for s in status])
+            self._minded = status, minded
+        return Things(observation.object_names, observation.object_positions, minded)
 
 
 def _position_of(observation: Observation, name: str) -> NDArray[np.float64]:

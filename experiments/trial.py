@@ -16,6 +16,7 @@ from experiments.analysis.topdown import draw_topdown
 from experiments.assistant import Assistant
 from experiments.errors import ConfigError
 from experiments.glasses import FilmConfig, Filming, Glasses
+from experiments.health import summarise_health
 from experiments.house import House
 from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
@@ -125,7 +126,8 @@ def run_trial(
             **_settings(config),
             "ended": ran.ended,
             **dataclasses.asdict(compute_metrics(ran.log.events, arrays["position"])),
-            **_health(ran.world, arrays),
+            **summarise_health(ran.log.events, arrays),
+            "simulated_s": float(arrays["time"][-1]),
             "frames_sha256": ran.frames_sha256,
             # Named wherever anything was drawn, if only the floor plan.
             "renderer": gl_info().renderer if film or topdown else None,
@@ -233,12 +235,3 @@ def prepare_session(
 def _settings(config: TrialConfig) -> dict[str, Any]:
     settings = dataclasses.asdict(config)
     return {**settings, "user": config.user_name, "time_limit": config.limit}
-
-
-def _health(world: World, arrays: dict[str, Any]) -> dict[str, Any]:
-    health = world.health
-    return {
-        "max_penetration_m": health.max_penetration_m,
-        "max_weld_error_m": health.max_weld_error_m,
-        "simulated_s": float(arrays["time"][-1]),
-    }

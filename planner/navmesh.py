@@ -156,6 +156,14 @@ class NavMesh:
             if shapely.contains_xy(self.islands[0], point[0], point[1]):
                 return point
 
+    def outline(self) -> NDArray[np.float64]:
+        """Edges of the navigable floor: x, y of one end and of the other, m, shape (e, 4).
+
+        A point is navigable if a ray from it crosses an odd number of them.
+        """
+        rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(self._loose)]
+        return np.ascontiguousarray(np.concatenate([np.hstack([r[:-1], r[1:]]) for r in rings]))
+
     def cell_centres(self) -> NDArray[np.float64]:
         """Centres of the grid's cells, (rows, columns, 2), m."""
         return _centres(self.bounds, self.resolution)

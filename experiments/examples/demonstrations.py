@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.known_house import KnownHouse
-from experiments.participants.base import Percept
+from experiments.participants.base import NO_THINGS, Percept
 from experiments.participants.nearest import Nearest
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult, Move, Pick
@@ -60,13 +60,13 @@ class Demonstrator:
                 heading=observation.heading,
                 hands=observation.hands,
                 busy=observation.busy,
-                hud=_no_glasses,
-                guidance=None,
-                flagpoles=flagpoles,
                 targets=self._targets,
                 answer=self.answer,
-                nearby={},
+                things=NO_THINGS,
+                hud=_no_glasses,
                 look=lambda: flagpoles,
+                find_guidance=lambda: None,
+                find_flagpoles=lambda: flagpoles,
             )
         )
 

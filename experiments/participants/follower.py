@@ -1,10 +1,11 @@
 """Follows the breadcrumbs and does what the current step says (condition `optimal`)."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse
-from experiments.participants.base import Participant, Percept
-from experiments.participants.errands import Errand, ErrandRunner
+from experiments.participants.base import Guidance, Outlook, Participant, Percept
+from experiments.participants.errands import NO_MOVES, Errand, ErrandRunner
 from mjsim.actions import IDLE, Action
 
 
@@ -18,10 +19,23 @@ class Follower:
 
     def act(self, percept: Percept) -> Action:
         """Walk along the breadcrumbs; pick or place at their end."""
-        step = percept.guidance
-        if step is None:
+        if percept.busy or percept.guidance is None:
             return IDLE
-        return self._runner.act(percept, Errand(step.kind, step.object, step.goal, step.path[-1]), step.path)
+        return self._runner.act(percept, _errand(percept.guidance), percept.guidance.path)
+
+    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
+        """Moves up to the end of the breadcrumbs."""
+        if percept.guidance is None:
+            return NO_MOVES
+        return self._runner.foresee(percept, outlook, _errand(percept.guidance), percept.guidance.way)
+
+    def went(self, steps: int) -> None:
+        """So many of the moves foreseen were made."""
+        self._runner.went(steps)
+
+
+def _errand(step: Guidance) -> Errand:
+    return Errand(step.kind, step.object, step.goal, step.path[-1])
 
 
 def build(house: KnownHouse, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance

@@ -1,16 +1,11 @@
 """Goes to the nearest flagpole while a hand is free, or to the nearest bin (condition `highlight`)."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse
-from experiments.participants.base import Participant, Percept
-from experiments.participants.errands import (
-    Errand,
-    ErrandRunner,
-    estimated_distance,
-    pick_errand,
-    place_errand,
-)
+from experiments.participants.base import Outlook, Participant, Percept
+from experiments.participants.errands import NO_MOVES, Errand, ErrandRunner, Visit, nearest_visit
 from mjsim.actions import IDLE, Action
 
 
@@ -22,25 +17,31 @@ class Nearest:
     def __init__(self, house: KnownHouse) -> None:
         self._house = house
         self._runner = ErrandRunner(house)
-        self._choice: tuple[str, str] | None = None
+        self._choice: Visit | None = None
 
     def act(self, percept: Percept) -> Action:
         """Walk to the chosen flagpole or bin; pick or place there."""
-        errands = {e.key: e for e in self._feasible(percept)}
-        if not errands:
-            return IDLE
-        if self._choice not in errands:
-            here = percept.position
-            self._choice = min(
-                errands, key=lambda k: (estimated_distance(self._house, here, errands[k].stand), k)
-            )
-        return self._runner.act(percept, errands[self._choice])
+        errand = None if percept.busy else self._errand(percept)
+        return IDLE if errand is None else self._runner.act(percept, errand)
 
-    def _feasible(self, percept: Percept) -> list[Errand]:
-        bins = [place_errand(self._house, n, percept.targets[n]) for n in percept.carried]
-        if None not in percept.hands:
-            return bins
-        return bins + [pick_errand(self._house, n, xy) for n, xy in percept.flagpoles.items()]
+    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
+        """Moves up to the chosen flagpole or bin."""
+        errand = self._errand(percept)
+        return NO_MOVES if errand is None else self._runner.foresee(percept, outlook, errand)
+
+    def went(self, steps: int) -> None:
+        """So many of the moves foreseen were made."""
+        self._runner.went(steps)
+
+    def _errand(self, percept: Percept) -> Errand | None:
+        feasible = [("place", name) for name in percept.carried]
+        if None in percept.hands:
+            feasible += [("pick", name) for name in percept.flagpoles]
+        if not feasible:
+            return None
+        if self._choice not in feasible:
+            self._choice = nearest_visit(self._house, percept, feasible, percept.flagpoles)
+        return self._runner.errand(percept, self._choice, percept.flagpoles)
 
 
 def build(house: KnownHouse, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance

@@ -1,16 +1,22 @@
 """Searches room by room with what it can see, and tidies what it finds (condition `none`)."""
 
+import dataclasses
+import math
+
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse, Point
-from experiments.participants.base import Participant, Percept
+from experiments.participants.base import Outlook, Participant, Percept
 from experiments.participants.errands import (
+    NO_MOVES,
     Errand,
     ErrandRunner,
-    estimated_distance,
-    pick_errand,
-    place_errand,
+    Visit,
+    estimated_distances,
+    nearest_visit,
 )
+from experiments.participants.strides import TICK
 from mjsim.actions import IDLE, Action, Move
 
 LOOK_INTERVAL = 0.2  # s between two looks while walking
@@ -37,7 +43,7 @@ class Searcher:
         self._turned: float | None = None
         self._last_heading = 0.0
         self._next_look = 0.0
-        self._choice: tuple[str, str] | None = None
+        self._choice: Visit | None = None
 
     def act(self, percept: Percept) -> Action:
         """Look, remember, decide, and do one control step of what was decided."""
@@ -50,28 +56,41 @@ class Searcher:
             return self._runner.act(percept, errand)
         return self._search(percept)
 
+    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
+        """Moves up to the next look, while it walks somewhere."""
+        self._look(percept)
+        steps = math.ceil((self._next_look - TICK - percept.time) / outlook.gait.dt)
+        outlook = dataclasses.replace(outlook, limit=min(outlook.limit, steps))
+        errand = self._errand(percept)
+        if errand is not None:
+            self._turned = None
+            return self._runner.foresee(percept, outlook, errand)
+        if self._turned is not None:
+            return NO_MOVES
+        return self._runner.foresee_walk(percept, outlook, self._goal(percept)[1], SEARCHED)
+
+    def went(self, steps: int) -> None:
+        """So many of the moves foreseen were made."""
+        self._runner.went(steps)
+
     def _look(self, percept: Percept) -> None:
         for name in percept.carried:
             self._remembered.pop(name, None)
-        if percept.time < self._next_look:
+        if percept.time < self._next_look - TICK:
             return
         self._next_look = percept.time + LOOK_INTERVAL
         self._remembered.update(percept.look())
 
     def _errand(self, percept: Percept) -> Errand | None:
         """What can be done with what is known: fetch the nearest known object, or bring what is carried."""
-        bins = [place_errand(self._house, n, percept.targets[n]) for n in percept.carried]
-        known = [pick_errand(self._house, n, xy) for n, xy in sorted(self._remembered.items())]
+        bins = [("place", name) for name in percept.carried]
+        known = [("pick", name) for name in sorted(self._remembered)]
         feasible = bins if None not in percept.hands else known or bins
-        errands = {e.key: e for e in feasible}
-        if not errands:
+        if not feasible:
             return None
-        if self._choice not in errands:
-            here = percept.position
-            self._choice = min(
-                errands, key=lambda k: (estimated_distance(self._house, here, errands[k].stand), k)
-            )
-        chosen = errands[self._choice]
+        if self._choice not in feasible:
+            self._choice = nearest_visit(self._house, percept, feasible, self._remembered)
+        chosen = self._runner.errand(percept, self._choice, self._remembered)
         if chosen.kind == "pick" and self._has_gone(percept, chosen):
             del self._remembered[chosen.object]
             return self._errand(percept)
@@ -85,13 +104,17 @@ class Searcher:
     def _search(self, percept: Percept) -> Action:
         if self._turned is not None:
             return self._look_around(percept)
-        if self._target is None:
-            self._target = self._next_viewpoint(percept.position)
-        room, viewpoint = self._target
+        room, viewpoint = self._goal(percept)
         if float(np.linalg.norm(viewpoint - percept.position)) > SEARCHED:
             return self._runner.walk(percept, self._runner.way_to(percept.position, viewpoint))
         self._room, self._turned, self._last_heading = room, 0.0, percept.heading
         return Move(turn=LOOK_AROUND_RATE)
+
+    def _goal(self, percept: Percept) -> tuple[str, Point]:
+        """Viewpoint to search from next, and its room."""
+        if self._target is None:
+            self._target = self._next_viewpoint(percept.position)
+        return self._target
 
     def _look_around(self, percept: Percept) -> Action:
         step = (percept.heading - self._last_heading + np.pi) % FULL_TURN - np.pi
@@ -108,7 +131,8 @@ class Searcher:
         if not self._unsearched:
             self._unsearched = self._all_viewpoints()
         here = [v for v in self._unsearched if v[0] == self._room] or self._unsearched
-        return min(here, key=lambda v: estimated_distance(self._house, position, v[1]))
+        gaps = estimated_distances(self._house, position, [point for _, point in here])
+        return here[int(np.argmin(gaps))]
 
     def _all_viewpoints(self) -> list[tuple[str, Point]]:
         """Every viewpoint, a little elsewhere at each round so that what was hidden once is seen later."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from experiments import records
 from experiments.errors import RecordError
+from experiments.health import summarise_health
 from experiments.metrics import compute_metrics
 from experiments.records import Event, read_json
 from experiments.replaying.replayer import WORLD_EVENTS, Replayer
@@ -98,6 +99,7 @@ def _derived_faults(record: RunRecord) -> Iterator[Fault]:
         yield Fault(last, str(error))
         return
     expected = dataclasses.asdict(compute_metrics(events, record.arrays["position"]))
+    expected |= summarise_health(events, record.arrays)
     for name, value in {**expected, "ended": record.reason}.items():
         if name in metrics and metrics[name] != value:
             yield Fault(last, f"{records.METRICS}: {name} is {metrics[name]!r}, the log gives {value!r}")

@@ -135,7 +135,8 @@ class Replayer:
         except _EndOfReplay:
             if self._user.fault is None:  # the person stopped the run here: no more than the state is known
                 recording.append()
-                session.trajectory.append(self._world.observation(), record.action(record.steps - 1))
+                action, health = record.action(record.steps - 1), self._world.health_sample
+                session.trajectory.append(self._world.observation(), action, health)
         except PhysicsError as error:
             self.failure = str(error)
         self._trajectory = session.trajectory

@@ -32,6 +32,11 @@ PER_STEP = {
     "object_quaternion": 3,
     "object_status": 2,
     "action": 2,
+    "penetration_m": 1,
+    "trunk_penetration_m": 1,
+    "weld_error_m": 2,
+    "weld_error_rad": 2,
+    "settle_s": 1,
 }
 
 
