@@ -22,15 +22,20 @@ _HOUSE, _PERSON = -1, -2  # who bears a geom, where no object does
 
 
 class Carrying:
-    """Keeps both hands in posture; one instance per world."""
+    """Keeps both hands in posture; one instance per world.
+
+    Attributes:
+        loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
+        field: Clearance at the heights of what is carried: arrays of a `ClearanceField`, for kernels.
+    """
 
     def __init__(self, person: Person) -> None:
         scene = person.scene
         low, high = CARRY_BAND
         self._person = person
         self._clearance = ClearanceField.from_model(scene.model, low=low, high=high)
-        self._field = (self._clearance.distance, self._clearance.gradient, self._clearance.frame)
-        self._loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
+        self.field = (self._clearance.distance, self._clearance.gradient, self._clearance.frame)
+        self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._bearer = _bearers(scene)
         self._rest = np.array(avatar.REST)
         self._postures = {p: np.array(p) for p in (avatar.CARRY, avatar.TUCKED, avatar.ASIDE)}
@@ -65,7 +70,7 @@ class Carrying:
         posture = self._postures[held_posture]
         update_hands(
             rig.pose, rig.motion, rig.hand_targets, person.hand_velocities, self._yield, self._goals,
-            left, right, moving, posture, self._rest, self._loads, *self._field,
+            left, right, moving, posture, self._rest, self.loads, *self.field,
             geoms, frames, self._bearer, person.dt,
         )  # fmt: skip
 
@@ -73,11 +78,11 @@ class Carrying:
         self, hand: int, item: int, held_posture: tuple[float, float, float] = avatar.CARRY
     ) -> NDArray[np.float64]:
         """Where a hand best holds object `item` now, clear of the house: body frame, m, (3,)."""
-        radius, height = self._loads[item].tolist()
+        radius, height = self.loads[item].tolist()
         forward, side, up = avatar.posture(hand, held_posture)
         rig = self._person.rig
         return np.array(
-            [*drawn_in(forward, side, radius, rig.pose, rig.motion, *self._field), max(up, LOWEST + height)]
+            [*drawn_in(forward, side, radius, rig.pose, rig.motion, *self.field), max(up, LOWEST + height)]
         )
 
     def _contacts(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:

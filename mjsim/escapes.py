@@ -124,6 +124,10 @@ class Escapes:
         self._ejected: set[int] = set()
         self.ejections = self.tunnellings = 0
 
+    def resume(self, data: mujoco.MjData) -> None:
+        """Take the objects to have been where they are now."""
+        self.anchors[:] = data.xipos[self._bodies]
+
     def find(
         self, data: mujoco.MjData, marks: NDArray[np.uint8], releases: Releases, gripped: Collection[int]
     ) -> list[tuple[EventKind, int]]:

@@ -78,6 +78,10 @@ class HealthMonitor:
             return ()
         return self._escapes.find(data, self._marks, self._releases, gripped)
 
+    def resume(self) -> None:
+        """Go on after something else than physics has moved the person and what the hands hold."""
+        self._escapes.resume(self._rig.data)
+
     def memory(self) -> dict[str, Any]:
         """Everything accumulated, JSON-ready."""
         return {
