@@ -47,4 +47,5 @@ $(READY): pyproject.toml .ci/system-libraries
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --editable '.[dev]'
 	$(BIN)/python -m planner.warmup
+	$(BIN)/python -m mjsim.warmup
 	@touch $@
