@@ -78,6 +78,13 @@ def posture(hand: int, place: tuple[float, float, float]) -> tuple[float, float,
     return (forward, side if hand == 0 else -side, up)
 
 
+def eye_position(x: float, y: float, heading: float, pitch: float) -> tuple[float, float, float]:
+    """Where the eye is in the house, m, of a person at x, y, m, who looks along a heading and a pitch, rad."""
+    out = EYE_FORWARD * math.cos(pitch)
+    height = EYE_HEIGHT + EYE_FORWARD * math.sin(pitch)
+    return x + out * math.cos(heading), y + out * math.sin(heading), height
+
+
 def attach_avatar(
     spec: mujoco.MjSpec, object_names: Sequence[str], *, start: tuple[float, float, float]
 ) -> None:

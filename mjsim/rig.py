@@ -143,10 +143,7 @@ class Rig:
     @property
     def eye(self) -> Vector:
         """Eye camera in the house frame, m, shape (3,)."""
-        x, y, heading, pitch = self.pose[:4].tolist()
-        out = avatar.EYE_FORWARD * math.cos(pitch)
-        height = avatar.EYE_HEIGHT + avatar.EYE_FORWARD * math.sin(pitch)
-        return np.array([x + out * math.cos(heading), y + out * math.sin(heading), height])
+        return np.array(avatar.eye_position(*self.pose[:4].tolist()))
 
     def look_at_pitch(self, pitch: float) -> None:
         """Command a pitch of the head, rad, kept within what a neck can do."""
