@@ -23,6 +23,8 @@ SHOWN = (
     ("replans", "replans", "{}"),
     ("refusals", "refusals", "{}"),
     ("max_penetration_m", "deepest penetration", "{:.4f} m"),
+    ("ejections", "objects ejected", "{}"),
+    ("tunnellings", "objects tunnelled", "{}"),
     ("wall_s", "wall time", "{:.1f} s"),
 )
 
