@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planning_cases import random_problem
 
 from planner.bound_checker import proven_bound
 from planner.certificate import Certificate, Proof
@@ -15,26 +16,10 @@ from planner.checker import check
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
-from planner.problem import RoutingProblem, Shipment
 from planner.solver import SOLVERS, SolveLimit, solver
 
 seeds = st.integers(0, 2**32 - 1)
 SEARCH = ExactSolver(table_bytes=0)
-
-
-def random_problem(seed, shipments, onboard=0, bins=4, capacity=2):
-    """Location 0 is the start, then the bins, then the objects."""
-    rng = np.random.default_rng(seed)
-    points = rng.uniform(0, 10, (1 + bins + shipments, 2))
-    d = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
-    deliveries = rng.integers(1, bins + 1, shipments)
-    return RoutingProblem(
-        d,
-        0,
-        tuple(Shipment(1 + bins + k, int(deliveries[k])) for k in range(shipments)),
-        tuple(int(j) for j in rng.integers(1, bins + 1, onboard)),
-        capacity,
-    )
 
 
 def claiming(plan, **changes):

@@ -6,30 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planning_cases import random_problem
 
 from planner.errors import ProblemError
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 from planner.plan import Status, Visit, VisitKind
-from planner.problem import RoutingProblem, Shipment
 from planner.regret import after, regrets
 from planner.replanner import Replanner
 from planner.route import TaskState
 from planner.solver import solver
-
-
-def random_problem(seed, shipments, onboard):
-    rng = np.random.default_rng(seed)
-    points = rng.uniform(0, 10, (4 + shipments, 2))
-    d = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
-    deliveries = rng.integers(1, 4, shipments)
-    return RoutingProblem(
-        d,
-        0,
-        tuple(Shipment(4 + k, int(deliveries[k])) for k in range(shipments)),
-        tuple(int(j) for j in rng.integers(1, 4, onboard)),
-        2,
-    )
 
 
 def best_by_first_stop(problem):

@@ -3,8 +3,8 @@
 import json
 import threading
 
-import numpy as np
 import pytest
+from planning_cases import Task, two_rooms
 
 from experiments import records
 from experiments.cli import main
@@ -14,70 +14,20 @@ from planner.checker import check
 from planner.errors import ProblemError, UnreachableError
 from planner.exact.solver import ExactSolver
 from planner.exact.warm import Warm
-from planner.geodesics import Geodesics
 from planner.greedy_solver import nearest_first
 from planner.live import TIE, LiveReplanner
-from planner.navmesh import NavMesh
 from planner.plan import Plan, Status, VisitKind
 from planner.replanner import Replanner, left_of
 from planner.route import TaskState
 from planner.solver import SolveLimit, solver
 from planner.tour import pick, place, tour_length
 
-WALL = [
-    np.array([(3.9, 0), (4.1, 0), (4.1, 4), (3.9, 4)]),
-    np.array([(3.9, 5), (4.1, 5), (4.1, 8), (3.9, 8)]),
-]
-BINS = [(1.0, 7.0), (7.0, 7.0), (7.0, 1.0)]
 SEARCH = ExactSolver(table_bytes=0, passes=((2, 3_000), (6, 30_000)))
 
 
 @pytest.fixture(scope="module")
 def geodesics():
-    return Geodesics(NavMesh.build(WALL, (0, 0, 8, 8)))
-
-
-class Task:
-    """A task that is carried out visit by visit, with things going wrong."""
-
-    def __init__(self, geodesics, count, seed):
-        self.rng = np.random.default_rng(seed)
-        self.mesh = geodesics.navmesh
-        self.loose = {f"object_{k:02}": self.anywhere() for k in range(count)}
-        self.deliveries = {name: BINS[k % 3] for k, name in enumerate(self.loose)}
-        self.carried = []
-        self.position = self.anywhere()
-
-    def anywhere(self):
-        return tuple(map(float, self.mesh.sample(self.rng)))
-
-    @property
-    def state(self):
-        return TaskState(self.position, dict(self.loose), tuple(self.carried), self.deliveries)
-
-    def do(self, kind, name):
-        if kind is VisitKind.PICK:
-            self.position = self.loose.pop(name)
-            self.carried.append(name)
-        else:
-            self.position = self.deliveries[name]
-            self.carried.remove(name)
-
-    def misfortune(self):
-        """Something that was not planned; the person stands where it happened."""
-        kind = self.rng.integers(5)
-        if kind == 0 and self.carried:  # dropped
-            self.loose[self.carried.pop()] = self.anywhere()
-        elif kind == 1 and self.loose:  # kicked
-            self.loose[sorted(self.loose)[0]] = self.anywhere()
-        elif kind == 2:  # something new
-            name = f"new_{len(self.deliveries)}"
-            self.loose[name], self.deliveries[name] = self.anywhere(), BINS[0]
-        elif kind == 3 and len(self.loose) > 1:  # somebody else took it
-            del self.loose[sorted(self.loose)[-1]]
-        elif len(self.carried) < 2 and self.loose:  # another object than suggested
-            self.do(VisitKind.PICK, sorted(self.loose)[int(self.rng.integers(len(self.loose)))])
-        self.position = self.anywhere()
+    return two_rooms()
 
 
 class Script:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planning_cases import random_problem
 
 from planner.checker import check
 from planner.plan import Status, VisitKind
@@ -13,21 +14,6 @@ from planner.problem import RoutingProblem, Shipment
 from planner.solver import SolveLimit, solver
 
 seeds = st.integers(0, 2**32 - 1)
-
-
-def random_problem(seed, shipments, onboard=0, capacity=2, bins=3):
-    """Points in the plane; location 0 is the start, then the bins, then the objects."""
-    rng = np.random.default_rng(seed)
-    points = rng.uniform(0, 10, (1 + bins + shipments, 2))
-    d = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
-    deliveries = rng.integers(1, bins + 1, shipments)
-    return RoutingProblem(
-        d,
-        0,
-        tuple(Shipment(1 + bins + k, int(deliveries[k])) for k in range(shipments)),
-        tuple(int(j) for j in rng.integers(1, bins + 1, onboard)),
-        capacity,
-    )
 
 
 def shortest_by_permutations(problem):

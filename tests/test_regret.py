@@ -1,20 +1,19 @@
 """Regrets from one table or one pass against a plain recursion and against solving the rest after each visit."""
 
 import dataclasses
-import functools
 import threading
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planning_cases import optimum, random_problem
 
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 from planner.plan import VisitKind
-from planner.problem import RoutingProblem, Shipment
 from planner.regret import after, one_by_one, regrets
 from planner.replanner import Replanner
 from planner.route import TaskState
@@ -23,44 +22,6 @@ from planner.tour import possible_next
 
 seeds = st.integers(0, 2**32 - 1)
 TABLE, PASS = ExactSolver(), ExactSolver(table_bytes=0)
-
-
-def random_problem(seed, shipments, onboard=0, bins=4, capacity=2, coincide=False):
-    """Location 0 is the start, then the bins, then the objects; coinciding ones lie on a coarse grid."""
-    rng = np.random.default_rng(seed)
-    points = rng.uniform(0, 10, (1 + bins + shipments, 2))
-    if coincide:
-        points = np.round(points / 5) * 5
-    d = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
-    deliveries = rng.integers(1, bins + 1, shipments)
-    return RoutingProblem(
-        d,
-        0,
-        tuple(Shipment(1 + bins + k, int(deliveries[k])) for k in range(shipments)),
-        tuple(int(j) for j in rng.integers(1, bins + 1, onboard)),
-        capacity,
-    )
-
-
-def optimum(problem):
-    """Least length by recursion on the problem itself: every possible visit, one after another."""
-
-    @functools.cache
-    def go(here, loose, carried):
-        ways = [
-            problem.distances[here, j] + go(j, loose, carried[:k] + carried[k + 1 :])
-            for k, j in enumerate(carried)
-        ]
-        if len(carried) < problem.capacity:
-            for k in loose:
-                s = problem.shipments[k]
-                ways.append(
-                    problem.distances[here, s.pickup]
-                    + go(s.pickup, loose - {k}, tuple(sorted((*carried, s.delivery))))
-                )
-        return min(ways, default=0.0)
-
-    return go(problem.start, frozenset(range(len(problem.shipments))), tuple(sorted(problem.onboard)))
 
 
 def expected(problem):

@@ -5,56 +5,27 @@ import math
 
 import numpy as np
 import pytest
+from planning_cases import BINS, Task, two_rooms
 
 from planner.errors import PlannerError, ProblemError, UnreachableError
-from planner.geodesics import Geodesics, path_length
-from planner.navmesh import NavMesh
+from planner.geodesics import path_length
 from planner.plan import VisitKind
 from planner.replanner import Replanner
 from planner.route import TaskState
 from planner.solver import SolveLimit, solver
 
-WALL = [
-    np.array([(3.9, 0), (4.1, 0), (4.1, 4), (3.9, 4)]),
-    np.array([(3.9, 5), (4.1, 5), (4.1, 8), (3.9, 8)]),
-]
-BINS = [(1.0, 7.0), (7.0, 7.0)]
-
 
 @pytest.fixture(scope="module")
 def geodesics():
-    return Geodesics(NavMesh.build(WALL, (0, 0, 8, 8)))
+    return two_rooms()
 
 
 def replanner(geodesics, **options):
     return Replanner(geodesics, solver("ortools"), limit=SolveLimit(work=30), **options)
 
 
-class Task:
-    """A task that is carried out visit by visit."""
-
-    def __init__(self, count, seed=0):
-        rng = np.random.default_rng(seed)
-        self.loose = {f"object_{k:02}": tuple(map(float, rng.uniform(0.5, 3.5, 2))) for k in range(count)}
-        self.deliveries = {name: BINS[k % 2] for k, name in enumerate(self.loose)}
-        self.carried = []
-        self.position = (0.5, 0.5)
-
-    @property
-    def state(self):
-        return TaskState(self.position, dict(self.loose), tuple(self.carried), self.deliveries)
-
-    def do(self, kind, name):
-        if kind is VisitKind.PICK:
-            self.position = self.loose.pop(name)
-            self.carried.append(name)
-        else:
-            self.position = self.deliveries[name]
-            self.carried.remove(name)
-
-
 def test_a_followed_plan_is_walked_to_its_end_without_replanning(geodesics):
-    task, guide = Task(5), replanner(geodesics)
+    task, guide = Task(geodesics, 5), replanner(geodesics)
     route = guide.update(task.state)
     planned, walked = route, 0.0
     for expected in planned.visits:
@@ -72,7 +43,7 @@ def test_a_followed_plan_is_walked_to_its_end_without_replanning(geodesics):
 
 
 def test_two_visits_between_updates_are_still_the_plan(geodesics):
-    task, guide = Task(4), replanner(geodesics)
+    task, guide = Task(geodesics, 4), replanner(geodesics)
     planned = guide.update(task.state).visits
     for visit in planned[:2]:
         task.do(visit.kind, visit.object)
@@ -81,7 +52,7 @@ def test_two_visits_between_updates_are_still_the_plan(geodesics):
 
 
 def test_a_deviation_is_replanned_and_counted(geodesics):
-    task, guide = Task(5), replanner(geodesics)
+    task, guide = Task(geodesics, 5), replanner(geodesics)
     route = guide.update(task.state)
     other = next(name for name in task.loose if name != route.next.object)
     assert not route.follows(VisitKind.PICK, other)
@@ -97,7 +68,7 @@ def test_a_deviation_is_replanned_and_counted(geodesics):
 
 
 def test_a_dropped_object_is_replanned(geodesics):
-    task, guide = Task(3), replanner(geodesics)
+    task, guide = Task(geodesics, 3), replanner(geodesics)
     route = guide.update(task.state)
     task.do(route.next.kind, route.next.object)
     guide.update(task.state)
@@ -109,7 +80,7 @@ def test_a_dropped_object_is_replanned(geodesics):
 
 
 def test_a_nudge_moves_the_stop_and_a_long_push_replans(geodesics):
-    task, guide = Task(3), replanner(geodesics)
+    task, guide = Task(geodesics, 3), replanner(geodesics)
     order = [(v.kind, v.object) for v in guide.update(task.state).visits]
     name = next(iter(task.loose))
     x, y = task.loose[name]
@@ -125,7 +96,7 @@ def test_a_nudge_moves_the_stop_and_a_long_push_replans(geodesics):
 
 
 def test_the_cost_is_the_length_of_the_geodesics_between_the_stops(geodesics):
-    task, guide = Task(4), replanner(geodesics)
+    task, guide = Task(geodesics, 4), replanner(geodesics)
     guide.update(task.state)
     # A state seen before, objects moved and back: reused distances must be those of the right places.
     moved = dict(list(task.state.loose.items())[::-1])

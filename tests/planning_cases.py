@@ -1,0 +1,103 @@
+"""Small planning problems, tasks and plain recursions that several tests of the planner share."""
+
+import functools
+
+import numpy as np
+
+from planner.geodesics import Geodesics
+from planner.navmesh import NavMesh
+from planner.plan import VisitKind
+from planner.problem import RoutingProblem, Shipment
+from planner.route import TaskState
+
+WALL = [
+    np.array([(3.9, 0), (4.1, 0), (4.1, 4), (3.9, 4)]),
+    np.array([(3.9, 5), (4.1, 5), (4.1, 8), (3.9, 8)]),
+]
+BINS = [(1.0, 7.0), (7.0, 7.0), (7.0, 1.0)]
+
+
+def random_problem(seed, shipments, onboard=0, capacity=2, bins=4, coincide=False):
+    """Points in the plane, or of a coarse grid: location 0 is the start, then the bins, then the objects."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(0, 10, (1 + bins + shipments, 2))
+    if coincide:
+        points = np.round(points / 5) * 5
+    d = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+    deliveries = rng.integers(1, bins + 1, shipments)
+    return RoutingProblem(
+        d,
+        0,
+        tuple(Shipment(1 + bins + k, int(deliveries[k])) for k in range(shipments)),
+        tuple(int(j) for j in rng.integers(1, bins + 1, onboard)),
+        capacity,
+    )
+
+
+def optimum(problem):
+    """Least length by recursion on the problem itself: every possible visit, one after another."""
+
+    @functools.cache
+    def go(here, loose, carried):
+        ways = [
+            problem.distances[here, j] + go(j, loose, carried[:k] + carried[k + 1 :])
+            for k, j in enumerate(carried)
+        ]
+        if len(carried) < problem.capacity:
+            for k in loose:
+                s = problem.shipments[k]
+                ways.append(
+                    problem.distances[here, s.pickup]
+                    + go(s.pickup, loose - {k}, tuple(sorted((*carried, s.delivery))))
+                )
+        return min(ways, default=0.0)
+
+    return go(problem.start, frozenset(range(len(problem.shipments))), tuple(sorted(problem.onboard)))
+
+
+def two_rooms():
+    """Geodesics of two rooms of 4 m x 8 m, a door between them."""
+    return Geodesics(NavMesh.build(WALL, (0, 0, 8, 8)))
+
+
+class Task:
+    """A task that is carried out visit by visit, in `two_rooms`."""
+
+    def __init__(self, geodesics, count, seed=0):
+        self.rng = np.random.default_rng(seed)
+        self.mesh = geodesics.navmesh
+        self.loose = {f"object_{k:02}": self.anywhere() for k in range(count)}
+        self.deliveries = {name: BINS[k % 3] for k, name in enumerate(self.loose)}
+        self.carried = []
+        self.position = self.anywhere()
+
+    def anywhere(self):
+        return tuple(map(float, self.mesh.sample(self.rng)))
+
+    @property
+    def state(self):
+        return TaskState(self.position, dict(self.loose), tuple(self.carried), self.deliveries)
+
+    def do(self, kind, name):
+        if kind is VisitKind.PICK:
+            self.position = self.loose.pop(name)
+            self.carried.append(name)
+        else:
+            self.position = self.deliveries[name]
+            self.carried.remove(name)
+
+    def misfortune(self):
+        """Something that was not planned; the person stands where it happened."""
+        kind = self.rng.integers(5)
+        if kind == 0 and self.carried:  # dropped
+            self.loose[self.carried.pop()] = self.anywhere()
+        elif kind == 1 and self.loose:  # kicked
+            self.loose[sorted(self.loose)[0]] = self.anywhere()
+        elif kind == 2:  # something new
+            name = f"new_{len(self.deliveries)}"
+            self.loose[name], self.deliveries[name] = self.anywhere(), BINS[0]
+        elif kind == 3 and len(self.loose) > 1:  # somebody else took it
+            del self.loose[sorted(self.loose)[-1]]
+        elif len(self.carried) < 2 and self.loose:  # another object than suggested
+            self.do(VisitKind.PICK, sorted(self.loose)[int(self.rng.integers(len(self.loose)))])
+        self.position = self.anywhere()
