@@ -69,6 +69,7 @@ def regrets(
     seed: int = 0,
     limit: SolveLimit | None = None,
     radius: float = RADIUS,
+    plan: Plan | None = None,
 ) -> tuple[Regret, ...]:
     """What each possible next visit costs, the best visit first.
 
@@ -84,13 +85,14 @@ def regrets(
         seed: Handed to the solver.
         limit: Handed to the solver, for each problem that it solves.
         radius: Regrets up to here are wanted exactly, m.
+        plan: A plan of this problem, if there is one: if it is proven it need not be found again.
 
     Raises:
         ProblemError: The radius is negative.
     """
     if not radius >= 0:
         raise ProblemError(f"the radius of regrets must be at least 0 m, got {radius}")
-    found = _exactly(problem, solver, seed, limit, radius) if isinstance(solver, ExactSolver) else None
+    found = _exactly(problem, solver, seed, limit, radius, plan) if isinstance(solver, ExactSolver) else None
     return found if found is not None else one_by_one(problem, solver, seed=seed, limit=limit)
 
 
@@ -110,7 +112,12 @@ def one_by_one(
 
 
 def _exactly(
-    problem: RoutingProblem, solver: ExactSolver, seed: int, limit: SolveLimit | None, radius: float
+    problem: RoutingProblem,
+    solver: ExactSolver,
+    seed: int,
+    limit: SolveLimit | None,
+    radius: float,
+    plan: Plan | None,
 ) -> tuple[Regret, ...] | None:
     metric = integer_metric(problem.distances)
     if not solver.applies(problem, metric):
@@ -118,8 +125,9 @@ def _exactly(
     instance = make_instance(problem, metric)
     if solver.table_fits(instance):
         costs = costs_by_table(instance)
-        return _ranked(problem, costs, max(costs.values(), default=0), costs)
-    plan = solver.solve(problem, seed=seed, limit=limit)
+        return ranked(problem, costs, max(costs.values(), default=0), costs)
+    if plan is None or plan.status is not Status.OPTIMAL:
+        plan = solver.solve(problem, seed=seed, limit=limit)
     if plan.status is not Status.OPTIMAL:
         return None
     return _around(problem, instance, metric, plan, radius, limit)
@@ -145,7 +153,7 @@ def _around(
         longest = best + math.floor(radius / UNIT)
         costs = costs_by_pass(bound, longest, MOST_STATES, deadline)
         if costs is not None:
-            return _ranked(problem, costs, longest, least)
+            return ranked(problem, costs, longest, least)
         radius /= 2
         if radius < SMALLEST_RADIUS or deadline.over():
             return None
@@ -161,8 +169,8 @@ def _bound(instance: Instance, plan: Plan, best: int, deadline: Deadline) -> Bou
     return grown(bound, best, MOST_EXACT, deadline)
 
 
-def _ranked(problem: RoutingProblem, costs: Costs, longest: int, least: Costs) -> tuple[Regret, ...]:
-    """Regrets from integer costs; those above `longest` are unknown but for that and their least cost."""
+def ranked(problem: RoutingProblem, costs: Costs, longest: int, least: Costs) -> tuple[Regret, ...]:
+    """Regrets from integer costs, the best visit first; those above `longest` are unknown but for that and `least`."""
     found = []
     for visit in possible_next(problem, ()):
         action = visit.shipment if visit.shipment is not None else -1 - (visit.onboard or 0)

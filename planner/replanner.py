@@ -105,8 +105,7 @@ class Replanner:
             UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
             ProblemError: More is carried than the capacity allows.
         """
-        spots = self._spots(state)
-        problem, names = self._problem(state, spots)
+        problem, names, spots = self.task(state)
         plan = self._first_plan(problem, names, state, limit or self.limit)
         visits = tuple(RouteVisit(kind, name, spots[kind, name]) for kind, name in named(plan, names, state))
         self._route = Route(visits, plan.cost, plan)
@@ -180,7 +179,12 @@ class Replanner:
             UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
             ProblemError: More is carried than the capacity allows.
         """
-        return self._problem(state, self._spots(state))[0]
+        return self.task(state)[0]
+
+    def task(self, state: TaskState) -> tuple[RoutingProblem, list[str], dict[tuple[VisitKind, str], XY]]:
+        """As `problem`, with the names of the shipments and where each visit takes place."""
+        spots = self._spots(state)
+        return *self._problem(state, spots), spots
 
     def regrets(self, state: TaskState, *, radius: float = RADIUS) -> dict[Stop, Regret]:
         """What each possible next visit costs compared with the best one, the best first.
