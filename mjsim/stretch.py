@@ -1,5 +1,6 @@
 """Many control steps as one value."""
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,8 @@ from numpy.typing import NDArray
 
 from mjsim.actions import WorldEvent
 from mjsim.observation import Observation
+
+_LAST = ("observation", "events")  # of a stretch's last step alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,12 @@ class Stretch:
 
     def __len__(self) -> int:
         return len(self.headings)
+
+    def then(self, later: "Stretch") -> "Stretch":
+        """This stretch and the one that follows it, as one."""
+        arrays = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name not in _LAST}
+        joined = {name: np.concatenate((rows, getattr(later, name))) for name, rows in arrays.items()}
+        return Stretch(**joined, observation=later.observation, events=later.events)
 
     @classmethod
     def of(

@@ -1,13 +1,16 @@
 """How much of a world is physics: tiers that share one interface (docs/fidelity.md)."""
 
+from collections.abc import Callable
+
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.tier import Tier
+from mjsim.fidelity.windows import Windows
 from mjsim.options import WorldOptions
 from mjsim.scene import Scene
 
 __all__ = ["Tier", "make_tier"]
 
-_TIERS: dict[str, type[Full]] = {"full": Full}
+_TIERS: dict[str, Callable[[Scene, WorldOptions], Tier]] = {"full": Full, "windows": Windows}
 
 
 def make_tier(scene: Scene, options: WorldOptions) -> Tier:
