@@ -3,10 +3,11 @@
 import math
 
 from hud import theme
-from hud.canvas import Patch, Rect
+from hud.canvas import Canvas, Patch, Rect
 from hud.pen import Pen
-from hud.rows import EMPTY_WIDTH, GAP, HEADER, LINE, PADDING, SLOT_WIDTH, TILE, BinRow
+from hud.rows import EMPTY_WIDTH, GAP, HEADER, LINE, PADDING, SLOT_WIDTH, SLOT_WIDTH_LONG, TILE, BinRow
 from hud.state import BinEntry, InventorySlot, Message, MessageKind
+from hud.text import ELLIPSIS
 
 
 def draw_bins(
@@ -36,30 +37,35 @@ def draw_bins(
 def draw_inventory(pen: Pen, rect: Rect, slots: tuple[InventorySlot, InventorySlot]) -> Patch:
     """Two hands, at the left and the right end: a picture and a name each, or a word that it is empty."""
     canvas = pen.canvas(rect.width, rect.height)
-    px = canvas.px
-    for i, (slot, hand) in enumerate(zip(slots, ("Left hand", "Right hand"), strict=True)):
-        held = slot.label is not None
-        width = min(px(SLOT_WIDTH if held else EMPTY_WIDTH), (rect.width - px(GAP)) // 2)
-        left = 0 if i == 0 else rect.width - width
-        area = Rect(left, 0, width, rect.height)
-        canvas.rounded(area, 8.0 * pen.unit, theme.PANEL, theme.PANEL_OPACITY)
-        edge, opacity = (theme.ACCENT, 0.9) if held else (theme.EDGE, theme.EDGE_OPACITY)
-        canvas.rounded(area, 8.0 * pen.unit, edge, opacity, line=max(1.0, pen.unit * (1.5 if held else 1.0)))
-        x = left + px(PADDING + 1)
-        if slot.label is not None:
-            side = rect.height - 2 * px(5)
-            pen.tile(canvas, slot.picture, left + px(5), px(5), side)
-            x = left + px(5) + side + px(GAP)
-        room = left + width - px(PADDING) - x
-        if slot.label is not None:
-            lines, face, colour = canvas.wrap(slot.label, theme.LABEL, room, 2), theme.LABEL, theme.TEXT
-        else:
-            lines, face, colour = (hand, "empty"), theme.DETAIL, theme.QUIET
-        first = rect.height // 2 + px(4.5) - px(LINE) * (len(lines) - 1) // 2
-        for line_number, line in enumerate(lines):
-            line_top = first + line_number * px(LINE)
-            canvas.text(x, line_top, canvas.fit(line, face, room), face, colour)
+    for slot, hand, at_the_left in zip(slots, ("Left hand", "Right hand"), (True, False), strict=True):
+        _hand(pen, canvas, slot, hand, at_the_left)
     return canvas.patch()
+
+
+def _hand(pen: Pen, canvas: Canvas, slot: InventorySlot, hand: str, at_the_left: bool) -> None:
+    px = canvas.px
+    held = slot.label is not None
+    side = canvas.height - 2 * px(5)
+    inset = px(5) + side + px(GAP) if held else px(PADDING + 1)
+    face, colour = (theme.LABEL, theme.TEXT) if held else (theme.DETAIL, theme.QUIET)
+    lines: tuple[str, ...] = ()
+    # A long name gets a wider slot at the cost of the view between the hands.
+    for size in (SLOT_WIDTH, SLOT_WIDTH_LONG) if held else (EMPTY_WIDTH,):
+        width = min(px(size), (canvas.width - px(GAP)) // 2)
+        room = width - px(PADDING) - inset
+        lines = (hand, "empty") if slot.label is None else canvas.wrap(slot.label, face, room, 2)
+        if not any(line.endswith(ELLIPSIS) for line in lines):
+            break
+    left = 0 if at_the_left else canvas.width - width
+    area = Rect(left, 0, width, canvas.height)
+    canvas.rounded(area, 8.0 * pen.unit, theme.PANEL, theme.PANEL_OPACITY)
+    edge, opacity = (theme.ACCENT, 0.9) if held else (theme.EDGE, theme.EDGE_OPACITY)
+    canvas.rounded(area, 8.0 * pen.unit, edge, opacity, line=max(1.0, pen.unit * (1.5 if held else 1.0)))
+    if held:
+        pen.tile(canvas, slot.picture, left + px(5), px(5), side)
+    first = canvas.height // 2 + px(4.5) - px(LINE) * (len(lines) - 1) // 2
+    for number, line in enumerate(lines):
+        canvas.text(left + inset, first + number * px(LINE), canvas.fit(line, face, room), face, colour)
 
 
 def draw_message(pen: Pen, rect: Rect, message: Message, lines: tuple[str, ...]) -> Patch:

@@ -24,6 +24,7 @@ CONTEXT = 2  # rows above the current one that stay in sight
 NUMBER = 19
 LINE = 14
 SLOT_WIDTH = 118
+SLOT_WIDTH_LONG = 133  # for names that would be cut
 EMPTY_WIDTH = 86  # an empty hand takes less, so that what lies at the feet is seen between the hands
 BETWEEN_HANDS = 64
 SLOT_HEIGHT = 40

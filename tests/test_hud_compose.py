@@ -1,6 +1,7 @@
 """The composed frame: pure, deterministic, legible at every supported size, safe for colour vision."""
 
 import dataclasses
+from typing import Any
 
 import cv2
 import numpy as np
@@ -8,13 +9,14 @@ import pytest
 from numpy.typing import NDArray
 
 from hud import checklist, sample, theme
-from hud.canvas import Rect
+from hud.canvas import Canvas, Rect
 from hud.compose import Compositor, compose
 from hud.conditions import condition
 from hud.errors import FrameError
 from hud.messages import message
 from hud.panels import clock_text
 from hud.state import ChecklistItem, HudState, InventorySlot, Marker, Message, MessageKind, Pointer
+from mjsim.catalogue import Catalogue
 
 SIZES = ((640, 480), (1280, 720), (1920, 1080))
 
@@ -248,6 +250,26 @@ def test_pictures_appear_where_the_row_is() -> None:
     ys, xs = np.nonzero((drawn == (255, 0, 255)).all(axis=2))
     assert len(ys) > 300
     assert rect.x <= xs.min() and xs.max() < rect.right and rect.y <= ys.min() and ys.max() < rect.bottom
+
+
+@pytest.mark.parametrize("size", [*SIZES, (1024, 768), (1366, 768)])
+def test_names_of_what_the_hands_hold_are_never_cut(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[str] = []
+    text = Canvas.text
+
+    def spy(canvas: Canvas, x: int, baseline: int, line: str, *rest: Any) -> int:
+        written.append(line)
+        return text(canvas, x, baseline, line, *rest)
+
+    monkeypatch.setattr(Canvas, "text", spy)
+    compositor = Compositor({})
+    for label in sorted({model.label for model in Catalogue.load().objects.values()}):
+        state = HudState("", (), (), (InventorySlot(label), InventorySlot(label)))
+        written.clear()
+        compositor.compose(plain(size, 0), state)
+        assert " ".join(written) == f"{label} {label}"
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.5707963, 3.1415926, -1.5707963])
