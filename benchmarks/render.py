@@ -18,7 +18,9 @@ import numpy as np
 
 from experiments.conditions import TaskBoard
 from experiments.examples.environment_speed import SETTINGS, steps_per_second
+from experiments.examples.hud_speed import hud_milliseconds, session_states, summary
 from experiments.house import House
+from experiments.trial import TrialConfig
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.state import HudState
@@ -33,10 +35,14 @@ SIZES = ((320, 240), (640, 480), (1280, 720))
 REPEATS = {"draft": 5, "fast": 7, "quality": 1}
 SLOW_VIEWS = 2  # views that slow settings are measured on
 FOVY = 1.2
+SESSION = TrialConfig(objects=6, assistance="optimal", seed=0)
+# The comparison with MuJoCo's defaults is the one in which every light casts shadows, as a light in MJCF does unless
+# it is told not to. The house tells all but one not to, which is an optimization of its author's, not a default.
 TARGETS = (
     ("fast 640x480 with HUD over raw mjr_render", "with_hud_ratio", "<=", 1.15),
     ("MuJoCo's default quality over fast 640x480", "default_over_fast", ">=", 20.0),
-    ("HUD drawing, ms per frame", "hud_steady_ms", "<=", 1.0),
+    ("HUD drawing over a session, mean ms per frame", "hud_mean_ms", "<=", 1.0),
+    ("HUD drawing over a session, 99th percentile, ms", "hud_p99_ms", "<=", 3.0),
 )
 
 
@@ -48,7 +54,7 @@ class Subject:
     data: Any
     poses: tuple[CameraPose, ...]
     state: HudState
-    compositor: Compositor
+    house: House
     clock: Callable[[], float]
 
 
@@ -67,10 +73,11 @@ def measure() -> dict[str, Any]:
     authored = measure_default(subject, shadows_of_all_lights=False)
     fast = next(r for r in rows if (r["profile"], r["width"]) == ("fast", 640))
     headline = {
-        "with_hud_ratio": (fast["ms"] + hud["steady_ms"]) / fast["raw_ms"],
+        "with_hud_ratio": (fast["ms"] + hud["mean_ms"]) / fast["raw_ms"],
         "default_over_fast": default["ms"] / default["fast_ms"],
         "authored_over_fast": authored["ms"] / authored["fast_ms"],
-        "hud_steady_ms": hud["steady_ms"],
+        "hud_mean_ms": hud["mean_ms"],
+        "hud_p99_ms": hud["p99_ms"],
     }
     return {
         "benchmark": "render",
@@ -105,7 +112,11 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     yield f"  every light casts shadows, MuJoCo's default: {default['ms']:.0f} ms, {ratio:.1f} x fast"
     yield f"  only those of the house that do: {authored['ms']:.0f} ms, {result['authored_over_fast']:.1f} x fast"
     hud = result["hud"]
-    yield f"HUD: {hud['steady_ms']:.2f} ms per frame, {hud['first_ms']:.1f} ms the first time"
+    yield (
+        f"HUD over the {hud['frames']} frames of a trial (optimal, six objects), ms: mean {hud['mean_ms']:.2f}, "
+        f"median {hud['median_ms']:.2f}, 99th percentile {hud['p99_ms']:.2f}, most {hud['max_ms']:.1f}, "
+        f"first {hud['first_ms']:.1f}"
+    )
     yield "Gymnasium environment, random actions, steps per core-second:"
     for name, rate in result["environment"].items():
         yield f"  {name}: {rate:.0f}"
@@ -131,8 +142,7 @@ def make_subject(clock: Callable[[], float]) -> Subject:
         eye = np.array([place[0], place[1], 1.6])
         gaze = np.array([math.cos(turn), math.sin(turn), -0.3])
         poses.append(CameraPose.looking_at(eye, eye + gaze, FOVY))
-    compositor = Compositor(render_pictures(house.catalogue))
-    return Subject(scene, world.data, tuple(poses), condition("optimal")(view), compositor, clock)
+    return Subject(scene, world.data, tuple(poses), condition("optimal")(view), house, clock)
 
 
 def measure_profile(subject: Subject, profile: RenderProfile, size: tuple[int, int]) -> dict[str, Any]:
@@ -230,18 +240,13 @@ def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[st
     return {"ms": 1e3 * float(np.mean(theirs)), "fast_ms": 1e3 * float(np.mean(ours))}
 
 
-def measure_hud(subject: Subject, frames: int = 200) -> dict[str, Any]:
-    """Milliseconds of laying the HUD over a frame of 640 x 480, while its clock runs at 25 frames per second."""
-    frame = np.zeros((480, 640, 3), np.uint8)
-    state = subject.state
-
-    def draw(number: int) -> float:
-        shown = dataclasses.replace(state, clock=number / 25.0)
-        return timed(subject.clock, lambda: subject.compositor.compose(frame, shown))
-
-    first = draw(0)
-    steady = [draw(number) for number in range(1, frames)]
-    return {"first_ms": 1e3 * first, "steady_ms": 1e3 * float(np.mean(steady))}
+def measure_hud(subject: Subject, trial: TrialConfig = SESSION) -> dict[str, Any]:
+    """Milliseconds of laying the HUD over a frame of 640 x 480, for every frame of a whole trial."""
+    states = session_states(subject.house, trial)
+    times = hud_milliseconds(
+        Compositor(render_pictures(subject.house.catalogue)), states, clock=subject.clock
+    )
+    return summary(times)
 
 
 def measure_environment(seconds: float = 2.0) -> dict[str, float]:

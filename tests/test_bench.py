@@ -8,6 +8,7 @@ import pytest
 from experiments.cli import main
 from experiments.commands.bench import benchmark, benchmark_names
 from experiments.errors import ConfigError
+from experiments.trial import TrialConfig
 
 
 def test_the_benchmarks_of_the_checkout_are_found() -> None:
@@ -42,13 +43,16 @@ def test_the_render_benchmark_measures_positive_times_and_judges_them() -> None:
     subject = module.make_subject(time.process_time)
     row = module.measure_profile(subject, module.PROFILES["draft"], (160, 120))
     assert row["ms"] > 0 and row["ratio"] == pytest.approx(row["ms"] / row["raw_ms"])
-    hud = module.measure_hud(subject, frames=5)
-    assert hud["steady_ms"] > 0 and hud["first_ms"] > 0
+    brief = TrialConfig(objects=2, assistance="none", seed=0, time_limit=1.0)
+    hud = module.measure_hud(subject, brief)
+    assert hud["frames"] == 25
+    assert 0 < hud["median_ms"] <= hud["p99_ms"] <= hud["max_ms"] and hud["first_ms"] > 0
     quality = {"ms": 400.0, "fast_ms": 20.0}
     result = {
         "renderer": "r", "gl": "v", "clock": "CPU time", "views": 9, "geoms": 3, "frames": [row], "hud": hud,
         "default_quality": quality, "default_quality_authored_lights": quality, "authored_over_fast": 20.0,
-        "environment": {"state": 1600.0}, "with_hud_ratio": 1.2, "default_over_fast": 20.0, "hud_steady_ms": 0.5,
+        "environment": {"state": 1600.0}, "with_hud_ratio": 1.2, "default_over_fast": 20.0, "hud_mean_ms": 0.5,
+        "hud_p99_ms": 3.1,
     }  # fmt: skip
-    verdicts = [line.rpartition(": ")[2].rstrip(")") for line in module.lines(result)][-3:]
-    assert verdicts == ["MISSED", "holds", "holds"]
+    verdicts = [line.rpartition(": ")[2].rstrip(")") for line in module.lines(result)][-4:]
+    assert verdicts == ["MISSED", "holds", "holds", "MISSED"]

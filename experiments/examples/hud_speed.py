@@ -1,0 +1,115 @@
+"""What drawing the HUD costs in a real session: every state that the glasses go through in one trial is drawn in turn.
+
+python -m experiments.examples.hud_speed --assistance optimal --objects 6
+"""
+
+import argparse
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from experiments.assistant import Assistant
+from experiments.house import House
+from experiments.records import EventLog
+from experiments.trial import TrialConfig, prepare_session
+from hud.compose import Compositor
+from hud.options.minimap import FLOORPLAN
+from hud.projection import CameraView
+from hud.state import HudState
+from mjsim.observation import Observation
+from mjsim.render import render_house_map, render_pictures
+from mjsim.render.cameras import camera_pose
+from mjsim.scene import compose
+from mjsim.world import World
+
+SIZE = (640, 480)
+COLD = (
+    16 << 20
+)  # bytes written between two frames, as rendering does, so that no cache still holds the panels
+
+
+class _Recorder:
+    """A viewer that keeps what the glasses are to show, and draws nothing."""
+
+    def __init__(self) -> None:
+        self.states: list[HudState] = []
+
+    def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
+        """Keep the state of this control step."""
+        pose = camera_pose(world.model, world.data, "avatar/eye")
+        camera = CameraView(pose.position, pose.rotation, pose.fovy, *SIZE)
+        self.states.append(assistant.hud_state(observation, camera))
+
+
+def session_states(house: House, trial: TrialConfig) -> tuple[HudState, ...]:
+    """The states of a trial, one per control step."""
+    scene = compose(house.sample_episode(objects=trial.objects, seed=trial.seed), house.catalogue)
+    recorder = _Recorder()
+    session, _ = prepare_session(trial, house, scene, EventLog(), recorder)
+    session.run()
+    return tuple(recorder.states)
+
+
+def hud_milliseconds(
+    compositor: Compositor,
+    states: Sequence[HudState],
+    size: tuple[int, int] = SIZE,
+    clock: Callable[[], float] = time.process_time,
+) -> NDArray[np.float64]:
+    """What it takes to lay each of `states` over a frame, in order, ms, shape (states,).
+
+    Args:
+        compositor: Draws them; what it keeps from frame to frame is part of what is measured.
+        states: Of a session.
+        size: Width and height of the frame, px.
+        clock: Counts seconds.
+    """
+    frame = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
+    elsewhere = np.zeros(COLD, np.uint8)
+    times = np.empty(len(states))
+    for i, state in enumerate(states):
+        elsewhere += 1
+        start = clock()
+        compositor.compose(frame, state)
+        times[i] = clock() - start
+    return 1e3 * times
+
+
+def summary(times: NDArray[np.float64]) -> dict[str, float]:
+    """Mean, median, 99th percentile and the most of the frames after the first, and the first one, ms."""
+    later = times[1:]
+    return {
+        "frames": len(times),
+        "mean_ms": float(later.mean()),
+        "median_ms": float(np.median(later)),
+        "p99_ms": float(np.percentile(later, 99)),
+        "max_ms": float(later.max()),
+        "first_ms": float(times[0]),
+    }
+
+
+def main() -> None:
+    """Print the cost for one trial."""
+    parser = argparse.ArgumentParser(description="Measure what drawing the HUD costs in a real session.")
+    parser.add_argument("--assistance", default="optimal")
+    parser.add_argument("--objects", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--width", type=int, default=SIZE[0])
+    parser.add_argument("--height", type=int, default=SIZE[1])
+    given = parser.parse_args()
+    house = House.load()
+    states = session_states(
+        house, TrialConfig(objects=given.objects, assistance=given.assistance, seed=given.seed)
+    )
+    pictures = render_pictures(house.catalogue)
+    pictures[FLOORPLAN] = render_house_map(house.catalogue, house.bounds)
+    found = summary(hud_milliseconds(Compositor(pictures), states, (given.width, given.height)))
+    for name, value in found.items():
+        Console().print(f"{name:10} {value:8.2f}" if name != "frames" else f"{name:10} {value:5.0f}")
+
+
+if __name__ == "__main__":
+    main()
