@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -77,6 +78,10 @@ class House:
 
     def known(self) -> KnownHouse:
         """What somebody knows of this house who was shown around."""
+        return self._known
+
+    @cached_property
+    def _known(self) -> KnownHouse:
         # A fixed seed: viewpoints are a property of the house, not of a trial.
         rng = np.random.default_rng(0)
         floor = np.array([self.navmesh.sample(rng) for _ in range(VIEWPOINT_CANDIDATES)])

@@ -183,6 +183,10 @@ class Trajectory:
             arrays[name] = part if width > 1 else part[:, 0]
         return {**arrays, "unknown_objects": np.array(self._unknown, dtype=np.str_)}
 
+    def save(self, path: Path) -> None:
+        """Write a compressed NPZ, whole or not at all."""
+        save_arrays(path, self.arrays())
+
     def _poses(self, o: Observation) -> tuple[Any, ...]:
         """All columns but the last two."""
         if o.hands != self._hands[0]:
@@ -196,11 +200,6 @@ class Trajectory:
         if self._rows:
             self._blocks.append(_block(self._rows))
             self._rows = []
-
-    def save(self, path: Path) -> None:
-        """Write a compressed NPZ, whole or not at all."""
-        with replacing(path) as temporary:
-            np.savez_compressed(temporary, allow_pickle=False, **self.arrays())
 
     def _encode(self, action: Action) -> list[float]:
         if isinstance(action, Move):
@@ -313,6 +312,12 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise RecordError(f"{path} is cut short or damaged: {error}") from error
+
+
+def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write a compressed NPZ, whole or not at all."""
+    with replacing(path) as temporary:
+        np.savez_compressed(temporary, allow_pickle=False, **arrays)
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol, cast
 
 import numpy as np
@@ -9,11 +10,10 @@ from numpy.typing import NDArray
 
 from experiments.assistant import OFF_THE_PATH, Assistant
 from experiments.errors import SessionError
-from experiments.lockstep import Finish, Play, Request, Walk, drive
+from experiments.lockstep import Finish, Outcome, Play, Request, Step, Walk, drive
 from experiments.participants.base import Foreseeing, Guidance, Outlook, Participant, Percept, Things
 from experiments.recording import Recording
 from experiments.records import EventLog, Trajectory
-from hud.state import HudState
 from mjsim.actions import IDLE, Action, ActionResult, WorldEvent
 from mjsim.errors import PhysicsError
 from mjsim.observation import ObjectStatus, Observation
@@ -107,13 +107,13 @@ class Session:
             SessionError: The participant needs guidance that the assistance condition does not show.
             PhysicsError: The physics failed; the log says when.
         """
-        return drive(self.play(on_progress), self._world)
+        return drive(self.play(on_progress))
 
     def resume(self, observation: Observation, on_progress: OnProgress = lambda _: None) -> str:
         """Run to the end from where the world and the assistant are now; returns and raises as `run` does."""
-        return drive(self._play_on(observation, on_progress), self._world)
+        return drive(self._play_on(observation, on_progress))
 
-    def play(self, on_progress: OnProgress = lambda _: None) -> Play:
+    def play(self, on_progress: OnProgress = lambda _: None) -> Play[str]:
         """Run as a generator: yields what the world is to do and takes what came of it; returns as `run` does.
 
         A `PhysicsError` or `KeyboardInterrupt` that comes of it is thrown in.
@@ -122,7 +122,7 @@ class Session:
         self._assistant.begin(observation)
         return (yield from self._play_on(observation, on_progress))
 
-    def _play_on(self, observation: Observation, on_progress: OnProgress) -> Play:
+    def _play_on(self, observation: Observation, on_progress: OnProgress) -> Play[str]:
         self._now = observation
         self._shown = frozenset(m.role for m in self._assistant.hud_state(observation).markers)
         if not self._participant.needs <= self._shown:
@@ -141,7 +141,7 @@ class Session:
         self._log.append(self._now.time, "end", reason=reason)
         return reason
 
-    def _until_done(self, on_progress: OnProgress) -> Play:
+    def _until_done(self, on_progress: OnProgress) -> Play[str]:
         answer: ActionResult | None = None
         total = len(self._now.object_names)
         delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
@@ -167,10 +167,10 @@ class Session:
 
     def _step(
         self, action: Action
-    ) -> Generator[Request, StepResult | Stretch, tuple[ActionResult | None, tuple[WorldEvent, ...]]]:
+    ) -> Generator[Request, Outcome, tuple[ActionResult | None, tuple[WorldEvent, ...]]]:
         """One control step, observed by everybody."""
         self._record(action)
-        step = cast(StepResult, (yield action))
+        step = cast(StepResult, (yield Step(self._world, action)))
         self._now = step.observation
         if step.result is not None:
             self._note_attempt(self._now.time, step.result)
@@ -183,17 +183,15 @@ class Session:
         if self._assistant.expecting or (percept.answer is not None and not percept.answer.applied):
             return None
         if percept.busy:
-            return Finish() if left * self._world.control_timestep > LONGEST_MOTION else None
+            return Finish(self._world) if left * self._world.control_timestep > LONGEST_MOTION else None
         limit = min(left, self.recording.steps_to_checkpoint)
-        if limit < 1:
+        legs = self._world.legs
+        if limit < 1 or legs is None:
             return None
-        body, gait, floor = getattr(self._world, "walker")  # noqa: B009
-        moves = participant.foresee(percept, Outlook(body, gait, floor, limit, stray=OFF_THE_PATH))
-        return Walk(moves) if len(moves) else None
+        moves = participant.foresee(percept, Outlook(legs, limit, stray=OFF_THE_PATH))
+        return Walk(self._world, moves) if len(moves) else None
 
-    def _stride(
-        self, request: Walk | Finish
-    ) -> Generator[Request, StepResult | Stretch, tuple[WorldEvent, ...]]:
+    def _stride(self, request: Walk | Finish) -> Generator[Request, Outcome, tuple[WorldEvent, ...]]:
         """Many control steps, recorded as if they had been observed one by one."""
         self._recorded_until = self._now.time
         self.recording.append()
@@ -218,12 +216,12 @@ class Session:
         self.recording.append()
         self.trajectory.append(self._now, action, self._world.health_sample)
 
-    def _glow(self) -> Generator[Request, StepResult | Stretch, None]:
+    def _glow(self) -> Generator[Request, Outcome, None]:
         """Let the viewer see the end for a moment; nothing of it is measured."""
         end = self._now
         while self._viewer is not None and self._now.time < end.time + AFTERGLOW:
             self._film()
-            self._now = cast(StepResult, (yield IDLE)).observation
+            self._now = cast(StepResult, (yield Step(self._world, IDLE))).observation
         self._now = end
 
     def _take_note(self, events: tuple[WorldEvent, ...]) -> None:
@@ -247,41 +245,37 @@ class Session:
             self._viewer.show(self._world, self._now, self._assistant)
 
     def _percept(self, answer: ActionResult | None) -> Percept:
-        observation = self._now
-
-        def hud() -> HudState:
-            return self._assistant.hud_state(observation)
-
-        def look() -> dict[str, NDArray[np.float64]]:
-            seen = visible_objects(
-                self._world.scene, self._world.data, observation.eye, observation.heading, observation.pitch
-            )
-            # What has been put away stays in view, in its bin, but nobody takes it for misplaced.
-            loose = set(observation.names_with(ObjectStatus.LOOSE))
-            return {name: _position_of(observation, name) for name in seen if name in loose}
-
-        def guidance() -> Guidance | None:
-            return self._assistant.guidance(observation) if "goal" in self._shown else None
-
-        def flagpoles() -> dict[str, NDArray[np.float64]]:
-            if "flagpole" not in self._shown:
-                return {}
-            return {n: _position_of(observation, n) for n in observation.names_with(ObjectStatus.LOOSE)}
-
+        seen = self._now
         return Percept(
-            time=observation.time,
-            position=observation.position,
-            heading=observation.heading,
-            hands=observation.hands,
-            busy=observation.busy,
+            time=seen.time,
+            position=seen.position,
+            heading=seen.heading,
+            hands=seen.hands,
+            busy=seen.busy,
             targets=self._targets,
             answer=answer,
-            things=self._things(observation),
-            hud=hud,
-            look=look,
-            find_guidance=guidance,
-            find_flagpoles=flagpoles,
+            things=self._things(seen),
+            hud=partial(self._assistant.hud_state, seen),
+            look=partial(self._look, seen),
+            find_guidance=partial(self._guidance, seen),
+            find_flagpoles=partial(self._flagpoles, seen),
         )
+
+    def _look(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
+        seen = visible_objects(
+            self._world.scene, self._world.data, observation.eye, observation.heading, observation.pitch
+        )
+        # What has been put away stays in view, in its bin, but nobody takes it for misplaced.
+        loose = set(observation.names_with(ObjectStatus.LOOSE))
+        return {name: _position_of(observation, name) for name in seen if name in loose}
+
+    def _guidance(self, observation: Observation) -> Guidance | None:
+        return self._assistant.guidance(observation) if "goal" in self._shown else None
+
+    def _flagpoles(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
+        if "flagpole" not in self._shown:
+            return {}
+        return {n: _position_of(observation, n) for n in observation.names_with(ObjectStatus.LOOSE)}
 
     def _things(self, observation: Observation) -> Things:
         status, minded = self._minded

@@ -3,7 +3,6 @@
 import dataclasses
 import hashlib
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +17,15 @@ from experiments.errors import ConfigError
 from experiments.glasses import FilmConfig, Filming, Glasses
 from experiments.health import summarise_health
 from experiments.house import House
+from experiments.lockstep import Play, drive
 from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
 from experiments.recording import provenance
 from experiments.records import EventLog
-from experiments.session import Progress, Session, Viewer
+from experiments.session import OnProgress, Session, Viewer
 from experiments.video import VideoWriter
 from mjsim.errors import PhysicsError
+from mjsim.options import FIDELITIES, WorldOptions
 from mjsim.render import gl_info
 from mjsim.scene import Scene, compose
 from mjsim.world import World
@@ -51,6 +52,7 @@ class TrialConfig:
         live: Plan against the clock, with proofs in the background, as for a person; what takes long is done before
             the clock starts. Such a run depends on how fast the machine is; a replay of it shows the plans that were
             shown.
+        fidelity: How much of the world is physics: `full`, `windows` or `event` (docs/fidelity.md).
     """
 
     objects: int
@@ -61,8 +63,11 @@ class TrialConfig:
     planner: str = DEFAULT_SOLVER
     time_limit: float | None = None
     live: bool = False
+    fidelity: str = WorldOptions.fidelity
 
     def __post_init__(self) -> None:
+        if self.fidelity not in FIDELITIES:
+            raise ConfigError(f"no fidelity {self.fidelity!r}; choose one of {', '.join(FIDELITIES)}")
         if self.seed < 0:
             raise ConfigError(f"seed must not be negative, got {self.seed}")
         if self.time_limit is not None and not self.time_limit > 0:
@@ -86,7 +91,7 @@ def run_trial(
     film: FilmConfig | None = None,
     topdown: bool = True,
     house: House | None = None,
-    on_progress: Callable[[Progress], None] = lambda _: None,
+    on_progress: OnProgress = lambda _: None,
 ) -> dict[str, Any]:
     """Run a trial and write its record to `out`, whole or not at all.
 
@@ -105,15 +110,28 @@ def run_trial(
         ExperimentError, MjsimError, PlannerError, HudError: The configuration or the run directory is unusable.
         PhysicsError: The physics failed. What led there is kept beside `out`, and the message says where.
     """
+    return drive(play_trial(config, out, film=film, topdown=topdown, house=house, on_progress=on_progress))
+
+
+def play_trial(
+    config: TrialConfig,
+    out: Path,
+    *,
+    film: FilmConfig | None = None,
+    topdown: bool = True,
+    house: House | None = None,
+    on_progress: OnProgress = lambda _: None,
+) -> Play[dict[str, Any]]:
+    """A trial as a generator, as `Session.play`; takes, returns and raises what `run_trial` does."""
     started = time.perf_counter()
     house = house or House.load(config.house)
     episode = house.sample_episode(objects=config.objects, seed=config.seed)
     with records.run_directory(out) as folder:
         scene = compose(episode, house.catalogue)
-        ran = _simulate(config, house, scene, folder, film, on_progress)
+        ran = yield from _simulate(config, house, scene, folder, film, on_progress)
         arrays = ran.session.trajectory.arrays()
         episode.save(folder / records.EPISODE)
-        ran.session.trajectory.save(folder / records.TRAJECTORY)
+        records.save_arrays(folder / records.TRAJECTORY, arrays)
         ran.session.recording.save(folder / records.RECORDING, arrays["action"])
         plans = [e for e in ran.log.events if e["event"] == "plan"]
         records.write_json(folder / records.PLAN, plans)
@@ -142,7 +160,6 @@ class _Ran:
     """A session that is over: why it ended, or how the physics failed, and the hash of the film's frames."""
 
     session: Session
-    world: World
     log: EventLog
     ended: str | PhysicsError
     frames_sha256: str | None
@@ -154,9 +171,28 @@ def _simulate(
     scene: Scene,
     folder: Path,
     film: FilmConfig | None,
-    on_progress: Callable[[Progress], None],
-) -> _Ran:
+    on_progress: OnProgress,
+) -> Play[_Ran]:
     """Run the session of a trial; log and video are complete in `folder` afterwards."""
+    ran = yield from _simulate_once(config, house, scene, folder, film, on_progress, foresight=True)
+    if isinstance(ran.ended, PhysicsError) and config.fidelity != "full":
+        # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
+        for path in folder.iterdir():
+            path.unlink()
+        ran = yield from _simulate_once(config, house, scene, folder, film, on_progress, foresight=False)
+    return ran
+
+
+def _simulate_once(
+    config: TrialConfig,
+    house: House,
+    scene: Scene,
+    folder: Path,
+    film: FilmConfig | None,
+    on_progress: OnProgress,
+    *,
+    foresight: bool,
+) -> Play[_Ran]:
     with ExitStack() as stack:
         log = stack.enter_context(EventLog(folder / records.EVENTS))
         video = viewer = None
@@ -168,12 +204,12 @@ def _simulate(
         replanner = None
         if config.live:
             replanner = stack.enter_context(LiveReplanner(house.geodesics, solver(config.planner)))
-        session, world = prepare_session(config, house, scene, log, viewer, replanner)
+        session, _ = prepare_session(config, house, scene, log, viewer, replanner, foresight=foresight)
         try:
-            ended: str | PhysicsError = session.run(on_progress)
+            ended: str | PhysicsError = yield from session.play(on_progress)
         except PhysicsError as error:
             ended = error
-    return _Ran(session, world, log, ended, video.frames_sha256 if video else None)
+    return _Ran(session, log, ended, video.frames_sha256 if video else None)
 
 
 def prepare_session(
@@ -183,6 +219,8 @@ def prepare_session(
     log: EventLog,
     viewer: Viewer | None = None,
     replanner: Replanner | None = None,
+    *,
+    foresight: bool = True,
 ) -> tuple[Session, World]:
     """Make the world, the assistant and the participant of a trial, ready to run.
 
@@ -193,6 +231,7 @@ def prepare_session(
         log: Takes the events.
         viewer: Sees every control step, or None.
         replanner: Plans for the assistant; None for one whose plans repeat.
+        foresight: See `Session`.
     """
     episode = scene.episode
     order_rng, user_rng = (
@@ -200,7 +239,7 @@ def prepare_session(
     )
     names = [o.name for o in episode.objects]
     order = [names[i] for i in order_rng.permutation(len(names))]
-    world = World(scene)
+    world = World(scene, WorldOptions(fidelity=config.fidelity))
     log.append(
         0.0,
         "start",
@@ -228,6 +267,7 @@ def prepare_session(
         targets=episode.targets,
         time_limit=config.limit,
         viewer=viewer,
+        foresight=foresight,
     )
     return session, world
 

@@ -113,6 +113,20 @@ class Gait(NamedTuple):
         )
 
 
+class Legs(NamedTuple):
+    """All that a walk without physics depends on, for kernels that foresee one.
+
+    Attributes:
+        body: The body now; copy it before stepping it.
+        gait: How it walks.
+        floor: What it walks into.
+    """
+
+    body: NDArray[np.float64]
+    gait: "Gait"
+    floor: "Floor"
+
+
 class Floor(NamedTuple):
     """Outlines of what the trunk meets, with a grid that says which are near; for kernels.
 

@@ -10,6 +10,7 @@ from mjsim.actions import Action, ActionResult, WorldEvent
 from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.fidelity import make_tier
 from mjsim.health import Health, HealthSample
+from mjsim.kinematics import Legs
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
 from mjsim.recording import WorldState
@@ -85,6 +86,11 @@ class World:
     def busy(self) -> bool:
         """Whether a pick or place is under way."""
         return self._tier.busy
+
+    @property
+    def legs(self) -> Legs | None:
+        """What the walk depends on, for foreseeing it with `mjsim.kinematics`; None while physics moves the person."""
+        return self._tier.legs
 
     def reset(self) -> Observation:
         """Return to the episode's beginning; the same actions then lead to bit-identical states."""

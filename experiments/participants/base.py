@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.known_house import KnownHouse
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult
-from mjsim.kinematics import Floor, Gait
+from mjsim.kinematics import Legs
 
 Point = NDArray[np.float64]
 
@@ -134,16 +134,12 @@ class Outlook:
     """What a walk depends on as long as nothing happens; not for deciding, only for foreseeing one's own steps.
 
     Attributes:
-        body: The body now, as in `mjsim.kinematics`.
-        gait: How it walks.
-        floor: What it walks into.
+        legs: What moves the person.
         limit: How many control steps to foresee at most.
         stray: How far from the way that is shown another one is shown, m.
     """
 
-    body: NDArray[np.float64]
-    gait: Gait
-    floor: Floor
+    legs: Legs
     limit: int
     stray: float
 

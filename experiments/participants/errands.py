@@ -191,9 +191,9 @@ class ErrandRunner:
         self._memories = np.empty((outlook.limit + 1, 2))
         self._memories[0] = self._memory
         count = foresee_errand(
-            outlook.body.copy(),
-            outlook.gait,
-            outlook.floor,
+            outlook.legs.body.copy(),
+            outlook.legs.gait,
+            outlook.legs.floor,
             way,
             shown,
             outlook.stray if shown else OFF_THE_WAY,

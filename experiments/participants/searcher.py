@@ -59,7 +59,7 @@ class Searcher:
     def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
         """Moves up to the next look, while it walks somewhere."""
         self._look(percept)
-        steps = math.ceil((self._next_look - TICK - percept.time) / outlook.gait.dt)
+        steps = math.ceil((self._next_look - TICK - percept.time) / outlook.legs.gait.dt)
         outlook = dataclasses.replace(outlook, limit=min(outlook.limit, steps))
         errand = self._errand(percept)
         if errand is not None:

@@ -17,6 +17,7 @@ from mjsim.fidelity.tier import by_steps
 from mjsim.grips import Grips
 from mjsim.health import Health, HealthSample
 from mjsim.inventory import LEFT, RIGHT
+from mjsim.kinematics import Legs
 from mjsim.monitoring import HealthMonitor
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
@@ -85,6 +86,11 @@ class Full:
     def health_sample(self) -> HealthSample:
         """What the physics was like in the latest control step."""
         return self.person.monitor.sample
+
+    @property
+    def legs(self) -> Legs | None:
+        """Physics moves the person."""
+        return None
 
     def reset(self) -> None:
         """Return to the episode's beginning."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mjsim.actions import Action, ActionResult, WorldEvent
 from mjsim.fidelity.ledger import Ledger
 from mjsim.health import Health, HealthSample
+from mjsim.kinematics import Legs
 from mjsim.observation import Observation
 from mjsim.recording import WorldState
 from mjsim.stretch import Stretch
@@ -47,6 +48,11 @@ class Tier(Protocol):
     @property
     def health_sample(self) -> HealthSample:
         """What the physics was like in the latest control step."""
+        ...
+
+    @property
+    def legs(self) -> Legs | None:
+        """What the walk depends on; None while physics moves the person."""
         ...
 
     def reset(self) -> None:

@@ -25,7 +25,7 @@ from mjsim.fidelity.strides import (
     walk_rows,
 )
 from mjsim.health import HealthSample
-from mjsim.kinematics import HEADING, PITCH, VX, VY, Floor, Gait, X, Y
+from mjsim.kinematics import HEADING, PITCH, VX, VY, Floor, Gait, Legs, X, Y
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
 from mjsim.rig import Rig
@@ -72,6 +72,11 @@ class Walker:
     def time(self) -> float:
         """Simulated time, s."""
         return float(self.live[TIME])
+
+    @property
+    def legs(self) -> Legs:
+        """What the walk depends on."""
+        return Legs(self.live[BODY:HANDS], self.house.gait, self.house.floor)
 
     @property
     def holds(self) -> list[tuple[int, int] | None]:

@@ -13,7 +13,7 @@ from mjsim.fidelity.strides import BODY, HAND_SPEEDS, HANDS, HOLDS
 from mjsim.fidelity.tier import by_steps
 from mjsim.fidelity.walker import Walker
 from mjsim.health import Health, HealthSample
-from mjsim.kinematics import HEADING, SERVO, TURN_RATE, VX, VY, X, Y
+from mjsim.kinematics import HEADING, SERVO, TURN_RATE, VX, VY, Legs, X, Y
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
 from mjsim.recording import WorldState
@@ -65,6 +65,11 @@ class Windows:
     def health_sample(self) -> HealthSample:
         """What the physics was like in the latest control step."""
         return self._full.health_sample if self._open else self._walker.health_sample
+
+    @property
+    def legs(self) -> Legs | None:
+        """What the walk depends on; None while physics moves the person."""
+        return None if self._open else self._walker.legs
 
     def reset(self) -> None:
         """Return to the episode's beginning."""
