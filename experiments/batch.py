@@ -36,6 +36,7 @@ class BatchConfig:
         user: Participant, or None for the one that makes the most of each condition.
         house: House name, or path of a catalogue.
         planner: Solver of the routing problem.
+        fidelity: How much of the world is physics.
     """
 
     objects: Sequence[int]
@@ -44,6 +45,7 @@ class BatchConfig:
     user: str | None = None
     house: str = "apartment"
     planner: str = TrialConfig.planner
+    fidelity: str = TrialConfig.fidelity
 
     def __post_init__(self) -> None:
         for name in ("objects", "assistance", "seeds"):
@@ -63,6 +65,7 @@ class BatchConfig:
                 user=self.user,
                 house=self.house,
                 planner=self.planner,
+                fidelity=self.fidelity,
             )
 
 
@@ -82,7 +85,10 @@ def trial_name(config: TrialConfig) -> str:
     user = config.user_name.replace(":", ".").replace("/", ".")
     house = Path(config.house).parent.name if "/" in config.house else config.house
     assistance = config.assistance.replace(":", ".")
-    return f"{house}-{config.objects:02d}-{assistance}-{user}-{config.planner}-seed{config.seed:04d}"
+    fidelity = "" if config.fidelity == TrialConfig.fidelity else f"-{config.fidelity}"
+    return (
+        f"{house}-{config.objects:02d}-{assistance}-{user}-{config.planner}{fidelity}-seed{config.seed:04d}"
+    )
 
 
 def run_batch(

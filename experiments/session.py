@@ -183,7 +183,8 @@ class Session:
         if self._assistant.expecting or (percept.answer is not None and not percept.answer.applied):
             return None
         if percept.busy:
-            return Finish(self._world) if left * self._world.control_timestep > LONGEST_MOTION else None
+            in_time = left * self._world.control_timestep > LONGEST_MOTION
+            return Finish(self._world) if in_time and participant.waits() else None
         limit = min(left, self.recording.steps_to_checkpoint)
         legs = self._world.legs
         if limit < 1 or legs is None:

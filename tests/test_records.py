@@ -1,7 +1,9 @@
 """Records: complete or absent, and never at the cost of something else."""
 
+import dataclasses
 import hashlib
 import json
+import math
 
 import numpy as np
 import pytest
@@ -22,7 +24,9 @@ from experiments.records import (
     run_directory,
 )
 from mjsim.actions import Move, Pick, Place
+from mjsim.health import HealthSample
 from mjsim.observation import ObjectStatus, Observation
+from mjsim.stretch import Stretch
 
 
 def observation(time=0.0, hands=(None, "b")):
@@ -113,7 +117,7 @@ def test_a_trajectory_round_trips_and_repeats_byte_for_byte(tmp_path):
     for name in ("one.npz", "two.npz"):
         trajectory = Trajectory(["a", "b"])
         for step, action in enumerate(actions):
-            trajectory.append(observation(step * 0.04), action)
+            trajectory.append(observation(step * 0.04), action, HealthSample())
         trajectory.save(tmp_path / name)
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
     arrays = np.load(tmp_path / "one.npz")
@@ -126,6 +130,27 @@ def test_a_trajectory_round_trips_and_repeats_byte_for_byte(tmp_path):
         [1, 1, 0, 0, 0, 0],
         [2, -1, 0, 0, 0, 0],
     ]
+
+
+def test_a_stretch_is_recorded_as_its_single_steps(tmp_path):
+    moves = np.random.default_rng(0).normal(size=(5, 4))
+    seen = [
+        dataclasses.replace(observation(step * 0.04), position=np.array([step, 1.0]), heading=0.1 * step)
+        for step in range(7)
+    ]
+    healths = [HealthSample(penetration_m=0.001 * step, weld_error_m=(math.nan, 0.1)) for step in range(7)]
+    stretch = Stretch.of(seen[2:], list(range(5)), seen[-1], (), [h.row for h in healths[2:]])
+    single, at_once = Trajectory(["a", "b"]), Trajectory(["a", "b"])
+    for trajectory in (single, at_once):
+        trajectory.append(seen[0], Pick("b"), healths[0])
+    for step, move in enumerate(moves, start=1):
+        single.append(seen[step], Move(*move), healths[step])
+    at_once.extend(seen[1], healths[1], stretch, moves)
+    for trajectory in (single, at_once):
+        trajectory.append(seen[-1], Move(), healths[-1])
+        trajectory.save(tmp_path / f"{trajectory is single}.npz")
+    assert len(single.arrays()["time"]) == 7
+    assert (tmp_path / "True.npz").read_bytes() == (tmp_path / "False.npz").read_bytes()
 
 
 def test_an_empty_trajectory_still_saves(tmp_path):
@@ -143,7 +168,7 @@ def test_actions_are_recorded_at_full_precision(actions):
     """Names that no object has are recorded, too: a replay refuses them in the same words."""
     trajectory = Trajectory(["a", "b"])
     for action in actions:
-        trajectory.append(observation(), action)
+        trajectory.append(observation(), action, HealthSample())
     arrays = trajectory.arrays()
     names = ["a", "b", *map(str, arrays["unknown_objects"])]
     again = [decode_action(row, names) for row in arrays["action"].reshape(-1, 6)]

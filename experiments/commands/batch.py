@@ -17,6 +17,7 @@ from rich.progress import (
 
 from experiments.batch import BatchConfig, BatchProgress, run_batch
 from experiments.commands.options import (
+    add_fidelity,
     add_house,
     add_planner,
     add_user,
@@ -59,6 +60,7 @@ def add_parser(commands: Any) -> None:
     add_user(parser)
     add_house(parser)
     add_planner(parser)
+    add_fidelity(parser)
     parser.add_argument(
         "--workers", type=int, default=os.cpu_count(), metavar="N", help="processes (one per core)"
     )
@@ -75,6 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         user=arguments.user,
         house=arguments.house,
         planner=arguments.planner,
+        fidelity=arguments.fidelity,
     )
     console = Console(stderr=True)
     columns = (

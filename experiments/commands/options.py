@@ -5,6 +5,7 @@ import re
 
 from experiments.participants import participant_names
 from hud.conditions import condition_names
+from mjsim.options import FIDELITIES, WorldOptions
 from mjsim.render import FAST, PROFILES
 from planner.solver import DEFAULT_SOLVER, SOLVERS
 
@@ -75,6 +76,17 @@ def add_planner(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_SOLVER,
         metavar="NAME",
         help=f"solver of the routing problem: {', '.join(SOLVERS)} ({DEFAULT_SOLVER})",
+    )
+
+
+def add_fidelity(parser: argparse.ArgumentParser) -> None:
+    """Add `--fidelity`."""
+    parser.add_argument(
+        "--fidelity",
+        choices=FIDELITIES,
+        default=WorldOptions.fidelity,
+        help="full: everything in physics; windows: physics for picks and places, kinematic walking in between; "
+        f"event: kinematic but for what falls ({WorldOptions.fidelity}; docs/fidelity.md)",
     )
 
 

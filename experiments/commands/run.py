@@ -8,7 +8,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from experiments.commands.options import add_frame, add_house, add_planner, add_user, assistance_help
+from experiments.commands.options import (
+    add_fidelity,
+    add_frame,
+    add_house,
+    add_planner,
+    add_user,
+    assistance_help,
+)
 from experiments.glasses import FilmConfig
 from experiments.session import Progress as SessionProgress
 from experiments.trial import TrialConfig, run_trial
@@ -61,6 +68,7 @@ def add_parser(commands: Any) -> None:
     )
     add_house(parser)
     add_planner(parser)
+    add_fidelity(parser)
     parser.add_argument(
         "--live",
         action="store_true",
@@ -86,6 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
         planner=arguments.planner,
         time_limit=arguments.time_limit,
         live=arguments.live,
+        fidelity=arguments.fidelity,
     )
     film = None if arguments.no_video else FilmConfig(arguments.size[0], arguments.size[1], arguments.profile)
     console = Console(stderr=True)

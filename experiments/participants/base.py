@@ -148,8 +148,7 @@ class Outlook:
 class Foreseeing(Participant, Protocol):
     """A participant that can say what it will do, where the walk follows from the walker alone.
 
-    It does nothing while a pick or place is under way. Foreseeing is a matter of speed: a run in which nothing is
-    foreseen is the same.
+    Foreseeing is a matter of speed: a run in which nothing is foreseen is the same.
     """
 
     def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
@@ -161,6 +160,10 @@ class Foreseeing(Participant, Protocol):
 
     def went(self, steps: int) -> None:
         """So many of the moves foreseen last were made."""
+        ...
+
+    def waits(self) -> bool:
+        """Whether it will do nothing until the pick or place under way is over."""
         ...
 
 

@@ -33,6 +33,10 @@ class Follower:
         """So many of the moves foreseen were made."""
         self._runner.went(steps)
 
+    def waits(self) -> bool:
+        """It reaches and looks on."""
+        return True
+
 
 def _errand(step: Guidance) -> Errand:
     return Errand(step.kind, step.object, step.goal, step.path[-1])

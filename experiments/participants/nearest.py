@@ -33,6 +33,10 @@ class Nearest:
         """So many of the moves foreseen were made."""
         self._runner.went(steps)
 
+    def waits(self) -> bool:
+        """It reaches and looks on."""
+        return True
+
     def _errand(self, percept: Percept) -> Errand | None:
         feasible = [("place", name) for name in percept.carried]
         if None in percept.hands:

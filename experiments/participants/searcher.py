@@ -73,6 +73,10 @@ class Searcher:
         """So many of the moves foreseen were made."""
         self._runner.went(steps)
 
+    def waits(self) -> bool:
+        """It reaches and looks on."""
+        return True
+
     def _look(self, percept: Percept) -> None:
         for name in percept.carried:
             self._remembered.pop(name, None)

@@ -11,8 +11,8 @@ from experiments.errors import RecordError
 from experiments.health import summarise_health
 from experiments.metrics import compute_metrics
 from experiments.records import Event, read_json
-from experiments.replaying.replayer import WORLD_EVENTS, Replayer
-from experiments.replaying.run_record import PER_STEP, Fault, RunRecord
+from experiments.replaying.replayer import Replayer
+from experiments.replaying.run_record import PER_STEP, WORLD_EVENTS, Fault, RunRecord
 from experiments.session import INTERRUPTED, PHYSICS_ERROR
 
 # What the physics alone decides. Plans and visits are the assistant's; the log's hashes vouch for them.

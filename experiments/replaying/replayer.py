@@ -4,26 +4,26 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 from numpy.typing import NDArray
 
 from experiments.assistant import Assistant
 from experiments.errors import RecordError, ReplayError
 from experiments.house import House
-from experiments.participants.base import Percept
+from experiments.participants.base import Outlook, Percept
+from experiments.participants.errands import NO_MOVES
 from experiments.recording import Recording, provenance
 from experiments.records import Event, EventLog
 from experiments.replaying.logged_plans import LoggedPlans
-from experiments.replaying.run_record import Fault, RunRecord
+from experiments.replaying.run_record import WORLD_EVENTS, Fault, RunRecord
 from experiments.session import INTERRUPTED, PHYSICS_ERROR, Session, Viewer
-from mjsim.actions import Action, EventKind, WorldEvent
+from mjsim.actions import Action, WorldEvent
 from mjsim.errors import PhysicsError, StateError
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
 from mjsim.scene import compose
 from mjsim.world import World
 from planner.replanner import Replanner
-
-WORLD_EVENTS = {kind.value: kind for kind in EventKind}
 
 
 class _EndOfReplay(Exception):  # noqa: N818 - no error: the record has no more to tell
@@ -58,6 +58,31 @@ class _RecordedUser:
         except RecordError as error:
             self._stop(Fault(step, str(error)))
             raise
+
+    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:  # noqa: ARG002 - the record decides
+        """The moves recorded next; what came of them is compared when the replay is over."""
+        record, step = self._record, self._recording.step
+        if step >= record.steps or self._world.state_hash() != int(record.recorded.state_hash[step]):
+            return NO_MOVES
+        return record.moves(step, min(step + outlook.limit, self._last_sound))
+
+    def waits(self) -> bool:
+        """Whether nothing was asked until the pick or place under way was over."""
+        record, step = self._record, self._recording.step
+        until = record.next_event(step)
+        if until is None or until >= self._last_sound:
+            return False
+        idle = record.moves(step, until + 1)
+        return len(idle) == until + 1 - step and not idle.any()
+
+    def went(self, steps: int) -> None:
+        """The record knows."""
+
+    @property
+    def _last_sound(self) -> int:
+        """The first step that is not simply done again: where the record ends, or is damaged."""
+        fault = self._record.fault
+        return self._record.steps - 1 if fault is None else min(fault.step, self._record.steps - 1)
 
     def _stop(self, fault: Fault) -> None:
         if self.fault is None or fault.step < self.fault.step:

@@ -14,13 +14,14 @@ from experiments import records
 from experiments.errors import RecordError, ReplayError
 from experiments.recording import Recorded, action_hashes
 from experiments.records import STATUS_CODE, Event, LogDigest, decode_action, read_arrays
-from mjsim.actions import Action
+from mjsim.actions import Action, EventKind
 from mjsim.avatar import EYE_HEIGHT
 from mjsim.episode import Episode
 from mjsim.errors import EpisodeError
 from mjsim.observation import Observation
 
 STATUS = {code: status for status, code in STATUS_CODE.items()}
+WORLD_EVENTS = {kind.value: kind for kind in EventKind}
 # Dimensions of the arrays that have a row per control step.
 PER_STEP = {
     "time": 1,
@@ -85,6 +86,16 @@ class RunRecord:
         """What was done at a control step; raises `RecordError` where that is no action."""
         names = [o.name for o in self.episode.objects]
         return decode_action(self.arrays["action"][step], [*names, *map(str, self.arrays["unknown_objects"])])
+
+    def moves(self, first: int, end: int) -> NDArray[np.float64]:
+        """The moves from control step `first` up to `end` or to the first other action: shape (n, 4)."""
+        rows = self.arrays["action"][first:end]
+        others = np.flatnonzero((rows[:, 0] != 0.0) | ~np.isfinite(rows).all(axis=1))
+        return rows[: others[0] if others.size else len(rows), 2:]
+
+    def next_event(self, first: int) -> int | None:
+        """The control step from `first` on at which something happened next in the world; None if nothing did."""
+        return next((s for s, e in self.events if s >= first and e["event"] in WORLD_EVENTS), None)
 
     def observation(self, step: int) -> Observation:
         """What the assistant saw before a control step; eye height and velocity, which it ignores, are nominal."""
