@@ -43,7 +43,10 @@ class Grips:
 
     def nearest_grip(self, hand: int, item: int) -> int:
         """Grip of object `item` that has to be turned least to align with a hand: 0 or 1."""
-        forward = self._data.site_xmat[self._hand_sites[hand], 0::3]
+        return self.grip_along(item, self._data.site_xmat[self._hand_sites[hand], 0::3])
+
+    def grip_along(self, item: int, forward: NDArray[np.float64]) -> int:
+        """Grip of object `item` whose x axis is nearest to a direction (3,): 0 or 1."""
         agreement = [float(self._data.site_xmat[site, 0::3] @ forward) for site in self._sites[item]]
         return int(np.argmax(agreement))
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from mjsim.fidelity.event import Event
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.tier import Tier
 from mjsim.fidelity.windows import Windows
@@ -10,7 +11,7 @@ from mjsim.scene import Scene
 
 __all__ = ["Tier", "make_tier"]
 
-_TIERS: dict[str, Callable[[Scene, WorldOptions], Tier]] = {"full": Full, "windows": Windows}
+_TIERS: dict[str, Callable[[Scene, WorldOptions], Tier]] = {"full": Full, "windows": Windows, "event": Event}
 
 
 def make_tier(scene: Scene, options: WorldOptions) -> Tier:

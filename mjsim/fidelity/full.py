@@ -169,7 +169,8 @@ class Full:
         for kind, item in self.person.monitor.check(self.person.held):
             self.ledger.report(self.time, kind, item)
         self._watch_grips()
-        self.watch_deliveries()
+        for item in self.dislodged():
+            self.ledger.dislodged(self.time, item)
 
     def observation(self) -> Observation:
         """The present state."""
@@ -227,14 +228,29 @@ class Full:
         except (KeyError, TypeError, ValueError) as error:
             raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
 
-    def watch_deliveries(self) -> None:
-        """Report what has left its receptacle."""
-        for item, status in enumerate(self.ledger.status):
-            if status is not ObjectStatus.DELIVERED or self.person.asleep(item):
-                continue
-            key = self.scene.episode.targets[self.scene.index.names[item]]
-            if not self.scene.receptacles[key].contains(self.person.center(item), _DISLODGED_MARGIN):
-                self.ledger.dislodged(self.time, item)
+    def dislodged(self) -> list[int]:
+        """Delivered objects that have left their receptacles."""
+        return [
+            item
+            for item, status in enumerate(self.ledger.status)
+            if status is ObjectStatus.DELIVERED and not self.person.asleep(item) and not self._in_place(item)
+        ]
+
+    def calm(self, speed: float) -> bool:
+        """Whether all that nobody holds sleeps, or is slower than `speed`, m/s."""
+        index, data = self.scene.index, self.data
+        awake = data.tree_awake[index.trees] != 0
+        awake[list(self.person.grips.gripped)] = False
+        moving = np.flatnonzero(awake)
+        return all(self.person.speed(item) < speed for item in moving.tolist())
+
+    def poses(self) -> NDArray[np.float64]:
+        """Poses of all objects, m and wxyz, shape (n, 7)."""
+        return np.array(self.data.qpos[self.scene.index.qpos[:, None] + np.arange(7)])
+
+    def _in_place(self, item: int) -> bool:
+        key = self.scene.episode.targets[self.scene.index.names[item]]
+        return self.scene.receptacles[key].contains(self.person.center(item), _DISLODGED_MARGIN)
 
     def _run_motion(self, motion: _Motion) -> None:
         try:

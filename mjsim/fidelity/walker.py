@@ -25,9 +25,10 @@ from mjsim.fidelity.strides import (
     walk_rows,
 )
 from mjsim.health import HealthSample
-from mjsim.kinematics import HEADING, PITCH, VX, VY, Floor, Gait, Legs, X, Y
+from mjsim.kinematics import FORWARD, HEADING, PITCH, VX, VY, Floor, Gait, Legs, X, Y
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
+from mjsim.postures import LOWEST, drawn_in
 from mjsim.rig import Rig
 from mjsim.scene import Scene
 from mjsim.stretch import Stretch
@@ -132,6 +133,16 @@ class Walker:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
+
+    def place_for(self, hand: int, item: int) -> NDArray[np.float64]:
+        """Where a hand best carries object `item`, clear of the house: body frame, m, (3,)."""
+        forward, left, up = avatar.posture(hand, avatar.CARRY)
+        body, house = self.live[BODY:HANDS], self.house
+        radius, height = house.loads[item].tolist()
+        place = drawn_in(
+            forward, left, radius, body, body[FORWARD:], house.distance, house.gradient, house.frame
+        )
+        return np.array([*place, max(up, LOWEST + height)])
 
     def step(self, move: Move) -> None:
         """One control step."""

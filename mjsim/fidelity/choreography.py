@@ -1,0 +1,208 @@
+"""Picks and places worked out without physics, at once, with the constants of `mjsim.picking` and `mjsim.placing`.
+
+Only the fall of what is let go is physics. It decides on success by the same test as placing does.
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim import avatar
+from mjsim.actions import EventKind
+from mjsim.fidelity import gestures
+from mjsim.fidelity.fall import drop
+from mjsim.fidelity.full import Full
+from mjsim.fidelity.gestures import ACROSS_FIRST, STRAIGHT, UP_FIRST, Script
+from mjsim.fidelity.strides import BODY, HANDS
+from mjsim.fidelity.walker import Walker
+from mjsim.kinematics import HEADING, LOOK, X, Y
+from mjsim.person import FACE_TIMEOUT
+from mjsim.picking import ALIGN_TIME, LIFT_TIME, REACH_TIME
+from mjsim.placing import (
+    DESCENT_SPEED,
+    HAND_SPEED,
+    HOVER_GAP,
+    RELEASE_GAP,
+    Footprint,
+    fill_slots,
+    object_corners,
+    square_heading,
+)
+from mjsim.receptacles import ReceptacleGeometry
+
+Vector = NDArray[np.float64]
+
+_MOST = 400  # control steps of a motion
+_APPROACH = 2  # control steps that a hand lags behind at the end of a reach
+_FACING, _SQUARE = 0.35, 0.04  # rad
+_LIFTS, _LIFT = 4, 0.035  # control steps and m of each, of a hand that withdraws
+_ANYWHERE = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A motion, worked out.
+
+    Attributes:
+        script: The state after each control step.
+        length: How many.
+        success: Whether the hand holds the object, or it rests in its receptacle.
+        incidents: What happens besides: step, kind and object.
+    """
+
+    script: Script
+    length: int
+    success: bool
+    incidents: tuple[tuple[int, EventKind, int], ...] = ()
+
+
+class Choreographer:
+    """Works out motions from the present state of a walk."""
+
+    def __init__(self, full: Full, walker: Walker) -> None:
+        self._full, self._walker = full, walker
+        self._tucked, self._aside = np.array(avatar.TUCKED), np.array(avatar.ASIDE)
+        self._corners: dict[tuple[int, int], Vector] = {}
+
+    def pick(self, hand: int, item: int) -> Plan:
+        """Take object `item`; data must be in step with the walk, which is left as it was."""
+        walker, person, house = self._walker, self._full.person, self._walker.house
+        before = walker.live.copy(), walker.poses.copy()
+        script = Script.empty(_MOST, len(walker.poses))
+        center, pitch = person.center(item), float(walker.live[BODY + LOOK])
+        row = self._face(script, center, _ANYWHERE, _FACING)
+        heading = float(walker.live[BODY + HEADING])
+        grip = person.grips.grip_along(item, np.array([math.cos(heading), math.sin(heading), 0.0]))
+        point = person.grips.point(item, grip)
+        row = self._swing(script, row, hand, point, person.steps(REACH_TIME), ACROSS_FIRST, center, True)
+        row = self._wait(script, row, hand, _APPROACH)
+        walker.hold(hand, item, grip)
+        row = self._wait(script, row, hand, person.steps(ALIGN_TIME))
+        goal = walker.place_for(hand, item)
+        ahead = np.array([math.nan, math.nan, pitch])
+        row = self._swing(script, row, hand, goal, person.steps(LIFT_TIME), UP_FIRST, ahead, False)
+        row = gestures.end(walker.live, walker.poses, script, row, walker.carry_posture, house)
+        walker.live[:], walker.poses[:] = before
+        return Plan(script, row, True)
+
+    def place(self, hand: int, item: int, receptacle: ReceptacleGeometry) -> Plan:
+        """Put object `item` into its receptacle; data must be in step with the walk, which is left as it was."""
+        walker, person = self._walker, self._full.person
+        before = walker.live.copy(), walker.poses.copy()
+        script = Script.empty(_MOST, len(walker.poses))
+        pitch = float(walker.live[BODY + LOOK])
+        row = self._face(script, receptacle.center, square_heading(person, receptacle), _SQUARE)
+        footprint = self._footprint(hand, receptacle)
+        slots = fill_slots(person, item, receptacle, footprint)
+        clear = max(float(receptacle.half_size[2]), *(s.fill for s in slots)) + HOVER_GAP
+        row = self._travel(script, row, hand, receptacle, _over(slots[0].hand, clear - footprint.low[2]))
+        row = self._descend(
+            script,
+            row,
+            hand,
+            receptacle,
+            _over(slots[0].hand, slots[0].fill + RELEASE_GAP - footprint.low[2]),
+        )
+        fall = drop(self._full, walker, hand, item, receptacle)
+        row = gestures.let_go(
+            walker.live, walker.poses, script, row, hand, fall.poses, _LIFTS, _LIFT, pitch, self._aside, walker.house
+        )  # fmt: skip
+        walker.poses[:] = fall.rest
+        released = row - len(fall.poses)
+        row = gestures.end(walker.live, walker.poses, script, row, walker.carry_posture, walker.house)
+        walker.live[:], walker.poses[:] = before
+        incidents = tuple((released + step, kind, item) for step, kind, item in fall.incidents)
+        return Plan(script, row, fall.success, incidents)
+
+    def _face(self, script: Script, point: Vector, heading: float, tolerance: float) -> int:
+        walker, most = self._walker, self._full.person.steps(FACE_TIMEOUT)
+        x, y, z = point.tolist()
+        return gestures.face(
+            walker.live,
+            walker.poses,
+            script,
+            0,
+            x,
+            y,
+            z,
+            heading,
+            tolerance,
+            most,
+            self._tucked,
+            walker.house,
+        )
+
+    def _swing(
+        self, script: Script, row: int, hand: int, goal: Vector, count: int, manner: int, look: Vector, in_house: bool
+    ) -> int:  # fmt: skip
+        walker = self._walker
+        return gestures.swing(
+            walker.live, walker.poses, script, row, hand, goal, in_house, count, manner, look, self._aside, walker.house
+        )  # fmt: skip
+
+    def _wait(self, script: Script, row: int, hand: int, count: int) -> int:
+        live = self._walker.live
+        ahead = np.array([math.nan, math.nan, live[BODY + LOOK]])
+        return self._swing(script, row, hand, self._hand(hand), count, STRAIGHT, ahead, False)
+
+    def _travel(
+        self, script: Script, row: int, hand: int, receptacle: ReceptacleGeometry, hover: Vector
+    ) -> int:
+        person = self._full.person
+        goal = receptacle.center + receptacle.rotation @ hover
+        for up_first in (True, False):
+            start = self._hand(hand)
+            there = self._in_body(goal)
+            if up_first:
+                there = np.array([start[0], start[1], max(start[2], there[2])])
+            distance = float(np.linalg.norm(there - start))
+            count = 0 if distance < 0.005 else person.steps(0.12 + distance / HAND_SPEED)
+            towards, in_house = (there, False) if up_first else (goal, True)
+            row = self._swing(script, row, hand, towards, count, STRAIGHT, receptacle.center, in_house)
+        return self._wait(script, row, hand, person.steps(0.08))
+
+    def _descend(
+        self, script: Script, row: int, hand: int, receptacle: ReceptacleGeometry, at: Vector
+    ) -> int:
+        start, goal = self._hand(hand), self._in_body(receptacle.center + receptacle.rotation @ at)
+        count = self._full.person.steps(0.12 + abs(float(goal[2] - start[2])) / DESCENT_SPEED)
+        ahead = np.array([math.nan, math.nan, self._walker.live[BODY + LOOK]])
+        row = self._swing(script, row, hand, goal, count, STRAIGHT, ahead, False)
+        return self._wait(script, row, hand, 1)  # to see that it touches nothing
+
+    def _hand(self, hand: int) -> Vector:
+        return self._walker.live[HANDS + 3 * hand : HANDS + 3 * hand + 3].copy()
+
+    def _in_body(self, point: Vector) -> Vector:
+        body = self._walker.live[BODY:HANDS]
+        c, s = math.cos(body[HEADING]), math.sin(body[HEADING])
+        dx, dy = point[0] - body[X], point[1] - body[Y]
+        return np.array([c * dx + s * dy, c * dy - s * dx, point[2]])
+
+    def _footprint(self, hand: int, receptacle: ReceptacleGeometry) -> Footprint:
+        """Extent of what a hand holds about it, in the receptacle's axes."""
+        hold = self._walker.holds[hand]
+        if hold is None:  # a place is only begun with something in the hand
+            return Footprint(np.zeros(3), np.zeros(3))
+        if hold not in self._corners:
+            self._corners[hold] = self._corners_about_hand(*hold)
+        heading = float(self._walker.live[BODY + HEADING])
+        c, s = math.cos(heading), math.sin(heading)
+        turned = self._corners[hold] @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        local = turned @ receptacle.rotation
+        return Footprint(low=local.min(axis=0), high=local.max(axis=0))
+
+    def _corners_about_hand(self, item: int, grip: int) -> Vector:
+        index, model = self._full.scene.index, self._full.scene.model
+        corners = object_corners(model, index.geoms(index.names[item]))
+        pose = self._walker.house.grips[item, grip]
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, pose[3:])
+        return np.asarray(corners @ rotation.reshape(3, 3).T + pose[:3])
+
+
+def _over(at: Vector, height: float) -> Vector:
+    return np.array([at[0], at[1], height])
