@@ -110,7 +110,7 @@ def _footprint(
 
 
 def fill_slots(person: Person, item: int, receptacle: ReceptacleGeometry, footprint: Footprint) -> list[Slot]:
-    """The 2 x 2 slots, least filled first, then nearest to the person.
+    """The 2 x 2 slots, least filled and most level first, then nearest to the person.
 
     Fill heights and positions are relative to the centre of the receptacle's volume. Each slot is moved so
     that the object clears the walls where it can.
@@ -123,26 +123,27 @@ def fill_slots(person: Person, item: int, receptacle: ReceptacleGeometry, footpr
     ranked = []
     for sx, sy in itertools.product((-0.5, 0.5), repeat=2):
         at = np.clip(half * (sx, sy), -room, room)
-        fill = _fill_height(person, item, receptacle, at, np.minimum(extent, half))
-        ranked.append((round(fill, 3), float(np.hypot(*(at - me[:2]))), Slot(hand=at - middle, fill=fill)))
+        heights = _surface(person, item, receptacle, at, np.minimum(extent, half))
+        fill = float(heights.max())
+        # On a slope things tip over: what is missing below counts as if it were filled.
+        cost = fill + (fill - float(heights.mean()))
+        ranked.append((round(cost, 3), float(np.hypot(*(at - me[:2]))), Slot(hand=at - middle, fill=fill)))
     ranked.sort(key=lambda entry: entry[:2])
     return [slot for _, _, slot in ranked]
 
 
-def _fill_height(
-    person: Person, item: int, receptacle: ReceptacleGeometry, at: Vector, extent: Vector
-) -> float:
-    """Highest surface below a footprint, m above the centre of the volume."""
+def _surface(person: Person, item: int, receptacle: ReceptacleGeometry, at: Vector, extent: Vector) -> Vector:
+    """Heights of what lies below a footprint, m above the centre of the volume, (25,)."""
     ignore = {int(b) for b in person.carried_bodies()} | {int(person.scene.index.bodies[item])}
     top = float(receptacle.half_size[2]) + _PROBE_ABOVE
-    best = -float(receptacle.half_size[2])
+    heights = []
     span = np.linspace(-1.0, 1.0, _PROBES)
     for u, v in itertools.product(span, span):
         local = np.array([at[0] + u * extent[0], at[1] + v * extent[1], top])
         start = receptacle.center + receptacle.rotation @ local
         distance, _ = first_hit(person.scene.model, person.data, start, (0.0, 0.0, -1.0), ignore=ignore)
-        best = max(best, top - distance)
-    return best
+        heights.append(max(top - distance, -float(receptacle.half_size[2])))
+    return np.array(heights)
 
 
 def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector) -> Vector:

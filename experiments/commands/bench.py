@@ -4,6 +4,7 @@ import argparse
 import importlib.util
 import inspect
 import json
+import math
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,8 +16,9 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 DESCRIPTION = """\
 Run a benchmark of the source checkout and print what it measured. Figures are ratios where they can be, so that they
 hold on another machine as well. A module in benchmarks/ is a benchmark when it defines measure() -> dict of JSON values
-and lines(result) -> lines of text; measure may take the keywords houses and quick, and picture(result, path) may draw
-the result."""
+and lines(result) -> lines of text; measure may take the keywords quick, houses, count, hours, workers and only, and
+picture(result, path) may draw the result."""
+OPTIONS = ("quick", "houses", "count", "hours", "workers", "only")
 
 
 def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
@@ -62,6 +64,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     parser.add_argument("--quick", action="store_true", help="a smaller run, where the benchmark has one")
     parser.add_argument("--houses", type=positive, metavar="N", help="houses, where the benchmark has many")
+    parser.add_argument("--count", type=positive, metavar="N", help="cases, where the benchmark counts them")
+    parser.add_argument(
+        "--hours", type=positive_number, metavar="H", help="simulated hours, where the benchmark counts them"
+    )
+    parser.add_argument("--workers", type=positive, metavar="N", help="processes, where it uses several")
+    parser.add_argument("--only", type=natural, metavar="N", help="one session alone, to look at it again")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the result as well")
     parser.set_defaults(run=run)
 
@@ -73,13 +81,32 @@ def positive(text: str) -> int:
     return int(text)
 
 
+def natural(text: str) -> int:
+    """Parse a whole number, 0 included."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return int(text)
+
+
+def positive_number(text: str) -> float:
+    """Parse a finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
+
+
 def options(module: ModuleType, arguments: argparse.Namespace) -> dict[str, Any]:
     """Options that were given, as keywords of the benchmark's `measure`.
 
     Raises:
         ConfigError: The benchmark has no such option.
     """
-    given = {name: getattr(arguments, name) for name in ("quick", "houses") if getattr(arguments, name)}
+    values = {name: getattr(arguments, name) for name in OPTIONS}
+    given = {name: value for name, value in values.items() if value is not None and value is not False}
     for name in given:
         if name not in inspect.signature(module.measure).parameters:
             raise ConfigError(f"benchmark {arguments.name} has no option --{name}; leave it out")

@@ -1,0 +1,180 @@
+"""Seeded placements over all object models, receptacles and fill levels.
+
+A session is an ordinary world: somebody stands near a receptacle, at a random place from which it can be used, with
+objects of its category on the floor around. They pick them one after another and place each into the receptacle, which
+the earlier ones fill. Nothing is put anywhere by other means than the person's own hands.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.house import House
+from mjsim.actions import IDLE, EventKind, Pick, Place
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.errors import PhysicsError
+from mjsim.rules import receptacle_distance
+from mjsim.scene import compose
+from mjsim.world import World
+
+SEED = 2026
+LEVELS = 6  # the receptacle holds 0 to 5 objects before
+AROUND = (0.4, 0.92)  # m from the person to the objects on the floor
+STRAY = 0.3  # m from the receptacle's own approach point at most, in x and in y
+REACH = 0.8  # m from the person to the receptacle's volume at most
+SPACING = 0.3  # m between objects on the floor
+DROP = 0.01  # m
+LONGEST = 400  # control steps of one motion
+NOT_TRIED = ("pick_failed", "refused")
+_OUTCOMES = (
+    EventKind.PICKED, EventKind.PICK_FAILED, EventKind.PLACED, EventKind.PLACE_FAILED, EventKind.GRIP_LOST,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Placement:
+    """One object that was picked up and, if `outcome` is not `pick_failed`, placed.
+
+    Attributes:
+        session: Number of the session; `run_session` repeats it.
+        model: Object model.
+        receptacle: Receptacle key.
+        fill: How many objects the receptacle held before.
+        outcome: `placed`, or `place_failed`, `pick_failed`, `grip_lost`, `refused`, `dislodged` if it was placed and
+            shoved another one out, `error` if the physics failed.
+        ejections: Objects ejected meanwhile.
+        tunnellings: Objects that tunnelled meanwhile.
+        settle_s: Time from release to rest, s.
+        weld_m: Largest weld error, m.
+        weld_rad: Likewise, rad.
+        penetration: Deepest overlap in each control step, m.
+    """
+
+    session: int
+    model: str
+    receptacle: str
+    fill: int
+    outcome: str
+    ejections: int
+    tunnellings: int
+    settle_s: float
+    weld_m: float
+    weld_rad: float
+    penetration: NDArray[np.float64]
+
+
+def run_session(house: House, number: int) -> list[Placement]:
+    """Run session `number`; the same number gives the same session, to the last bit."""
+    episode = make_episode(house, number)
+    world = World(compose(episode, house.catalogue))
+    found: list[Placement] = []
+    fill = 0
+    for placed in episode.objects:
+        placement = _transport(world, number, placed, fill)
+        found.append(placement)
+        if placement.outcome == "error":
+            break
+        fill += placement.outcome in ("placed", "dislodged")
+    return found
+
+
+def make_episode(house: House, number: int) -> Episode:
+    """Somebody near a receptacle with objects around: receptacles in turn, everything else by chance."""
+    rng = np.random.default_rng([SEED, number])
+    category = list(house.catalogue.categories.values())[number % len(house.catalogue.categories)]
+    receptacle = house.receptacles[category.receptacle]
+    while True:
+        stand = _stand(house, category.receptacle, rng)
+        spots = _spots(house, stand, rng)
+        if len(spots) == LEVELS:
+            break
+    models = [str(model) for model in rng.permutation(list(category.objects) * 2)[:LEVELS]]
+    objects = []
+    for i, (model, spot) in enumerate(zip(models, spots, strict=True)):
+        yaw = rng.uniform(-math.pi, math.pi)
+        x, y = (float(v) for v in spot)
+        quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+        objects.append(PlacedObject(f"o{i}", category.key, model, (x, y), (x, y, DROP), quaternion))
+    heading = math.atan2(*(receptacle.center[:2] - stand)[::-1]) + rng.uniform(-1.5, 1.5)
+    return Episode(
+        house=house.catalogue.name,
+        seed=number,
+        start=StartPose(float(stand[0]), float(stand[1]), float(heading)),
+        objects=tuple(objects),
+        receptacles=tuple(house.catalogue.receptacles),
+        targets={o.name: category.receptacle for o in objects},
+    )
+
+
+def _stand(house: House, key: str, rng: np.random.Generator) -> NDArray[np.float64]:
+    """A floor point from which a receptacle can be used, near the point that is meant for it."""
+    receptacle = house.receptacles[key]
+    while True:
+        point = receptacle.approach + rng.uniform(-STRAY, STRAY, 2)
+        if house.navmesh.is_navigable(point) and receptacle_distance(point, receptacle) < REACH:
+            return np.asarray(point)
+
+
+def _spots(house: House, stand: NDArray[np.float64], rng: np.random.Generator) -> list[NDArray[np.float64]]:
+    """Places for objects on the floor in reach of somebody, apart from each other and from what stands there."""
+    spots: list[NDArray[np.float64]] = []
+    for _ in range(400):
+        angle, radius = rng.uniform(-math.pi, math.pi), rng.uniform(*AROUND)
+        spot = stand + radius * np.array([math.cos(angle), math.sin(angle)])
+        apart = all(np.linalg.norm(spot - other) > SPACING for other in spots)
+        free = house.navmesh.is_navigable(spot)
+        if apart and free and len(house.body_geodesics.shortest_path(stand, spot).points) == 2:
+            spots.append(spot)
+            if len(spots) == LEVELS:
+                break
+    return spots
+
+
+def _transport(world: World, session: int, placed: PlacedObject, fill: int) -> Placement:
+    """Pick one object up and place it."""
+    receptacle = world.scene.episode.targets[placed.name]
+    before = world.health
+    rows: list[tuple[float, ...]] = []
+    outcome = ""
+    try:
+        outcome = _motion(world, Pick(placed.name), rows)
+        if outcome == EventKind.PICKED.value:
+            rows.clear()
+            outcome = _motion(world, Place(placed.name), rows)
+    except PhysicsError:
+        outcome = "error"
+    table = np.array(rows).reshape(-1, 7)
+    after = world.health
+    return Placement(
+        session=session,
+        model=placed.model,
+        receptacle=receptacle,
+        fill=fill,
+        outcome=outcome,
+        ejections=after.ejections - before.ejections,
+        tunnellings=after.tunnellings - before.tunnellings,
+        settle_s=float(np.nanmax(table[:, 6], initial=0.0)),
+        weld_m=float(np.nanmax(table[:, 2:4], initial=0.0)),
+        weld_rad=float(np.nanmax(table[:, 4:6], initial=0.0)),
+        penetration=table[:, 0].copy(),
+    )
+
+
+def _motion(world: World, action: Pick | Place, rows: list[tuple[float, ...]]) -> str:
+    """Do one thing to its end; the outcome. `rows` takes the health of every control step."""
+    step = world.step(action)
+    if step.result is None or not step.result.applied:
+        return "refused"
+    kinds: list[EventKind] = []
+    for _ in range(LONGEST):
+        rows.append(world.health_sample.row)
+        kinds += [event.kind for event in step.events]
+        if not world.busy:
+            break
+        step = world.step(IDLE)
+    outcome = next(k for k in reversed(kinds) if k in _OUTCOMES).value
+    if outcome == EventKind.PLACED.value and EventKind.DISLODGED in kinds:
+        return EventKind.DISLODGED.value
+    return outcome
