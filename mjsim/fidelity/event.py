@@ -15,6 +15,7 @@ from mjsim.fidelity.gestures import play_rows
 from mjsim.fidelity.strides import Rows
 from mjsim.fidelity.walker import Walker
 from mjsim.health import Health, HealthSample
+from mjsim.kinematics import Legs
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
 from mjsim.recording import WorldState
@@ -83,6 +84,11 @@ class Event:
     def health_sample(self) -> HealthSample:
         """What the physics was like in the latest control step."""
         return self._walker.health_sample
+
+    @property
+    def legs(self) -> Legs | None:
+        """What the walk depends on; None while the person picks or places."""
+        return None if self.busy else self._walker.legs
 
     def reset(self) -> None:
         """Return to the episode's beginning."""
