@@ -157,6 +157,38 @@ def test_the_fast_profile_has_spots_where_the_quality_profile_has_shadows(scene)
     assert (darker.sum(axis=2) > 5).sum() > 15 and darker.min() >= -2
 
 
+def flat_things(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[str, float]]:
+    """Material and top of the rugs and drawn shadows, m: wide, thin, seen but not touched."""
+    found = []
+    for geom in np.flatnonzero((model.geom_group == 2) & (data.geom_xpos[:, 2] < 0.02)):
+        is_plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
+        reach = np.abs(data.geom_xmat[geom].reshape(3, 3)) @ model.geom_aabb[geom, 3:]
+        if is_plane or (reach[:2].min() > 0.2 and reach[2] < 0.01):
+            name = model.mat(model.geom_matid[geom]).name
+            found.append((name, data.geom_xpos[geom, 2] + (0.0 if is_plane else reach[2])))
+    return found
+
+
+def test_nothing_flat_on_the_floor_covers_what_lies_on_it(scene):
+    """A plate's bottom is 7 mm up. Rugs, drawn shadows and the spots under things all stay below it, on every rug."""
+    model, data = scene.model, mujoco.MjData(scene.model)
+    mujoco.mj_kinematics(model, data)
+    flat = flat_things(model, data)
+    assert {"rug_living", "rug_runner", "rug_bedroom", "rug_round", "shadow_box"} <= {
+        name for name, _ in flat
+    }
+    assert max(top for _, top in flat) <= 0.005
+    plate = next(o.name for o in scene.episode.objects if o.model == "plate")
+    address = model.joint(f"{plate}/free").qposadr[0]
+    with Renderer(model, width=64, height=48, profile=FAST) as made:
+        for room, rug in {"living": (10.0, 8.0), "child's": (7.9, 1.8), "bedroom": (1.9, 1.2)}.items():
+            data.qpos[address : address + 3] = *rug, 0.0
+            mujoco.mj_forward(model, data)
+            at = data.body(f"{plate}/object").xpos
+            seen = made.rgb(data, CameraPose.looking_at(at + np.array([0.2, 0.1, 0.6]), at, 0.4))
+            assert seen[22:26, 30:34].min() > 120 and np.ptp(seen[22:26, 30:34]) < 60, f"{room}: white china"
+
+
 # --- several cameras, reduction ---------------------------------------------------------------------------
 
 

@@ -1,6 +1,6 @@
 """Contact shadows: dark soft spots under loose things near the floor, where shadow maps would cost too much.
 
-They are planes with a soft round texture, added to the scene for one frame as markers are. A spot is as wide as the
+They are flat boxes with a soft round texture, added to the scene for one frame as markers are. A spot is as wide as the
 thing above it and fades as the thing is lifted; it takes part in neither depth nor segmentation.
 """
 
@@ -17,8 +17,10 @@ from mjsim.render.culling import outside
 MATERIAL = "shadow_round"
 # How far a spot reaches beyond the thing, m: its texture is faint at the edge.
 _BORDER = 0.05
-# Above the lowest point of the thing, so that thin rugs do not cover it, m.
-_LIFT = 0.010
+# Above the lowest point of the thing, m: above the house's rugs and drawn shadows (at most 5 mm, docs/models.md) and
+# below the bottom of a plate (7 mm), which would look grey under it.
+_LIFT = 0.006
+_THICKNESS = 1e-4
 # Things higher than this above the floor throw no spot, m.
 _REACH = 0.3
 
@@ -83,8 +85,9 @@ class ContactShadows:
     ) -> None:
         geom = scene.geoms[scene.ngeom]
         rgba = (self._rgba * [1.0, 1.0, 1.0, strength]).astype(np.float32)
-        size = np.array([*half, 0.0])
-        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_PLANE, size, centre, np.eye(3).ravel(), rgba)
+        size = np.array([*half, _THICKNESS])
+        # A box, because the rasteriser draws translucent planes (rugs, drawn shadows) before everything translucent.
+        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_BOX, size, centre, np.eye(3).ravel(), rgba)
         geom.matid, geom.texcoord = self._material, 0
         # Left as it was by initialisation, so that a slot may still name a geom of another scene.
         geom.objtype, geom.objid = _NO_OBJECT, -1
