@@ -1,5 +1,6 @@
 """The assistant: sees the whole house, plans, judges each visit against its plan, and fills the glasses."""
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 
@@ -8,9 +9,10 @@ from numpy.typing import NDArray
 
 from experiments.conditions import TaskBoard
 from experiments.house import House
-from experiments.participants.base import Guidance
+from experiments.participants.base import Choice, Guidance
 from experiments.participants.walking import first_astray, project, rest_of
 from experiments.records import EventLog
+from experiments.regrets import Regrets, RegretsAtOnce
 from hud.conditions import condition
 from hud.projection import CameraView
 from hud.state import HudState
@@ -18,8 +20,8 @@ from hud.task import StepKind
 from mjsim.actions import EventKind, WorldEvent
 from mjsim.episode import CAPACITY, Episode
 from mjsim.observation import ObjectStatus, Observation
-from planner.plan import VisitKind
-from planner.replanner import Replanner
+from planner.plan import Status, VisitKind
+from planner.replanner import Replanner, Stop
 from planner.route import XY, Route, RouteVisit, TaskState
 
 OFF_THE_PATH = 0.6  # m from the shown path before a new one is shown
@@ -43,6 +45,8 @@ class Assistant:
         replanner: Plans routes.
         order: Object names in this participant's random order.
         log: Where plans and visits are logged.
+        regrets: Works out what alternatives cost; None for one whose answers repeat.
+        judging: Whether the regret of every visit is logged.
     """
 
     def __init__(
@@ -54,12 +58,17 @@ class Assistant:
         replanner: Replanner,
         order: Sequence[str],
         log: EventLog,
+        regrets: Regrets | None = None,
+        judging: bool = False,
     ) -> None:
         self._house = house
         self._episode = episode
         self._show = condition(assistance)
         self._replanner = replanner
         self._log = log
+        self._regrets = regrets or RegretsAtOnce(house.geodesics)
+        self._judging = judging
+        self._visits = 0
         self._board = TaskBoard(house, episode, order)
         self._number = {placed.name: i for i, placed in enumerate(episode.objects)}
         self._deliveries = {
@@ -72,7 +81,9 @@ class Assistant:
 
     def familiarise(self, observation: Observation) -> None:
         """What takes long is done before the clock starts: load the planner, plan and prove, learn prices."""
-        self._replanner.prepare(self._task_state(observation), seconds=FAMILIARISATION)
+        state = self._task_state(observation)
+        route = self._replanner.prepare(state, seconds=FAMILIARISATION)
+        self._regrets.prepare(state, route.plan)
 
     def begin(self, observation: Observation) -> None:
         """Plan for the start of the task."""
@@ -130,8 +141,31 @@ class Assistant:
         visit = self._route.next if self._route else None
         if self._path is None or visit is None:
             return None
-        ahead, goal = rest_of(self._path, *observation.position), self._goal(observation, visit)
+        ahead, goal = (
+            rest_of(self._path, *observation.position),
+            self._goal(observation, visit.kind, visit.object),
+        )
         return Guidance(visit.kind.value, visit.object, ahead, goal, way=self._path)
+
+    def choices(self, observation: Observation) -> tuple[Choice, ...]:
+        """What can be done next and what it costs compared with the best, the best first; empty until it is known."""
+        return tuple(
+            Choice(
+                kind.value,
+                name,
+                self._goal(observation, kind, name),
+                found.regret,
+                found.capped,
+                functools.partial(self._regrets.exact, (kind, name)),
+            )
+            for (kind, name), found in self._regrets.known().items()
+        )
+
+    def finish(self, time: float) -> None:
+        """The task is over: log the regrets of visits that could not be judged in time."""
+        self._regrets.close()
+        for number, regret in self._regrets.later():
+            self._log.append(time, "regret", visit=number, regret_m=_rounded(regret))
 
     def _visited(self, observation: Observation, event: WorldEvent) -> None:
         kind = VISIT_KIND[event.kind]
@@ -145,13 +179,24 @@ class Assistant:
             suggested=_as_json(suggested) if suggested else None,
             deviated=self._route is not None and not self._route.follows(kind, event.object),
             alternatives=self._alternatives(observation, event),
+            **self._judged((kind, event.object)),
             position=[round(float(v), 6) for v in here],
             geodesic_m=round(
                 self._house.body_geodesics.shortest_path(self._stood, here).geodesic_distance, 6
             ),
         )
+        self._visits += 1
         self._stood = here
         self._board.did(STEP[kind], event.object)
+
+    def _judged(self, stop: Stop) -> dict[str, float | None]:
+        """Extra cost of a visit, if that is wanted. The next one of a plan that is proven has none."""
+        if not self._judging:
+            return {}
+        route = self._route
+        if route is not None and route.follows(*stop) and route.plan.status is Status.OPTIMAL:
+            return {"regret_m": 0.0}
+        return {"regret_m": _rounded(self._regrets.judge(self._visits, stop))}
 
     def _alternatives(self, observation: Observation, event: WorldEvent) -> int:
         """How many other visits were feasible when this one was made."""
@@ -167,7 +212,9 @@ class Assistant:
         """Follow the plan on, or make a new one where the task is no longer as planned."""
         before = self._replanner.replans
         first = self._route is None
-        self._route = self._replanner.update(self._task_state(observation))
+        state = self._task_state(observation)
+        self._route = self._replanner.update(state)
+        self._regrets.begin(state, self._route.plan)
         self._show_way(observation, observation.position)
         if not first and self._replanner.replans == before:
             return
@@ -210,17 +257,17 @@ class Assistant:
     def _position_of(self, observation: Observation, name: str) -> NDArray[np.float64]:
         return observation.object_positions[self._number[name], :2]
 
-    def _goal(self, observation: Observation, visit: RouteVisit) -> NDArray[np.float64]:
+    def _goal(self, observation: Observation, kind: VisitKind, name: str) -> NDArray[np.float64]:
         """Where a visit happens: the object itself, or the middle of the receptacle, m, (2,)."""
-        if visit.kind is VisitKind.PICK:
-            return self._position_of(observation, visit.object)
-        return self._house.receptacles[self._episode.targets[visit.object]].center[:2]
+        if kind is VisitKind.PICK:
+            return self._position_of(observation, name)
+        return self._house.receptacles[self._episode.targets[name]].center[:2]
 
     def _show_way(self, observation: Observation, start: NDArray[np.float64]) -> None:
         visit = self._route.next if self._route else None
         self._path = None
         if visit is not None:
-            self._path_goal = self._goal(observation, visit).copy()
+            self._path_goal = self._goal(observation, visit.kind, visit.object).copy()
             target = self._path_goal if visit.kind is VisitKind.PICK else self._deliveries[visit.object]
             self._path = self._house.geodesics.shortest_path(start, target).points
 
@@ -230,7 +277,9 @@ class Assistant:
             return False
         x, y = observation.position
         strayed = project(self._path, x, y)[1] > OFF_THE_PATH
-        return strayed or math.dist(self._goal(observation, visit), self._path_goal) > MOVED
+        return (
+            strayed or math.dist(self._goal(observation, visit.kind, visit.object), self._path_goal) > MOVED
+        )
 
     def _ahead(self, observation: Observation) -> NDArray[np.float64] | None:
         """What is left of the shown way, from the point of it nearest to the person, m, (k, 2)."""
@@ -239,6 +288,10 @@ class Assistant:
 
 def _xy(point: NDArray[np.float64]) -> XY:
     return float(point[0]), float(point[1])
+
+
+def _rounded(metres: float | None) -> float | None:
+    return None if metres is None else round(metres, 6)
 
 
 def _as_json(visit: RouteVisit) -> list[str]:

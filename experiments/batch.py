@@ -37,6 +37,7 @@ class BatchConfig:
         house: House name, or path of a catalogue.
         planner: Solver of the routing problem.
         fidelity: How much of the world is physics.
+        regret: Judge every visit.
     """
 
     objects: Sequence[int]
@@ -46,6 +47,7 @@ class BatchConfig:
     house: str = "apartment"
     planner: str = TrialConfig.planner
     fidelity: str = TrialConfig.fidelity
+    regret: bool = True
 
     def __post_init__(self) -> None:
         for name in ("objects", "assistance", "seeds"):
@@ -66,6 +68,7 @@ class BatchConfig:
                 house=self.house,
                 planner=self.planner,
                 fidelity=self.fidelity,
+                regret=self.regret,
             )
 
 

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from experiments.records import Event
 
+REGRETFUL = 0.01  # m
+
 
 @dataclass(frozen=True)
 class Metrics:
@@ -24,6 +26,11 @@ class Metrics:
         replans: How often the plan was made anew after the first, because the task was no longer as planned.
         refusals: Infeasible attempts.
         failures: Picks and places that were begun but did not succeed in the physics, and objects lost from a hand.
+        mean_regret_m: By how much a visit makes the rest of the task longer than the best one at that moment, m; the
+            mean of all judged visits, None if there is none.
+        total_regret_m: Their sum, m: how much longer the way is for the order of visits alone; or None.
+        regretful_visits: Visits that cost more than 1 cm. The others are the best or as good: a tie is no mistake.
+        unjudged_visits: Visits whose regret is not known: the planner could not prove it, or nobody asked.
     """
 
     delivered: int
@@ -35,6 +42,10 @@ class Metrics:
     replans: int
     refusals: int
     failures: int
+    mean_regret_m: float | None
+    total_regret_m: float | None
+    regretful_visits: int
+    unjudged_visits: int
 
 
 def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> Metrics:
@@ -56,6 +67,7 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
     shortest = float(sum(v["geodesic_m"] for v in visits))
     delivered = [e for e in events if e["event"] == "placed"]
     dislodged = sum(e["event"] == "dislodged" for e in events)
+    regrets = _regrets(events, visits)
     return Metrics(
         delivered=len(delivered) - dislodged,
         normalized_deviations=deviations / len(choices) if choices else 0.0,
@@ -66,4 +78,15 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
         replans=max(sum(not p.get("improved", False) for p in plans) - 1, 0),
         refusals=sum(e["event"] == "attempt" and not e["applied"] for e in events),
         failures=sum(e["event"] in ("pick_failed", "place_failed", "grip_lost") for e in events),
+        mean_regret_m=sum(regrets) / len(regrets) if regrets else None,
+        total_regret_m=sum(regrets) if regrets else None,
+        regretful_visits=sum(regret > REGRETFUL for regret in regrets),
+        unjudged_visits=len(visits) - len(regrets),
     )
+
+
+def _regrets(events: Sequence[Event], visits: Sequence[Event]) -> list[float]:
+    """Regrets that are known, m: logged with the visit, or later under its number."""
+    found = {k: visit.get("regret_m") for k, visit in enumerate(visits)}
+    found |= {e["visit"]: e["regret_m"] for e in events if e["event"] == "regret"}
+    return [float(regret) for regret in found.values() if regret is not None]

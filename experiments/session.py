@@ -138,6 +138,7 @@ class Session:
         except PhysicsError as error:
             self._log.append(self._recorded_until, "end", reason=PHYSICS_ERROR, error=str(error))
             raise
+        self._assistant.finish(self._now.time)
         self._log.append(self._now.time, "end", reason=reason)
         return reason
 
@@ -260,6 +261,7 @@ class Session:
             look=partial(self._look, seen),
             find_guidance=partial(self._guidance, seen),
             find_flagpoles=partial(self._flagpoles, seen),
+            find_choices=partial(self._assistant.choices, seen),
         )
 
     def _look(self, observation: Observation) -> dict[str, NDArray[np.float64]]:

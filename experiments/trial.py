@@ -22,6 +22,7 @@ from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
 from experiments.recording import provenance
 from experiments.records import EventLog
+from experiments.regrets import RegretsAtOnce, RegretsBeside
 from experiments.session import OnProgress, Session, Viewer
 from experiments.video import VideoWriter
 from mjsim.errors import PhysicsError
@@ -53,6 +54,7 @@ class TrialConfig:
             the clock starts. Such a run depends on how fast the machine is; a replay of it shows the plans that were
             shown.
         fidelity: How much of the world is physics: `full`, `windows` or `event` (docs/fidelity.md).
+        regret: Judge every visit: by how much it made the rest of the task longer than the best one would have.
     """
 
     objects: int
@@ -64,6 +66,7 @@ class TrialConfig:
     time_limit: float | None = None
     live: bool = False
     fidelity: str = WorldOptions.fidelity
+    regret: bool = True
 
     def __post_init__(self) -> None:
         if self.fidelity not in FIDELITIES:
@@ -256,6 +259,8 @@ def prepare_session(
         replanner=replanner or Replanner(house.geodesics, solver(config.planner)),
         order=order,
         log=log,
+        regrets=(RegretsBeside if config.live else RegretsAtOnce)(house.geodesics),
+        judging=config.regret,
     )
     if config.live:
         assistant.familiarise(world.observation())

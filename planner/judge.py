@@ -19,7 +19,9 @@ from planner.regret import RADIUS, Regret, after, ranked, regrets
 from planner.replanner import Replanner, Stop, name_of
 from planner.route import XY, TaskState
 from planner.solver import SolveLimit
-from planner.tour import integer_metric, possible_next
+from planner.tour import integer_metric, possible_next, tour_length
+
+SAME = 1e-6  # m
 
 Spots = Mapping[tuple[VisitKind, str], XY]
 
@@ -66,17 +68,18 @@ class Judge:
 
         Args:
             state: The task as it is now.
-            plan: A plan for exactly this state, if there is one: if it is proven it need not be found again.
+            plan: What was planned for this state or before it; if it is proven and of this state, no other is searched.
 
         Raises:
             UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
             ProblemError: More is carried than the capacity allows.
         """
-        if self._last is None or not _same(self._last[0], state):
+        if self._last is None or not same_state(self._last[0], state):
             problem, names, spots = self._tasks.task(state)
             found = self._by_table(problem, names, state, spots)
             if found is None:
-                found = regrets(problem, self._solver, limit=self._limit, radius=self._radius, plan=plan)
+                best = plan if plan is not None and _is_best(plan, problem) else None
+                found = regrets(problem, self._solver, limit=self._limit, radius=self._radius, plan=best)
             self._last = state, {name_of(regret.visit, names, state): regret for regret in found}
         return dict(self._last[1])
 
@@ -91,7 +94,7 @@ class Judge:
         Returns:
             The exact regret, however large; None where the visit is not possible or nothing is proven.
         """
-        if self._last is not None and _same(self._last[0], state):
+        if self._last is not None and same_state(self._last[0], state):
             known = self._last[1].get(stop)
             if known is not None and known.proven and not known.capped:
                 return known.regret
@@ -102,7 +105,7 @@ class Judge:
         found = self._by_table(problem, names, state, spots)
         if found is not None:
             return next(regret.regret for regret in found if regret.visit == visits[stop])
-        before = plan if plan is not None and plan.status is Status.OPTIMAL else self._solve(problem)
+        before = plan if plan is not None and _is_best(plan, problem) else self._solve(problem)
         rest = self._rest(problem, visits[stop], before)
         if not before.status is rest.status is Status.OPTIMAL:
             return None
@@ -136,6 +139,16 @@ class Judge:
         return ranked(problem, costs, max(costs.values(), default=0), costs)
 
 
+def _is_best(plan: Plan, problem: RoutingProblem) -> bool:
+    """Whether it is a proven plan of this very problem, and not of an earlier state of the task."""
+    if plan.status is not Status.OPTIMAL or len(plan.visits) != 2 * len(problem.shipments) + len(
+        problem.onboard
+    ):
+        return False
+    length = tour_length(problem.distances, problem.start, plan.visits)
+    return abs(length - plan.cost) <= SAME
+
+
 def _known(plan: Plan, visit: Visit) -> Warm | None:
     """What a plan says of the problem after a visit."""
     certificate = plan.certificate
@@ -152,7 +165,8 @@ def _known(plan: Plan, visit: Visit) -> Warm | None:
     )
 
 
-def _same(one: TaskState, other: TaskState) -> bool:
+def same_state(one: TaskState, other: TaskState) -> bool:
+    """Whether person and objects are where they were; where things belong does not change."""
     return one is other or (one.position, one.carried, one.loose) == (
         other.position,
         other.carried,

@@ -48,6 +48,26 @@ def test_without_any_choice_there_are_no_deviations():
     assert compute_metrics(log(visit(1, alternatives=0)), STRAIGHT).normalized_deviations == 0.0
 
 
+def test_regrets_add_up_and_a_tie_is_no_mistake():
+    visits = [{**visit(t), "regret_m": m} for t, m in ((1, 0.0), (2, 0.004), (3, 2.5), (4, None))]
+    metrics = compute_metrics(log(*visits), STRAIGHT)
+    assert metrics.total_regret_m == pytest.approx(2.504)
+    assert metrics.mean_regret_m == pytest.approx(2.504 / 3)
+    assert (metrics.regretful_visits, metrics.unjudged_visits) == (1, 1)
+
+
+def test_regrets_that_came_later_count_for_their_visits():
+    later = {"t": 9.0, "event": "regret", "visit": 1, "regret_m": 0.7}
+    metrics = compute_metrics(log({**visit(1), "regret_m": 0.0}, visit(2), later), STRAIGHT)
+    assert (metrics.total_regret_m, metrics.unjudged_visits) == (0.7, 0)
+
+
+def test_where_nobody_judged_there_is_no_regret_to_speak_of():
+    metrics = compute_metrics(log(visit(1), visit(2)), STRAIGHT)
+    assert (metrics.mean_regret_m, metrics.total_regret_m) == (None, None)
+    assert (metrics.regretful_visits, metrics.unjudged_visits) == (0, 2)
+
+
 def test_completion_time_is_that_of_the_last_delivery():
     placed = [{"t": t, "event": "placed"} for t in (5.0, 11.5)]
     metrics = compute_metrics(log(*placed, end=11.5), STRAIGHT)

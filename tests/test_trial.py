@@ -56,6 +56,17 @@ def test_a_full_follower_never_deviates(runs):
     assert read_json(runs / "optimal" / records.METRICS)["normalized_deviations"] == 0.0
 
 
+def test_every_visit_is_judged_and_following_costs_nothing(runs):
+    for assistance in ("none", "highlight", "optimal"):
+        metrics = read_json(runs / assistance / records.METRICS)
+        visits = [e for e in read_events(runs / assistance / records.EVENTS) if e["event"] == "visit"]
+        assert metrics["unjudged_visits"] == 0
+        assert metrics["total_regret_m"] == pytest.approx(sum(v["regret_m"] for v in visits))
+        assert all(v["regret_m"] == 0 for v in visits if not v["deviated"])
+        assert all(v["regret_m"] >= 0 for v in visits)
+        assert (metrics["total_regret_m"] > 0) == (assistance != "optimal")
+
+
 def test_the_record_agrees_with_itself(runs):
     folder = runs / "optimal"
     metrics, events = read_json(folder / records.METRICS), read_events(folder / records.EVENTS)

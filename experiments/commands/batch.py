@@ -20,6 +20,7 @@ from experiments.commands.options import (
     add_fidelity,
     add_house,
     add_planner,
+    add_regret,
     add_user,
     assistance_help,
     int_list,
@@ -61,6 +62,7 @@ def add_parser(commands: Any) -> None:
     add_house(parser)
     add_planner(parser)
     add_fidelity(parser)
+    add_regret(parser)
     parser.add_argument(
         "--workers", type=int, default=os.cpu_count(), metavar="N", help="processes (one per core)"
     )
@@ -78,6 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
         house=arguments.house,
         planner=arguments.planner,
         fidelity=arguments.fidelity,
+        regret=arguments.regret,
     )
     console = Console(stderr=True)
     columns = (

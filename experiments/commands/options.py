@@ -90,6 +90,16 @@ def add_fidelity(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_regret(parser: argparse.ArgumentParser) -> None:
+    """Add `--no-regret`."""
+    parser.add_argument(
+        "--no-regret",
+        dest="regret",
+        action="store_false",
+        help="do not work out what each visit cost compared with the best one (up to a second a trial)",
+    )
+
+
 def add_frame(
     parser: argparse.ArgumentParser, *, size: tuple[int, int] = (640, 480), profile: str = FAST.name
 ) -> None:

@@ -13,6 +13,7 @@ from experiments.commands.options import (
     add_frame,
     add_house,
     add_planner,
+    add_regret,
     add_user,
     assistance_help,
 )
@@ -27,6 +28,8 @@ SHOWN = (
     ("optimal_distance_m", "planned at the start", "{:.1f} m"),
     ("inverse_path_length", "inverse path length", "{:.3f}"),
     ("normalized_deviations", "normalized deviations", "{:.3f}"),
+    ("regretful_visits", "visits that cost extra", "{}"),
+    ("total_regret_m", "what they cost", "{:.2f} m"),
     ("replans", "replans", "{}"),
     ("refusals", "refusals", "{}"),
     ("max_penetration_m", "deepest penetration", "{:.4f} m"),
@@ -74,6 +77,7 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="plan against the clock, with proofs in the background, as for a person (see above)",
     )
+    add_regret(parser)
     parser.add_argument(
         "--time-limit", type=float, metavar="S", help="simulated seconds after which the trial ends"
     )
@@ -95,6 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
         time_limit=arguments.time_limit,
         live=arguments.live,
         fidelity=arguments.fidelity,
+        regret=arguments.regret,
     )
     film = None if arguments.no_video else FilmConfig(arguments.size[0], arguments.size[1], arguments.profile)
     console = Console(stderr=True)
@@ -119,9 +124,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _show_metrics(console: Console, metrics: dict[str, Any], out: Path) -> None:
     table = Table(show_header=False, box=None)
     for key, label, form in SHOWN:
-        table.add_row(
-            label, form.format(metrics[key]) + (f" of {metrics['objects']}" if key == "delivered" else "")
-        )
+        value = "unknown" if metrics[key] is None else form.format(metrics[key])
+        table.add_row(label, value + (f" of {metrics['objects']}" if key == "delivered" else ""))
     console.print(table)
     if metrics["ended"] != "all delivered":
         console.print(f"ended early: {metrics['ended']}")

@@ -1,6 +1,6 @@
 """What a simulated participant perceives and how it answers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, runtime_checkable
@@ -35,6 +35,27 @@ class Guidance:
     path: NDArray[np.float64]
     goal: Point
     way: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A visit that is possible next, and what it costs compared with the best one.
+
+    Attributes:
+        kind: `pick` or `place`.
+        object: Instance name.
+        goal: Where the object or the receptacle is, m, shape (2,).
+        regret: By how much it makes the rest of the task longer, m, as of the last visit.
+        capped: Whether `regret` is only a lower bound.
+        find_exact: Gives the exact regret, m, or None where nothing is proven; takes some 0.1 s.
+    """
+
+    kind: str
+    object: str
+    goal: Point
+    regret: float
+    capped: bool
+    find_exact: Callable[[], float | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +97,7 @@ class Percept:
         look: Misplaced objects in view at this moment -> their floor position, m; computed only when asked.
         find_guidance: Gives `guidance`.
         find_flagpoles: Gives `flagpoles`.
+        find_choices: Gives `choices`.
     """
 
     time: float
@@ -90,6 +112,7 @@ class Percept:
     look: Callable[[], Mapping[str, Point]]
     find_guidance: Callable[[], Guidance | None]
     find_flagpoles: Callable[[], Mapping[str, Point]]
+    find_choices: Callable[[], Sequence[Choice]] = tuple
 
     @cached_property
     def guidance(self) -> Guidance | None:
@@ -100,6 +123,14 @@ class Percept:
     def flagpoles(self) -> Mapping[str, Point]:
         """Object instance name -> floor position of the flagpole over it, m; empty in conditions without."""
         return self.find_flagpoles()
+
+    @cached_property
+    def choices(self) -> Sequence[Choice]:
+        """All visits that are possible next with their regrets, the best first: for models of people, who know less.
+
+        Empty when all is done, and beside a person until the regrets are known.
+        """
+        return self.find_choices()
 
     @cached_property
     def nearby(self) -> Mapping[str, Point]:
