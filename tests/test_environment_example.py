@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from experiments.examples.breadcrumbs import breadcrumb_sensor
 from experiments.examples.demonstrations import demonstrate, encode
 from experiments.house import House
 from mjsim.actions import Move, Pick, Place
@@ -80,3 +81,38 @@ def test_actions_are_encoded_for_continuous_control(core: Rearrangement) -> None
         assert type(asked) is type(action)
         if isinstance(action, Move) and isinstance(asked, Move):
             assert (asked.forward, asked.left, asked.turn) == pytest.approx((0.7, -0.3, 1.1), abs=1e-6)
+
+
+def test_following_the_breadcrumbs_leads_around_the_walls_to_the_nearest_object(house: House) -> None:
+    """Walking where the sensor points, and nothing else, arrives; what is left shrinks by what was walked."""
+    core = build(
+        EnvironmentOptions(
+            objects=2,
+            actions=Continuous(repeat=3),
+            observations=(breadcrumb_sensor(house.known()),),
+            time_limit=30.0,
+            navigable=lambda *_: house.navmesh,
+        )
+    )
+    seen, _ = core.reset(0)
+
+    def metres_left() -> float:
+        return float(seen["breadcrumbs"][2]) * core.layout.scale
+
+    def straight() -> float:
+        gaps = core.state.object_positions[:, :2] - core.state.position
+        return float(np.linalg.norm(gaps, axis=1).min())
+
+    first, walked = metres_left(), 0.0
+    assert first > 1.5 * straight() > 3.0, "a wall is in between"
+    while metres_left() > 0.8:
+        forward, aside, _ = seen["breadcrumbs"]
+        turn = np.clip(2.0 * np.arctan2(aside, forward), -1.0, 1.0)
+        before = core.state.position.copy()
+        taken = core.step(np.array([0.8 if abs(turn) < 0.5 else 0.0, 0.0, turn, 0.0], np.float32))
+        assert not taken.truncated
+        seen = taken.observation
+        walked += float(np.linalg.norm(core.state.position - before))
+    assert walked + metres_left() == pytest.approx(first, rel=0.1)
+    assert straight() < 1.3
+    core.close()

@@ -3,9 +3,10 @@
     pip install -e '.[learn]'
     python -m experiments.examples.behaviour_cloning
 
-A built-in participant demonstrates; a policy of Stable-Baselines3 is fitted to its actions, on its own episodes and,
-with `--rounds`, on episodes in which the learner acts and is corrected (DAgger). The policy's share of delivered
-objects in episodes it never saw is printed before and after. It runs on a CPU in a few minutes.
+A built-in participant demonstrates; a policy of Stable-Baselines3 is fitted to its actions, on its own episodes and
+then, for a number of rounds, on episodes in which the learner acts and is corrected (DAgger). The learner wears the
+glasses: a sensor tells it where the breadcrumbs lead. The policy's share of delivered objects in episodes it never saw
+is printed before and after. It runs on a CPU in a few minutes.
 """
 
 import argparse
@@ -22,11 +23,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 from stable_baselines3 import PPO
 
+from experiments.examples.breadcrumbs import breadcrumb_sensor
 from experiments.examples.demonstrations import Demonstrations, demonstrate
 from experiments.house import House
 from mjsim.environments.control import Continuous
 from mjsim.environments.core import ObservationDict
 from mjsim.environments.gymnasium_environment import RearrangeEnv
+from mjsim.environments.sensors import Sensor
 
 UNSEEN = 1_000_000  # first seed of the evaluation; far from those of the demonstrations
 TRIGGER_WEIGHT = 10.0  # attempts are rare and decide everything
@@ -39,24 +42,28 @@ class Settings:
     Attributes:
         episodes: Houses to learn in.
         rounds: Rounds in which the learner acts and is corrected.
+        glasses: Whether the learner sees where the breadcrumbs lead.
         epochs: Passes over the data in each round.
         evaluation: Unseen episodes to measure in.
         seed: Of everything.
     """
 
     episodes: int = 80
-    rounds: int = 0
+    rounds: int = 1
+    glasses: bool = True
     epochs: int = 15
     evaluation: int = 20
     seed: int = 0
 
 
-def make_environment(episodes: int | None, time_limit: float) -> RearrangeEnv:
+def make_environment(
+    episodes: int | None, time_limit: float, breadcrumbs: Sequence[Sensor] = ()
+) -> RearrangeEnv:
     """One object, eight decisions a second."""
     made = gymnasium.make(
         "mjsim/Rearrange-v0",
         objects=1,
-        observations=("state",),
+        observations=("state", *breadcrumbs),
         actions=Continuous(repeat=3),
         time_limit=time_limit,
         episodes=episodes,
@@ -77,7 +84,9 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
     torch.manual_seed(settings.seed)
     torch.set_num_threads(1)  # the network is small: more threads wait for each other
     rng = np.random.default_rng(settings.seed)
-    house, environment = House.load(), make_environment(settings.episodes, 30.0)
+    house = House.load()
+    sensors = (breadcrumb_sensor(house.known()),) if settings.glasses else ()
+    environment = make_environment(settings.episodes, 30.0, sensors)
     model = PPO(
         "MultiInputPolicy",
         environment,
@@ -90,7 +99,7 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
         action, _ = model.predict(observation, deterministic=True)
         return np.asarray(action, np.float32)
 
-    before = evaluate(model, settings.evaluation)
+    before = evaluate(model, make_environment(None, 60.0, sensors), settings.evaluation)
     console.print(f"before: {before:.0%} delivered in {settings.evaluation} unseen episodes")
     gathered: list[Demonstrations] = []
     for number in range(settings.rounds + 1):
@@ -110,7 +119,7 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
             f"round {number}: the {who} delivered {shown.delivered:.0%}; {sum(len(d.actions) for d in gathered)} rows, "
             f"loss {loss:.4f}, {time.perf_counter() - started:.0f} s"
         )
-    after = evaluate(model, settings.evaluation)
+    after = evaluate(model, make_environment(None, 60.0, sensors), settings.evaluation)
     console.print(f"after: {after:.0%} delivered in {settings.evaluation} unseen episodes")
     environment.close()
     return model, before, after
@@ -142,9 +151,8 @@ def fit(model: Any, shown: Sequence[Demonstrations], *, epochs: int, rng: np.ran
     return float(np.mean(losses))
 
 
-def evaluate(model: Any, episodes: int) -> float:
-    """Share of the objects that the policy delivers in episodes it never saw."""
-    environment = make_environment(None, 60.0)
+def evaluate(model: Any, environment: RearrangeEnv, episodes: int) -> float:
+    """Share of the objects that the policy delivers in episodes it never saw; closes the environment."""
     delivered = total = 0
     for seed in range(UNSEEN, UNSEEN + episodes):
         seen, info = environment.reset(seed=seed)
@@ -164,11 +172,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Train an agent to deliver an object, by imitation.")
     parser.add_argument("--episodes", type=int, default=Settings.episodes, help="houses to learn in")
     parser.add_argument("--rounds", type=int, default=Settings.rounds, help="rounds of correction")
+    parser.add_argument(
+        "--without-glasses", action="store_true", help="do not show where the breadcrumbs lead"
+    )
     parser.add_argument("--seed", type=int, default=Settings.seed)
     parser.add_argument("--out", type=Path, default=None, help="where to save the trained model (.zip)")
     given = parser.parse_args()
     console = Console()
-    settings = Settings(episodes=given.episodes, rounds=given.rounds, seed=given.seed)
+    settings = Settings(
+        episodes=given.episodes, rounds=given.rounds, seed=given.seed, glasses=not given.without_glasses
+    )
     model, _, _ = learn(settings, console)
     if given.out is not None:
         model.save(given.out)
