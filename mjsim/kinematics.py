@@ -131,16 +131,18 @@ class Floor(NamedTuple):
     """Outlines of what the trunk meets, with a grid that says which are near; for kernels.
 
     Attributes:
-        corners: Corners of all convex polygons, counter-clockwise, m, shape (c, 2).
-        first: Polygon p has the corners `first[p]` to `first[p + 1]`, shape (p + 1,).
+        edges: Edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, shape (e, 5).
+        first: Polygon p has the edges `first[p]` to `first[p + 1]`, shape (p + 1,).
+        boxes: Each polygon's least and largest x, and least and largest y, m, shape (p, 4).
         near: Polygons that may touch the trunk, cell by cell.
         near_first: Cell i, j has the entries of `near` from `near_first[i * columns + j]`, shape (cells + 1,).
         origin_x, origin_y: Corner of cell 0, 0, m.
         rows, columns: Cells along x and y.
     """
 
-    corners: NDArray[np.float64]
+    edges: NDArray[np.float64]
     first: NDArray[np.int64]
+    boxes: NDArray[np.float64]
     near: NDArray[np.int64]
     near_first: NDArray[np.int64]
     origin_x: float
@@ -161,10 +163,10 @@ class Floor(NamedTuple):
     @classmethod
     def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
         """Convex counter-clockwise polygons (k, 2), m, for a trunk of this radius, m."""
-        corners = np.concatenate([np.zeros((0, 2)), *polygons])
         reach = radius + _LONGEST + 0.01
-        low, high = (corners.min(axis=0), corners.max(axis=0)) if len(corners) else (np.zeros(2), np.ones(2))
-        low, high = low - reach, high + reach
+        boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
+        low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
+        high = boxes[:, 2:].max(axis=0, initial=-np.inf) + reach if len(polygons) else np.ones(2)
         rows, columns = (int(n) for n in np.ceil((high - low) / _CELL))
         i, j = (index.ravel() for index in np.mgrid[:rows, :columns])
         x, y = low[0] + _CELL * i, low[1] + _CELL * j
@@ -172,10 +174,12 @@ class Floor(NamedTuple):
         tree = shapely.STRtree([shapely.Polygon(polygon) for polygon in polygons])
         cell, near = tree.query(cells, predicate="dwithin", distance=reach)
         order = np.lexsort((near, cell))
+        edges = [_edges(polygon) for polygon in polygons]
         counts = np.bincount(cell, minlength=rows * columns)
         return cls(
-            corners=np.ascontiguousarray(corners),
-            first=np.cumsum([0, *(len(polygon) for polygon in polygons)], dtype=np.int64),
+            edges=np.concatenate([np.zeros((0, 5)), *edges]),
+            first=np.cumsum([0, *(len(sides) for sides in edges)], dtype=np.int64),
+            boxes=np.ascontiguousarray(boxes[:, [0, 2, 1, 3]]),
             near=np.ascontiguousarray(near[order].astype(np.int64)),
             near_first=np.concatenate(([0], np.cumsum(counts))).astype(np.int64),
             origin_x=float(low[0]),
@@ -183,6 +187,14 @@ class Floor(NamedTuple):
             rows=rows,
             columns=columns,
         )
+
+
+def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Start, direction and length of the sides of a polygon (k, 2), shape (k, 5); none of length 0."""
+    sides = np.roll(polygon, -1, axis=0) - polygon
+    lengths = np.hypot(sides[:, 0], sides[:, 1])
+    keep = lengths > 0.0
+    return np.column_stack((polygon[keep], sides[keep] / lengths[keep, None], lengths[keep]))
 
 
 def standing(x: float, y: float, heading: float, pitch: float = avatar.START_PITCH) -> NDArray[np.float64]:
@@ -253,39 +265,74 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
     to_y = s * body[FORWARD] + c * body[LEFT]
     to_turn, to_pitch = body[TURN], body[LOOK]
     h = gait.dt / gait.substeps
-    from_x, from_y, from_turn, from_pitch = body[SERVO], body[SERVO + 1], body[SERVO + 2], body[SERVO + 3]
+    ramp_x, ramp_y = (to_x - body[SERVO]) / gait.substeps, (to_y - body[SERVO + 1]) / gait.substeps
+    ramp_turn, ramp_pitch = (
+        (to_turn - body[SERVO + 2]) / gait.substeps,
+        (to_pitch - body[SERVO + 3]) / gait.substeps,
+    )
+    walk, turn = _servo(gait.mass, gait.walk_gain, h), _servo(gait.inertia, gait.turn_gain, h)
+    head = _servo(gait.head_inertia, gait.head_damping, h)
+    # No servo overshoots what it was told before or is told now.
+    reach_x = gait.radius + gait.dt * max(abs(body[VX]), abs(body[SERVO]), abs(to_x))
+    reach_y = gait.radius + gait.dt * max(abs(body[VY]), abs(body[SERVO + 1]), abs(to_y))
+    free = _free(body[X], body[Y], reach_x, reach_y, gait.radius, floor)
     for k in range(1, gait.substeps + 1):
-        share = k / gait.substeps
-        x = from_x + share * (to_x - from_x)
-        y = from_y + share * (to_y - from_y)
-        turn = from_turn + share * (to_turn - from_turn)
-        pitch = from_pitch + share * (to_pitch - from_pitch)
-        body[VX] = _follow(body[VX], x, gait.mass, gait.walk_gain, gait.walk_force, h)
-        body[VY] = _follow(body[VY], y, gait.mass, gait.walk_gain, gait.walk_force, h)
-        body[TURN_RATE] = _follow(body[TURN_RATE], turn, gait.inertia, gait.turn_gain, gait.turn_force, h)
-        spring = gait.head_stiffness * (pitch - body[PITCH])
-        body[PITCH_RATE] = _driven(
-            body[PITCH_RATE], spring, gait.head_inertia, gait.head_damping, gait.head_force, h
-        )
-        _stride(body, h, gait.radius, floor)
+        push_x = gait.walk_gain * (body[SERVO] + k * ramp_x)
+        push_y = gait.walk_gain * (body[SERVO + 1] + k * ramp_y)
+        torque = gait.turn_gain * (body[SERVO + 2] + k * ramp_turn)
+        spring = gait.head_stiffness * (body[SERVO + 3] + k * ramp_pitch - body[PITCH])
+        body[VX] = _driven(body[VX], push_x, gait.walk_gain, gait.walk_force, walk)
+        body[VY] = _driven(body[VY], push_y, gait.walk_gain, gait.walk_force, walk)
+        body[TURN_RATE] = _driven(body[TURN_RATE], torque, gait.turn_gain, gait.turn_force, turn)
+        body[PITCH_RATE] = _driven(body[PITCH_RATE], spring, gait.head_damping, gait.head_force, head)
+        if free:
+            body[X] += h * body[VX]
+            body[Y] += h * body[VY]
+        else:
+            _stride(body, h, gait.radius, floor)
         body[HEADING] += h * body[TURN_RATE]
         body[PITCH] += h * body[PITCH_RATE]
     body[SERVO], body[SERVO + 1], body[SERVO + 2], body[SERVO + 3] = to_x, to_y, to_turn, to_pitch
 
 
 @kernel
-def _follow(speed: float, wanted: float, mass: float, gain: float, limit: float, h: float) -> float:
-    """Speed of a velocity servo one physics step later."""
-    return _driven(speed, gain * wanted, mass, gain, limit, h)
+def _servo(mass: float, damping: float, h: float) -> tuple[float, float, float]:
+    """What of its speed a servo keeps in a physics step, what it gains by a force, and what of that undamped."""
+    return mass / (mass + h * damping), h / (mass + h * damping), h / mass
 
 
 @kernel
-def _driven(speed: float, push: float, mass: float, damping: float, limit: float, h: float) -> float:
+def _driven(
+    speed: float, push: float, damping: float, limit: float, servo: tuple[float, float, float]
+) -> float:
     """Speed after a step under the force `push - damping * speed`, implicit in the damping unless saturated."""
     force = push - damping * speed
     if force > limit or force < -limit:
-        return speed + h * min(limit, max(-limit, force)) / mass
-    return (mass * speed + h * push) / (mass + h * damping)
+        return speed + servo[2] * min(limit, max(-limit, force))
+    return servo[0] * speed + servo[1] * push
+
+
+@kernel
+def _free(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
+    """Whether no outline comes within these distances along x and y."""
+    if max(reach_x, reach_y) > radius + _LONGEST:
+        return False  # farther than the grid knows
+    start, end = _near(x, y, floor)
+    for entry in range(start, end):
+        box = floor.boxes[floor.near[entry]]
+        if box[0] - reach_x < x < box[1] + reach_x and box[2] - reach_y < y < box[3] + reach_y:
+            return False
+    return True
+
+
+@kernel
+def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
+    """Which entries of `Floor.near` are those of a point's cell."""
+    i, j = math.floor((x - floor.origin_x) / _CELL), math.floor((y - floor.origin_y) / _CELL)
+    if not (0 <= i < floor.rows and 0 <= j < floor.columns):
+        return 0, 0
+    cell = i * floor.columns + j
+    return floor.near_first[cell], floor.near_first[cell + 1]
 
 
 @kernel
@@ -297,11 +344,7 @@ def _stride(body: NDArray[np.float64], h: float, radius: float, floor: Floor) ->
         x, y = body[X], body[Y]
         body[X] += body[VX] * (h / parts)
         body[Y] += body[VY] * (h / parts)
-        i, j = int((x - floor.origin_x) / _CELL), int((y - floor.origin_y) / _CELL)
-        if x < floor.origin_x or y < floor.origin_y or i >= floor.rows or j >= floor.columns:
-            continue
-        cell = i * floor.columns + j
-        start, end = floor.near_first[cell], floor.near_first[cell + 1]
+        start, end = _near(x, y, floor)
         if start < end and not _push_out(body, radius, floor, start, end):
             # Wedged between walls: stay where it was.
             body[X], body[Y], body[VX], body[VY] = x, y, 0.0, 0.0
@@ -314,9 +357,12 @@ def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int
         free = True
         for entry in range(start, end):
             polygon = floor.near[entry]
-            gap, nx, ny = _gap(
-                body[X], body[Y], floor.corners, floor.first[polygon], floor.first[polygon + 1]
-            )
+            box = floor.boxes[polygon]
+            if not (
+                box[0] - radius < body[X] < box[1] + radius and box[2] - radius < body[Y] < box[3] + radius
+            ):
+                continue
+            gap, nx, ny = _gap(body[X], body[Y], floor.edges, floor.first[polygon], floor.first[polygon + 1])
             if gap >= radius - _TOUCHING:
                 continue
             free = False
@@ -332,28 +378,21 @@ def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int
 
 
 @kernel
-def _gap(
-    x: float, y: float, corners: NDArray[np.float64], first: int, last: int
-) -> tuple[float, float, float]:
+def _gap(x: float, y: float, edges: NDArray[np.float64], first: int, last: int) -> tuple[float, float, float]:
     """Signed distance of a point to a convex polygon, m, and the direction away from it."""
     nearest, near_x, near_y = math.inf, 0.0, 0.0
     depth, out_x, out_y = -math.inf, 0.0, 0.0
-    ax, ay = corners[last - 1, 0], corners[last - 1, 1]
-    for corner in range(first, last):
-        bx, by = corners[corner, 0], corners[corner, 1]
-        ex, ey = bx - ax, by - ay
-        length = math.sqrt(ex * ex + ey * ey)
-        if length > 0.0:
-            ex, ey = ex / length, ey / length
-            along = min(length, max(0.0, (x - ax) * ex + (y - ay) * ey))
-            beside = (x - ax) * ey - (y - ay) * ex  # positive outside, to the right of the edge
-            if beside > depth:
-                depth, out_x, out_y = beside, ey, -ex
-            dx, dy = x - ax - along * ex, y - ay - along * ey
-            distance = dx * dx + dy * dy
-            if distance < nearest:
-                nearest, near_x, near_y = distance, dx, dy
-        ax, ay = bx, by
+    for edge in range(first, last):
+        dx, dy = x - edges[edge, 0], y - edges[edge, 1]
+        ex, ey = edges[edge, 2], edges[edge, 3]
+        beside = dx * ey - dy * ex  # positive outside, to the right of the edge
+        if beside > depth:
+            depth, out_x, out_y = beside, ey, -ex
+        along = min(edges[edge, 4], max(0.0, dx * ex + dy * ey))
+        dx, dy = dx - along * ex, dy - along * ey
+        distance = dx * dx + dy * dy
+        if distance < nearest:
+            nearest, near_x, near_y = distance, dx, dy
     nearest = math.sqrt(nearest)
     if depth <= 0.0 or nearest < 1e-12:
         return depth, out_x, out_y

@@ -128,6 +128,8 @@ def drawn_in(
     """
     shift_f, shift_l = _sideways(forward, left, radius + MARGIN, pose, motion, distance, gradient, frame)
     forward, left = forward + shift_f, left + shift_l
+    if _clear_throughout(forward, left, radius + MARGIN, pose, motion, distance, gradient, frame):
+        return forward, left
     best_f, best_l, best_room, before = 0.0, 0.0, -math.inf, -math.inf
     for share in EXTENSIONS:
         at_f, at_l = share * forward, share * left
@@ -143,6 +145,21 @@ def drawn_in(
             best_f, best_l, best_room = at_f, at_l, room
         before = room
     return best_f, best_l
+
+
+@kernel
+def _clear_throughout(
+    forward: float, left: float, needed: float, pose: Floats, motion: Floats,
+    distance: Floats, gradient: Floats, frame: Floats,
+) -> bool:  # fmt: skip
+    """Whether the ends alone tell that a load is clear all the way: clearance changes by no more than the distance."""
+    length = math.sqrt(forward * forward + left * left)
+    for horizon in (0.0, NEAR, FAR):
+        axis, _, _ = _room(0.0, 0.0, horizon, pose, motion, distance, gradient, frame)
+        there, _, _ = _room(forward, left, horizon, pose, motion, distance, gradient, frame)
+        if min(axis, there, 0.5 * (axis + there - length)) < needed:
+            return False
+    return True
 
 
 @kernel

@@ -58,6 +58,8 @@ def drop(full: Full, walker: Walker, hand: int, item: int, receptacle: Receptacl
             success = receptacle.contains(person.center(item), options.volume_margin)
             break
     for _ in range(person.steps(_COMING_TO_REST)):
+        if full.calm(0.0):
+            break
         incidents += [(len(poses), kind, which) for kind, which in _advance(full, held)]
     walker.asleep[:] = full.data.tree_asleep
     return Fall(np.array(poses), full.poses(), success, tuple(incidents))

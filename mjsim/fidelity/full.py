@@ -238,11 +238,11 @@ class Full:
 
     def calm(self, speed: float) -> bool:
         """Whether all that nobody holds sleeps, or is slower than `speed`, m/s."""
-        index, data = self.scene.index, self.data
-        awake = data.tree_awake[index.trees] != 0
-        awake[list(self.person.grips.gripped)] = False
-        moving = np.flatnonzero(awake)
-        return all(self.person.speed(item) < speed for item in moving.tolist())
+        gripped = self.person.grips.gripped
+        if self.data.ntree_awake == 1 + len(gripped):  # the person is always awake, and wakes what it holds
+            return True
+        awake = np.flatnonzero(self.data.tree_awake[self.scene.index.trees])
+        return all(self.person.speed(item) < speed for item in awake.tolist() if item not in gripped)
 
     def poses(self) -> NDArray[np.float64]:
         """Poses of all objects, m and wxyz, shape (n, 7)."""

@@ -39,6 +39,7 @@ class Household(NamedTuple):
         rest: Where an empty left hand belongs, m, shape (3,).
         distance, gradient, frame: Clearance at the height of the hands (`mjsim.clearance`).
         timestep: Of the physics, s.
+        yields, goals: Room for results in between, shapes (2, 2), all 0, and (2, 3).
     """
 
     gait: Gait
@@ -50,6 +51,8 @@ class Household(NamedTuple):
     gradient: Floats
     frame: Floats
     timestep: float
+    yields: Floats
+    goals: Floats
 
 
 class Rows(NamedTuple):
@@ -91,7 +94,7 @@ def tick(live: Floats, poses: Floats, posture: Floats, moving: int, house: House
     body = live[BODY:HANDS]
     hands, speeds = live[HANDS:HAND_SPEEDS].reshape(2, 3), live[HAND_SPEEDS:HOLDS].reshape(2, 3)
     update_hands(
-        body, body[kinematics.FORWARD :], hands, speeds, np.zeros((2, 2)), np.zeros((2, 3)),
+        body, body[kinematics.FORWARD :], hands, speeds, house.yields, house.goals,
         held_in(live, 0), held_in(live, 1), moving, posture, house.rest, house.loads,
         house.distance, house.gradient, house.frame, _NO_GEOMS, _NO_FRAMES, _NO_BEARERS, house.gait.dt,
     )  # fmt: skip

@@ -67,6 +67,8 @@ class Walker:
             gradient=gradient,
             frame=frame,
             timestep=float(scene.model.opt.timestep),
+            yields=np.zeros((2, 2)),
+            goals=np.zeros((2, 3)),
         )
 
     @property
