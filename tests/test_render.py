@@ -462,6 +462,18 @@ def test_an_unclosed_renderer_leaves_no_noise_at_exit():
     assert len(run.stdout.split()) == 3 and run.stderr == ""
 
 
+@pytest.mark.parametrize("rest", ["", "Physics.from_xml_string('<mujoco/>').render(8, 8)"])
+def test_dm_control_imported_after_drawing_leaves_no_noise_at_exit(rest):
+    """It terminates the display of the process before the renderer's own hook runs."""
+    code = (
+        "import mujoco; from mjsim.render import Renderer\n"
+        "made = Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), width=8, height=8)\n"
+        f"from dm_control.mujoco import Physics\n{rest}"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert run.stderr == ""
+
+
 def test_renderers_of_several_models_interleave(room, renderer):
     other_model = mujoco.MjModel.from_xml_string(ROOM.replace('rgba=".2 .3 .8 1"', 'rgba="0 .9 0 1"'))
     other_data = mujoco.MjData(other_model)

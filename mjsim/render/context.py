@@ -101,10 +101,21 @@ class _ProcessContext:
         with self._lock:
             if self._gl is None or self._pid != os.getpid():
                 return
-            for key in list(self._owned):
-                self.release(key)
-            self._gl.free()
+            # Hooks run last in, first out: dm_control, if imported later, has terminated the display that all share.
+            if self._display_lives():
+                for key in list(self._owned):
+                    self.release(key)
+                self._gl.free()
+            else:
+                self._gl._context = None  # went with the display; the finalizer would destroy it once more
             self._gl = None
+
+    def _display_lives(self) -> bool:
+        try:
+            with self.current():
+                return True
+        except Exception:  # PyOpenGL's errors are of many types, and what is wrong does not matter here
+            return False
 
     def _ensure(self) -> None:
         if self._gl is None:
