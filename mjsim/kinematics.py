@@ -37,6 +37,7 @@ BODY_SIZE = 16
 _TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
 _LONGEST = 0.05  # m; a disc of 0.20 m cannot jump over a wall in strides of this length
 _CELL = 0.25  # m
+_KNOWN = 0.12  # m beyond the trunk that a cell of the grid knows of
 _ROUNDS = 12
 _TOUCHING = 1e-7  # m
 
@@ -163,7 +164,7 @@ class Floor(NamedTuple):
     @classmethod
     def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
         """Convex counter-clockwise polygons (k, 2), m, for a trunk of this radius, m."""
-        reach = radius + _LONGEST + 0.01
+        reach = radius + _KNOWN
         boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
         low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
         high = boxes[:, 2:].max(axis=0, initial=-np.inf) + reach if len(polygons) else np.ones(2)
@@ -315,7 +316,7 @@ def _driven(
 @kernel
 def _free(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
     """Whether no outline comes within these distances along x and y."""
-    if max(reach_x, reach_y) > radius + _LONGEST:
+    if max(reach_x, reach_y) > radius + _KNOWN:
         return False  # farther than the grid knows
     start, end = _near(x, y, floor)
     for entry in range(start, end):
