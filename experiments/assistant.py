@@ -2,12 +2,12 @@
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.conditions import TaskBoard
+from experiments.conditions import STEP, TaskBoard, alternatives
 from experiments.house import House
 from experiments.participants.base import Choice, Guidance
 from experiments.participants.walking import first_astray, project, rest_of
@@ -16,7 +16,6 @@ from experiments.regrets import Regrets, RegretsAtOnce
 from hud.conditions import condition
 from hud.projection import CameraView
 from hud.state import HudState
-from hud.task import StepKind
 from mjsim.actions import EventKind, WorldEvent
 from mjsim.episode import CAPACITY, Episode
 from mjsim.observation import ObjectStatus, Observation
@@ -28,7 +27,6 @@ OFF_THE_PATH = 0.6  # m from the shown path before a new one is shown
 MOVED = 0.25  # m an object may be pushed before the way to it is shown anew
 FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock starts
 
-STEP: Mapping[VisitKind, StepKind] = {VisitKind.PICK: "pick", VisitKind.PLACE: "place"}
 VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLACE}
 
 
@@ -132,9 +130,14 @@ class Assistant:
         """What the glasses show now."""
         visits = self._route.visits if self._route else ()
         plan = [(STEP[v.kind], v.object) for v in visits]
-        return self._show(
-            self._board.view(observation, plan=plan, path=self._ahead(observation), camera=camera)
+        view = self._board.view(
+            observation,
+            plan=plan,
+            path=self._ahead(observation),
+            camera=camera,
+            alternatives=lambda: alternatives(self._regrets.known()),
         )
+        return self._show(view)
 
     def guidance(self, observation: Observation) -> Guidance | None:
         """The next step and the way to it; None when all is done."""
@@ -193,10 +196,9 @@ class Assistant:
         """Extra cost of a visit, if that is wanted. The next one of a plan that is proven has none."""
         if not self._judging:
             return {}
-        route = self._route
-        if route is not None and route.follows(*stop) and route.plan.status is Status.OPTIMAL:
-            return {"regret_m": 0.0}
-        return {"regret_m": _rounded(self._regrets.judge(self._visits, stop))}
+        proven = self._route is not None and self._route.plan.status is Status.OPTIMAL
+        follows = self._route is not None and self._route.follows(*stop)
+        return {"regret_m": 0.0 if proven and follows else _rounded(self._regrets.judge(self._visits, stop))}
 
     def _alternatives(self, observation: Observation, event: WorldEvent) -> int:
         """How many other visits were feasible when this one was made."""

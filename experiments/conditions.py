@@ -1,6 +1,6 @@
 """From the state of the world to what an assistance condition sees: labels, pictures, rooms, messages."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +9,21 @@ from experiments.house import House
 from hud.messages import fade, message
 from hud.projection import CameraView
 from hud.state import Message
-from hud.task import PlannedStep, StepKind, TaskObject, TaskReceptacle, TaskView
+from hud.task import Alternative, PlannedStep, StepKind, TaskObject, TaskReceptacle, TaskView
 from mjsim.episode import Episode
 from mjsim.observation import Observation
+from planner.plan import VisitKind
+from planner.regret import Regret
+from planner.replanner import Stop
+
+STEP: Mapping[VisitKind, StepKind] = {VisitKind.PICK: "pick", VisitKind.PLACE: "place"}
+
+
+def alternatives(regrets: Mapping[Stop, Regret]) -> tuple[Alternative, ...]:
+    """Regrets of possible next visits in the terms of the conditions."""
+    return tuple(
+        Alternative(STEP[kind], name, found.regret, found.capped) for (kind, name), found in regrets.items()
+    )
 
 
 class TaskBoard:
@@ -46,6 +58,7 @@ class TaskBoard:
         plan: Sequence[tuple[StepKind, str]] = (),
         path: NDArray[np.float64] | None = None,
         camera: CameraView | None = None,
+        alternatives: Callable[[], tuple[Alternative, ...]] = tuple,
     ) -> TaskView:
         """The task as a condition sees it now.
 
@@ -54,6 +67,7 @@ class TaskBoard:
             plan: Remaining visits in planned order.
             path: Floor points of the way to the next visit, m, shape (k, 2).
             camera: The eye camera.
+            alternatives: Gives the visits that are possible next.
         """
         return TaskView(
             objects=tuple(self._task_object(observation, i) for i in range(len(observation.object_names))),
@@ -71,6 +85,7 @@ class TaskBoard:
             camera=camera,
             heading=observation.heading,
             bounds=self._house.bounds,
+            alternatives=alternatives,
         )
 
     def _message(self, time: float) -> Message | None:

@@ -31,8 +31,8 @@ def inventory(view: TaskView) -> tuple[InventorySlot, InventorySlot]:
     return left, right
 
 
-def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tuple[ChecklistItem, ...]:
-    """Objects in the participant's order; picked ones crossed out at the bottom, in the order of picking.
+def random_order(view: TaskView) -> tuple[TaskObject, ...]:
+    """Objects in the participant's order; picked ones at the bottom, in the order of picking.
 
     An object that was dropped on the way counts as not picked again.
     """
@@ -41,6 +41,11 @@ def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tu
     objects = [view.object(name) for name in view.order]
     waiting = [o for o in objects if o.status == "loose"]
     picked = sorted((o for o in objects if o.status != "loose"), key=lambda o: last_pick.get(o.name, -1))
+    return (*waiting, *picked)
+
+
+def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tuple[ChecklistItem, ...]:
+    """Rows of the objects in `random_order`, picked ones crossed out."""
     return tuple(
         ChecklistItem(
             text=o.label,
@@ -49,7 +54,7 @@ def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tu
             target_picture=view.receptacle(o.receptacle).picture,
             done=o.status != "loose",
         )
-        for o in (*waiting, *picked)
+        for o in random_order(view)
     )
 
 

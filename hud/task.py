@@ -1,5 +1,6 @@
 """TaskView: what an assistance condition sees of the task, as one value."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
@@ -19,6 +20,18 @@ class PlannedStep(NamedTuple):
 
     kind: StepKind
     object: str
+
+
+class Alternative(NamedTuple):
+    """A visit that is possible next, and by how much it makes the rest of the task longer than the best one, m.
+
+    `at_least`: that is only a lower bound.
+    """
+
+    kind: StepKind
+    object: str
+    extra: float
+    at_least: bool = False
 
 
 @dataclass(frozen=True)
@@ -78,6 +91,8 @@ class TaskView:
         camera: The eye camera; given, the optimal condition points to a goal that is out of view.
         heading: Where the person looks, rad, 0 along +x, counter-clockwise.
         bounds: xmin, ymin, xmax, ymax of the house, m, or None where there is no map of it.
+        alternatives: Gives all visits that are possible next, worked out only when asked; none as long as nothing is
+            known of them.
 
     Raises:
         TaskViewError: A name is unknown or repeated, `order` is not a permutation of the objects, or `path`
@@ -99,6 +114,7 @@ class TaskView:
     camera: CameraView | None = None
     heading: float = 0.0
     bounds: tuple[float, float, float, float] | None = None
+    alternatives: Callable[[], tuple[Alternative, ...]] = tuple
 
     def __post_init__(self) -> None:
         names = [o.name for o in self.objects]

@@ -11,7 +11,7 @@ from hud.errors import ConditionError, HudError, MessageError, TaskViewError
 from hud.lists import in_sentence
 from hud.messages import FADE, SHOWN, TEXTS, fade, message
 from hud.state import ChecklistItem, HudState, MessageKind
-from hud.task import PlannedStep, TaskView
+from hud.task import Alternative, PlannedStep, TaskView
 
 COUNTS = (6, 12, 18, 24)
 
@@ -280,6 +280,59 @@ def test_the_map_tells_no_more_than_the_condition(base: str) -> None:
     assert found.goal == (view.goal[:2] if base == "optimal" and view.goal else None)
 
 
+def knowing(view: TaskView, *alternatives: Alternative) -> TaskView:
+    return dataclasses.replace(view, alternatives=lambda: alternatives)
+
+
+def details(state: HudState) -> dict[str, str]:
+    return {f"{row.number or ''}{row.text}": " ".join(row.detail.split()) for row in state.checklist}
+
+
+def test_regrets_stand_beside_what_can_be_done_next_and_nowhere_else() -> None:
+    plain = sample.task(6, steps=1)  # the mug in one hand; next the toy car, then both are placed
+    mug, car, novel, shirt = (o.name for o in plain.objects[:4])
+    view = knowing(
+        plain,
+        Alternative("pick", car, 0.0),
+        Alternative("place", mug, 0.004),
+        Alternative("pick", novel, 2.34),
+        Alternative("pick", shirt, 1.0, at_least=True),
+    )
+    assert details(shown("optimal-regret", view)) == details(shown("optimal", view)) | {
+        "3Blue mug": "Put in Dish bin · Kitchen · +0 m",
+        "5Novel": "Pick up · Bedroom · +2.3 m",
+        "6T-shirt": "Pick up · Kitchen · over +1.0 m",
+    }
+    listed = details(shown("none-regret", view))
+    assert listed["Toy car"] == "→ Toy box · +0 m"
+    assert listed["Novel"] == "→ Bookshelf · +2.3 m"
+    assert listed["Blue mug"] == "→ Dish bin · +0 m"
+    assert not any("m" in listed[other].partition("·")[2] for other in ("Stapler", "Cardboard box"))
+
+
+def test_a_small_regret_is_not_shown_as_none() -> None:
+    view = sample.task(6)
+    view = knowing(view, Alternative("pick", view.objects[2].name, 0.03))
+    assert "+0.1 m" in details(shown("optimal-regret", view))["5Novel"]
+
+
+def test_as_long_as_no_regret_is_known_the_list_is_as_without() -> None:
+    for base in ("none", "highlight", "optimal"):
+        assert shown(f"{base}-regret", sample.task(12, steps=5)) == shown(base, sample.task(12, steps=5))
+
+
+def test_a_step_that_was_done_and_can_be_done_again_is_noted_once() -> None:
+    """The mug was dropped: picking it up is a step that is done and one that is possible."""
+    plain = sample.task(6, steps=1)
+    mug = dataclasses.replace(plain.objects[0], status="loose")
+    again = (PlannedStep("pick", plain.objects[1].name), PlannedStep("pick", mug.name))
+    view = dataclasses.replace(
+        plain, objects=(mug, *plain.objects[1:]), hands=(None, None), plan=again + plain.plan[2:]
+    )
+    rows = shown("optimal-regret", knowing(view, Alternative("pick", mug.name, 5.0))).checklist
+    assert ["+5.0 m" in row.detail for row in rows[:4]] == [False, False, True, False]
+
+
 def test_without_a_map_of_the_house_there_is_no_mini_map() -> None:
     assert shown("none-minimap", sample.task(6)) == shown("none", sample.task(6))
 
@@ -292,9 +345,9 @@ def test_options_combine_and_follow_outside_conditions() -> None:
 
 
 def test_an_unknown_option_is_refused_with_the_choices() -> None:
-    with pytest.raises(ConditionError, match=r"'sparkle'.*minimap, xray"):
+    with pytest.raises(ConditionError, match=r"'sparkle'.*minimap, regret, xray"):
         condition("none-sparkle")
-    with pytest.raises(ConditionError, match=r"'magic'.*-minimap or -xray"):
+    with pytest.raises(ConditionError, match=r"'magic'.*-minimap or -regret or -xray"):
         condition("magic-minimap")
 
 

@@ -1,5 +1,6 @@
 """Laws of the layout: whatever is shown, panels stay apart, inside the frame and narrow, and the current row shows."""
 
+import dataclasses
 import itertools
 import math
 
@@ -17,6 +18,7 @@ from hud.layout import Layout
 from hud.messages import TEXTS, message
 from hud.rows import window
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, MiniMap, Pointer
+from hud.task import Alternative
 from hud.text import Typeface
 
 FRAMES = ((640, 480), (1280, 720), (1920, 1080), (320, 240), (800, 600), (480, 640), (2560, 1080), (641, 479))
@@ -102,6 +104,26 @@ def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(
         assert panels["checklist"].width <= 0.3 * size[0]
     centre = Rect(size[0] // 2 - 1, size[1] // 2 - 1, 2, 2)
     assert not any(overlap(centre, rect) for name, rect in panels.items()), "what the person looks at is free"
+
+
+@pytest.mark.parametrize("base", ["highlight", "optimal"])
+@pytest.mark.parametrize("steps", [0, 1, 2, 13, 30])
+def test_the_metres_of_alternatives_are_never_cut_off(base: str, steps: int) -> None:
+    view = sample.task(24, steps=steps)
+    kinds = {"loose": "pick", "carried": "place"}
+    alternatives = tuple(
+        Alternative(kinds[o.status], o.name, 10.0 + i / 2, at_least=i % 2 == 0)  # type: ignore[arg-type]
+        for i, o in enumerate(view.objects)
+        if o.status in kinds
+    )
+    state = condition(f"{base}-regret")(dataclasses.replace(view, alternatives=lambda: alternatives))
+    for size in ((640, 480), (1280, 720), (320, 240)):
+        found = layout(state, size)
+        shown = zip(state.checklist[found.first : found.stop], found.rows, strict=True)
+        for item, row in shown:
+            text = " ".join(row.detail)
+            assert "…" not in text and (" m" in item.detail) == (" m" in text)
+        assert found.stop - found.first >= 5
 
 
 @settings(max_examples=50, deadline=None)

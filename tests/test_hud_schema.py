@@ -48,7 +48,7 @@ def conforms(schema: dict[str, Any], value: Any) -> bool:
 
 
 @given(
-    st.sampled_from([*condition_names(), "highlight-minimap", "optimal-minimap-xray"]),
+    st.sampled_from([*condition_names(), "highlight-minimap", "optimal-minimap-xray", "optimal-regret"]),
     st.integers(0, 24),
     st.data(),
 )

@@ -64,7 +64,8 @@ def add_user(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--user",
         metavar="NAME",
-        help=f"simulated participant: {', '.join(participant_names())}, or package.module:attribute "
+        help=f"simulated participant: {', '.join(participant_names())}, or package.module:attribute; "
+        "boltzmann:T takes a step that costs r m more with odds exp(-r/T) "
         "(default: the one that makes the most of the assistance)",
     )
 

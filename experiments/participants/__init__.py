@@ -19,14 +19,17 @@ def participant_names() -> tuple[str, ...]:
 
 
 def participant(name: str) -> ParticipantFactory:
-    """Find a participant by module name, or by `package.module:attribute` outside this package.
+    """Find a participant by module name, with its parameter after a colon, or one by `package.module:attribute`.
+
+    A module that takes a parameter defines `with_parameter(text)`, which gives the factory.
 
     Raises:
-        ConfigError: There is no such participant.
+        ConfigError: There is no such participant, or the parameter is none of its.
     """
-    if ":" in name:
-        module_name, attribute = name.split(":", 1)
-    else:
+    module_name, colon, attribute = name.partition(":")
+    if colon and module_name in participant_names():
+        return _with_parameter(module_name, attribute)
+    if not colon:
         if name not in participant_names():
             raise ConfigError(f"no participant {name!r}; there are {', '.join(participant_names())}")
         module_name, attribute = f"{__name__}.{name}", "build"
@@ -34,6 +37,14 @@ def participant(name: str) -> ParticipantFactory:
         factory: ParticipantFactory = getattr(importlib.import_module(module_name), attribute)
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"cannot load participant {name!r}: {error}") from error
+    return factory
+
+
+def _with_parameter(name: str, parameter: str) -> ParticipantFactory:
+    module = importlib.import_module(f"{__name__}.{name}")
+    if not hasattr(module, "with_parameter"):
+        raise ConfigError(f"participant {name} takes no parameter, got {parameter!r}")
+    factory: ParticipantFactory = module.with_parameter(parameter)
     return factory
 
 

@@ -1,0 +1,114 @@
+"""Knows what every next step would cost, and mostly takes a cheap one: a model of how closely people follow advice.
+
+A visit that makes the rest of the task r metres longer is chosen with probability proportional to
+exp(-r / temperature). The temperature is the parameter, m: `--user boltzmann:0.5`. Near 0 the visits are optimal; the
+higher it is, the less the cost matters, and from some 10 m on they are as good as random. The participant knows more
+than any condition shows and needs nothing shown, so it serves in all of them.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import ConfigError
+from experiments.known_house import KnownHouse
+from experiments.participants.base import Choice, Outlook, Participant, ParticipantFactory, Percept
+from experiments.participants.errands import NO_MOVES, Errand, ErrandRunner, Visit
+from mjsim.actions import IDLE, Action
+
+TEMPERATURE = 0.5  # m
+
+
+def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator) -> Choice:
+    """A choice with probability proportional to exp(-regret / temperature); the best one at 0.
+
+    Where only a lower bound is known, the exact regret is worked out when such a choice is drawn, and the draw is
+    rejected as often as the bound makes it too likely: so the probabilities are exact, for a few exact regrets.
+
+    Args:
+        choices: At least one.
+        temperature: m, not negative.
+        rng: Source of chance.
+    """
+    if temperature <= 0:
+        return min(choices, key=lambda choice: choice.regret)
+    regrets = np.array([choice.regret for choice in choices])
+    exact = [not choice.capped for choice in choices]
+    while True:
+        weights = np.exp((regrets.min() - regrets) / temperature)
+        k = int(rng.choice(len(choices), p=weights / weights.sum()))
+        if exact[k]:
+            return choices[k]
+        truth = choices[k].find_exact()
+        excess = max(0.0, truth - regrets[k]) if truth is not None else 0.0
+        if rng.random() < math.exp(-excess / temperature):
+            return choices[k]
+        regrets[k], exact[k] = regrets[k] + excess, True
+
+
+class Boltzmann:
+    """Draws what to do next, and keeps to it once drawn.
+
+    Args:
+        house: What it knows of the house.
+        rng: Its chance.
+        temperature: How little the cost matters, m.
+    """
+
+    needs: frozenset[str] = frozenset()
+
+    def __init__(self, house: KnownHouse, rng: np.random.Generator, temperature: float) -> None:
+        self._rng = rng
+        self._temperature = temperature
+        self._runner = ErrandRunner(house)
+        self._choice: Visit | None = None
+
+    def act(self, percept: Percept) -> Action:
+        """Walk to the chosen object or bin; pick or place there."""
+        errand = None if percept.busy else self._errand(percept)
+        return IDLE if errand is None else self._runner.act(percept, errand)
+
+    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
+        """Moves up to the chosen object or bin."""
+        errand = self._errand(percept)
+        return NO_MOVES if errand is None else self._runner.foresee(percept, outlook, errand)
+
+    def went(self, steps: int) -> None:
+        """So many of the moves foreseen were made."""
+        self._runner.went(steps)
+
+    def _errand(self, percept: Percept) -> Errand | None:
+        choices = {(choice.kind, choice.object): choice for choice in percept.choices}
+        if not choices:
+            return None
+        if self._choice not in choices:
+            drawn = draw(list(choices.values()), self._temperature, self._rng)
+            self._choice = drawn.kind, drawn.object
+        chosen = choices[self._choice]
+        return self._runner.errand(percept, self._choice, {chosen.object: chosen.goal})
+
+
+def with_parameter(text: str) -> ParticipantFactory:
+    """A maker of participants of this temperature.
+
+    Raises:
+        ConfigError: It is not a number, or negative.
+    """
+    try:
+        temperature = float(text)
+    except ValueError:
+        temperature = math.nan
+    if not 0 <= temperature < math.inf:
+        raise ConfigError(f"the temperature of boltzmann must be a number of metres from 0 on, got {text!r}")
+
+    def make(house: KnownHouse, rng: np.random.Generator) -> Participant:
+        return Boltzmann(house, rng, temperature)
+
+    return make
+
+
+def build(house: KnownHouse, rng: np.random.Generator) -> Participant:
+    """Make a participant of the usual temperature."""
+    return Boltzmann(house, rng, TEMPERATURE)

@@ -1,0 +1,46 @@
+"""Regret: beside each thing that can be done next, how many metres longer the rest of the task gets by it."""
+
+import dataclasses
+
+from hud.lists import random_order
+from hud.state import ChecklistItem, HudState
+from hud.task import Alternative, PlannedStep, TaskView
+
+NOTHING = 0.01  # m; less is rounding
+
+
+def apply(view: TaskView, state: HudState) -> HudState:
+    """Add the metres to the rows of the task list; as long as they are not known, the list stays as it is."""
+    extras = {(a.kind, a.object): a for a in view.alternatives()}
+    steps = _steps(view, state)
+    if not extras or len(steps) != len(state.checklist):
+        return state
+    rows = zip(state.checklist, steps, strict=True)
+    checklist = tuple(_noted(item, extras.get((step.kind, step.object))) for item, step in rows)
+    return dataclasses.replace(state, checklist=checklist)
+
+
+def wording(alternative: Alternative) -> str:
+    """How an extra length reads in the list."""
+    if alternative.extra <= NOTHING:
+        return "+0 m"
+    shown = f"+{max(alternative.extra, 0.1):.1f} m"
+    return f"over {shown}" if alternative.at_least else shown
+
+
+def _noted(item: ChecklistItem, alternative: Alternative | None) -> ChecklistItem:
+    past = item.done and item.number is not None
+    if alternative is None or past or item.current:  # the current step is what the others are compared with
+        return item
+    parts = item.detail.split("\n")
+    shortest = min(range(len(parts)), key=lambda k: len(parts[k]))
+    plain = parts[shortest].rstrip(" ·")
+    parts[shortest] = f"{plain} · {wording(alternative)}" + parts[shortest][len(plain) :]
+    return dataclasses.replace(item, detail="\n".join(parts))
+
+
+def _steps(view: TaskView, state: HudState) -> list[PlannedStep]:
+    """What each row of the list is about: a step of the plan, or what is to be done next with an object."""
+    if any(item.number is not None for item in state.checklist):
+        return [PlannedStep(*step) for step in view.steps_done] + list(view.plan)
+    return [PlannedStep("place" if o.status == "carried" else "pick", o.name) for o in random_order(view)]
