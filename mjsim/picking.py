@@ -16,7 +16,11 @@ _CLOSE_ENOUGH = 0.012
 
 
 def pick(
-    person: Person, hand: int, item: int, place_for: Callable[[int, int], NDArray[np.float64]]
+    person: Person,
+    hand: int,
+    item: int,
+    place_for: Callable[[int, int], NDArray[np.float64]],
+    pitch: float,
 ) -> Motion:
     """Reach for object `item` and lift it.
 
@@ -25,12 +29,12 @@ def pick(
         hand: Hand that reaches.
         item: Object.
         place_for: Where a hand holds an object clear of the house, body frame, m, (3,).
+        pitch: Where the head looks afterwards, rad.
 
     Returns:
         Whether the hand holds the object in the carrying posture. If not, the hand is open.
     """
     rig, grips = person.rig, person.grips
-    pitch = rig.pitch_target
     yield from person.face(person.center(item))
     person.moving_hand = hand
     grip = grips.nearest_grip(hand, item)

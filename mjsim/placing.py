@@ -43,14 +43,12 @@ class Slot:
     fill: float
 
 
-def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry) -> Motion:
-    """Put the object that `hand` holds into its receptacle and wait until it rests.
+def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
+    """Put the object that `hand` holds into its receptacle and wait until it rests; look to `pitch`, rad, then.
 
     Returns:
         Whether the object's centre rests inside the receptacle's volume.
     """
-    rig = person.rig
-    pitch = rig.pitch_target
     yield from person.face(receptacle.center, heading=square_heading(person, receptacle), tolerance=0.04)
     person.moving_hand = hand
     corners = object_corners(person.scene.model, person.scene.index.geoms(person.scene.index.names[item]))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim import avatar
-from mjsim.actions import EventKind
+from mjsim.actions import ActionResult, EventKind, Pick
 from mjsim.fidelity import gestures
 from mjsim.fidelity.fall import drop
 from mjsim.fidelity.full import Full
@@ -67,13 +67,28 @@ class Choreographer:
         self._tucked, self._aside = np.array(avatar.TUCKED), np.array(avatar.ASIDE)
         self._corners: dict[tuple[int, int], Vector] = {}
 
+    def turn(self, result: ActionResult) -> tuple[Script, int]:
+        """Brake and turn to what is picked or where it is placed; the script and its length.
+
+        Data must be in step with the walk, which is left as it was.
+        """
+        script = Script.empty(_MOST, len(self._walker.poses))
+        before = self._walker.live.copy(), self._walker.poses.copy()
+        if isinstance(result.action, Pick):
+            item = self._full.scene.index.position_of(str(result.object))
+            length = self._turn_to_object(script, item)
+        else:
+            length = self._turn_to_receptacle(script, self._full.scene.receptacles[str(result.receptacle)])
+        self._walker.live[:], self._walker.poses[:] = before
+        return script, length
+
     def pick(self, hand: int, item: int) -> Plan:
         """Take object `item`; data must be in step with the walk, which is left as it was."""
         walker, person, house = self._walker, self._full.person, self._walker.house
         before = walker.live.copy(), walker.poses.copy()
         script = Script.empty(_MOST, len(walker.poses))
-        center, pitch = person.center(item), float(walker.live[BODY + LOOK])
-        row = self._face(script, center, _ANYWHERE, _FACING)
+        center, pitch = person.center(item), walker.pitch_target
+        row = self._turn_to_object(script, item)
         heading = float(walker.live[BODY + HEADING])
         grip = person.grips.grip_along(item, np.array([math.cos(heading), math.sin(heading), 0.0]))
         point = person.grips.point(item, grip)
@@ -93,8 +108,8 @@ class Choreographer:
         walker, person = self._walker, self._full.person
         before = walker.live.copy(), walker.poses.copy()
         script = Script.empty(_MOST, len(walker.poses))
-        pitch = float(walker.live[BODY + LOOK])
-        row = self._face(script, receptacle.center, square_heading(person, receptacle), _SQUARE)
+        pitch = walker.pitch_target
+        row = self._turn_to_receptacle(script, receptacle)
         footprint = self._footprint(hand, receptacle)
         slots = fill_slots(person, item, receptacle, footprint)
         clear = max(float(receptacle.half_size[2]), *(s.fill for s in slots)) + HOVER_GAP
@@ -116,6 +131,13 @@ class Choreographer:
         walker.live[:], walker.poses[:] = before
         incidents = tuple((released + step, kind, item) for step, kind, item in fall.incidents)
         return Plan(script, row, fall.success, incidents)
+
+    def _turn_to_object(self, script: Script, item: int) -> int:
+        return self._face(script, self._full.person.center(item), _ANYWHERE, _FACING)
+
+    def _turn_to_receptacle(self, script: Script, receptacle: ReceptacleGeometry) -> int:
+        heading = square_heading(self._full.person, receptacle)
+        return self._face(script, receptacle.center, heading, _SQUARE)
 
     def _face(self, script: Script, point: Vector, heading: float, tolerance: float) -> int:
         walker, most = self._walker, self._full.person.steps(FACE_TIMEOUT)

@@ -11,7 +11,6 @@ from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick
 from mjsim.errors import StateError
 from mjsim.fidelity.choreography import Choreographer, Plan
 from mjsim.fidelity.full import Full
-from mjsim.fidelity.gestures import play_rows
 from mjsim.fidelity.strides import Rows
 from mjsim.fidelity.walker import Walker
 from mjsim.health import Health, HealthSample
@@ -165,9 +164,8 @@ class Event:
     def _play(self, motion: _Motion, until: int) -> Rows:
         """Go on to control step `until` of a motion, and report what happened in the last one."""
         walker, plan = self._walker, motion.plan
-        rows = Rows.empty(until - motion.played, len(walker.poses))
         before = float(plan.script.live[until - 2, 0]) if until > 1 else walker.time
-        play_rows(plan.script, motion.played, until, walker.live, walker.poses, rows)
+        rows = walker.play(plan.script, motion.played, until)
         motion.played = until
         for step, kind, item in plan.incidents:
             if step == until - 1 and kind is EventKind.DISLODGED:

@@ -144,13 +144,14 @@ class Full:
             return free[0], item
         return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item
 
-    def begin(self, result: ActionResult) -> None:
-        """Begin a feasible pick or place."""
+    def begin(self, result: ActionResult, *, pitch: float | None = None) -> None:
+        """Begin a feasible pick or place, after which the head looks to `pitch`, rad, or where it looks now."""
         hand, item = self.hand_for(result)
+        pitch = self.person.rig.pitch_target if pitch is None else pitch
         if isinstance(result.action, Pick):
-            steps = pick(self.person, hand, item, self.carrying.place_for)
+            steps = pick(self.person, hand, item, self.carrying.place_for, pitch)
         else:
-            steps = place(self.person, hand, item, self.scene.receptacles[str(result.receptacle)])
+            steps = place(self.person, hand, item, self.scene.receptacles[str(result.receptacle)], pitch)
         self._motion = _Motion(steps, result.action, hand, item, result.receptacle)
 
     def advance(self, move: Move) -> None:

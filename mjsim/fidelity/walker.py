@@ -11,6 +11,7 @@ from mjsim import avatar
 from mjsim.actions import Move, WorldEvent
 from mjsim.carrying import Carrying
 from mjsim.errors import StateError
+from mjsim.fidelity.gestures import Script, play_rows
 from mjsim.fidelity.ledger import Ledger
 from mjsim.fidelity.strides import (
     BODY,
@@ -25,7 +26,7 @@ from mjsim.fidelity.strides import (
     walk_rows,
 )
 from mjsim.health import HealthSample
-from mjsim.kinematics import FORWARD, HEADING, PITCH, VX, VY, Floor, Gait, Legs, X, Y
+from mjsim.kinematics import FORWARD, HEADING, LOOK, PITCH, VX, VY, Floor, Gait, Legs, X, Y
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
 from mjsim.postures import LOWEST, drawn_in
@@ -75,6 +76,11 @@ class Walker:
     def time(self) -> float:
         """Simulated time, s."""
         return float(self.live[TIME])
+
+    @property
+    def pitch_target(self) -> float:
+        """Where the head is told to look, rad."""
+        return float(self.live[BODY + LOOK])
 
     @property
     def legs(self) -> Legs:
@@ -154,6 +160,12 @@ class Walker:
         """One control step per row (n, 4)."""
         rows = Rows.empty(len(moves), len(self.poses))
         walk_rows(moves, self.live, self.poses, self.carry_posture, self.house, rows)
+        return rows
+
+    def play(self, script: Script, start: int, end: int) -> Rows:
+        """Go through control steps of a motion that was worked out before."""
+        rows = Rows.empty(end - start, len(self.poses))
+        play_rows(script, start, end, self.live, self.poses, rows)
         return rows
 
     def stretch(

@@ -1,6 +1,7 @@
 """Physics while something is picked up or put away; in between the person walks without it."""
 
 import json
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -8,7 +9,9 @@ from numpy.typing import NDArray
 
 from mjsim.actions import IDLE, Action, ActionResult, Move
 from mjsim.errors import StateError
+from mjsim.fidelity.choreography import Choreographer
 from mjsim.fidelity.full import Full
+from mjsim.fidelity.gestures import Script
 from mjsim.fidelity.handover import enter, leave
 from mjsim.fidelity.tier import by_steps
 from mjsim.fidelity.walker import Walker
@@ -21,12 +24,32 @@ from mjsim.scene import Scene
 from mjsim.stretch import Stretch
 
 
+@dataclass(eq=False)
+class _Turn:
+    """The person braking and turning before a pick or place.
+
+    Attributes:
+        script: The state after each control step.
+        length: How many.
+        result: The answer that it was begun with.
+        pitch: Where the head was told to look before, rad.
+        played: Control steps so far.
+    """
+
+    script: Script
+    length: int
+    result: ActionResult
+    pitch: float
+    played: int = 0
+
+
 class Windows:
     """The tier `windows`.
 
-    A window opens with a pick or place that is feasible. The physics then starts from exactly the state of the
-    walk: always from a reset, so that what happens in a window depends on that state alone. It closes at the first
-    control step at which the motion has ended and everything that nobody holds sleeps or is slow.
+    With a pick or place that is feasible the person first brakes and turns, still without physics. Then a window
+    opens: physics starts from exactly the state of the walk, and always from a reset, so that what happens in a
+    window depends on that state alone. It closes after the first control step at which the motion has ended and
+    everything that nobody holds sleeps or is slow.
 
     Attributes:
         ledger: Who holds what, what is put away, what happened in the latest control step.
@@ -37,6 +60,8 @@ class Windows:
         self._full = Full(scene, options)
         self.ledger = self._full.ledger
         self._walker = Walker(scene, options, self._full.person.rig, self._full.carrying)
+        self._choreographer = Choreographer(self._full, self._walker)
+        self._turn: _Turn | None = None
         self._open = False
         self._written = False
 
@@ -54,7 +79,7 @@ class Windows:
     @property
     def busy(self) -> bool:
         """Whether a pick or place is under way."""
-        return self._full.busy
+        return self._turn is not None or self._full.busy
 
     @property
     def health(self) -> Health:
@@ -68,14 +93,14 @@ class Windows:
 
     @property
     def legs(self) -> Legs | None:
-        """What the walk depends on; None while physics moves the person."""
-        return None if self._open else self._walker.legs
+        """What the walk depends on; None while physics or a motion moves the person."""
+        return None if self._open or self.busy else self._walker.legs
 
     def reset(self) -> None:
         """Return to the episode's beginning."""
         self._full.reset()
         self._walker.reset(self._full.data)
-        self._open, self._written = False, False
+        self._turn, self._open, self._written = None, False, False
 
     def step(self, action: Action) -> ActionResult | None:
         """Advance by one control step."""
@@ -86,15 +111,18 @@ class Windows:
         result = None
         if not isinstance(action, Move):
             self._write()
-            result = self._full.resolve(action, busy=False)
-        if result is None or not result.applied:
-            self.ledger.events = []
-            self._written = False
+            result = self._full.resolve(action, busy=self.busy)
+            if result is not None and result.applied:
+                self._turn = self._turn_for(result)
+        self.ledger.events = []
+        self._written = False
+        if self._turn is None:
             self._walker.step(action if isinstance(action, Move) else IDLE)
-            return result
-        self._enter_physics()
-        self._full.begin(result)
-        self._full.advance(IDLE)
+        elif self._turn.played < self._turn.length:
+            self._walker.play(self._turn.script, self._turn.played, self._turn.played + 1)
+            self._turn.played += 1
+        else:
+            self._open_window(self._turn)
         return result
 
     def walk(self, moves: NDArray[np.float64]) -> Stretch:
@@ -116,7 +144,9 @@ class Windows:
 
     def observation(self) -> Observation:
         """The present state."""
-        return self._full.observation() if self._open else self._walker.observation(self.ledger)
+        if self._open:
+            return self._full.observation()
+        return self._walker.observation(self.ledger, busy=self.busy)
 
     def state_hash(self) -> int:
         """64 bits that differ whenever the state differs (up to chance)."""
@@ -137,7 +167,7 @@ class Windows:
         """
         try:
             memory = json.loads(state.memory)
-            self._open = "rig" in memory
+            self._turn, self._open = None, "rig" in memory
             if self._open:
                 self._full.restore(state)
                 return
@@ -154,10 +184,19 @@ class Windows:
             self._walker.write(self._full.data)
             self._written = True
 
-    def _enter_physics(self) -> None:
-        """Let the physics go on from where the walk has come to."""
+    def _turn_for(self, result: ActionResult) -> _Turn:
+        """How the person turns to what is to be picked, or to where something is to be placed."""
+        pitch = self._walker.pitch_target
+        script, length = self._choreographer.turn(result)
+        return _Turn(script, length, result, pitch)
+
+    def _open_window(self, turn: _Turn) -> None:
+        """Let the physics go on from where the person has turned to, with one control step."""
         enter(self._full, self._walker)
-        self._open, self._written = True, False
+        self._turn, self._open = None, True
+        self._full.begin(turn.result, pitch=turn.pitch)
+        self._full.advance(IDLE)
+        self._close_if_calm()
 
     def _close_if_calm(self) -> None:
         full = self._full
