@@ -8,12 +8,12 @@ import math
 from mjsim.actions import Move, Pick, Place
 from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
-from mjsim.options import WorldOptions
+from mjsim.options import FIDELITIES, WorldOptions
 from mjsim.receptacles import receptacle_geometries
 from mjsim.scene import Scene, compile_house, compose
 from mjsim.world import World
 
-_TIERS = ("full",)
+_TIERS = FIDELITIES
 
 
 def compile_kernels(catalogue: Catalogue | None = None) -> None:
