@@ -31,6 +31,8 @@ from planner.route import TaskState
 from planner.solver import solver
 
 WORKER = Path(__file__).with_name("_planner_worker.py")
+LIVE_WORKER = Path(__file__).with_name("_live_worker.py")
+LIVE_OBJECTS = 24
 SIZES = (6, 12, 18, 24, 30)
 STATES = ("start", "mid-task")
 OTHERS_SHARE = 5  # every fifth house is also solved by the others, which take seconds by their nature
@@ -107,6 +109,7 @@ def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
         "houses": houses,
         "not_installed": [e.label for e in entrants if not e.installed],
         "first_call": first_call(cases[0].problem),
+        "live": live(sizes[-1] if quick else LIVE_OBJECTS, min(houses, 1 if quick else 12)),
         "summary": summary(records),
         "runs": records,
     }
@@ -185,6 +188,14 @@ def first_call(problem: RoutingProblem) -> dict[str, float]:
             wall.append(time.perf_counter() - before)
             cpu.append(children_cpu() - spent)
     return {"wall": min(wall), "cpu": min(cpu)}
+
+
+def live(objects: int, houses: int) -> dict[str, Any]:
+    """Replans beside a person who goes their own way: see the worker."""
+    command = [sys.executable, "-P", str(LIVE_WORKER), str(objects), str(houses)]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    found: dict[str, Any] = json.loads(done.stdout)
+    return {"objects": objects, "houses": houses, "groups": found}
 
 
 def children_cpu() -> float:
@@ -268,6 +279,15 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     yield (
         "gap: to the best tour found; best: how often it was; unproven: greatest gap to the planner's own bound"
     )
+    beside = result["live"]
+    yield f"live, {beside['objects']} objects, {beside['houses']} houses, every visit drawn at random:"
+    for name, row in beside["groups"].items():
+        yield (
+            f"  {name}: {row['replans']} replans; first plan {1000 * row['wall_median']:.0f} ms, "
+            f"95 % within {1000 * row['wall_p95']:.0f} ms (CPU {1000 * row['cpu_median']:.0f}, "
+            f"{1000 * row['cpu_p95']:.0f} ms), gap {row['gap_mean']:.2f} %, at most {row['gap_max']:.1f} %; "
+            f"{row['proven']} proven, after {row['proof_wall_median']:.2f} s, 95 % within {row['proof_wall_p95']:.2f} s"
+        )
     first = result["first_call"]
     yield f"first answer in a fresh process: {first['wall']:.2f} s, CPU {first['cpu']:.2f} s"
 

@@ -7,6 +7,12 @@ from experiments.commands.bench import benchmark
 MODULE = benchmark("planner")
 
 
+LIVE = {
+    "replans": 9, "proven": 8, "gap_mean": 0.25, "gap_max": 1.5, "wall_median": 0.02, "wall_p95": 0.045,
+    "cpu_median": 0.01, "cpu_p95": 0.02, "proof_wall_median": 0.1, "proof_wall_p95": 0.6,
+}  # fmt: skip
+
+
 def record(planner, cost, seed=0, bound=None, cpu=1.0):
     return {
         "planner": planner, "objects": 24, "seed": seed, "state": "start", "left": 24, "cost": cost, "bound": bound,
@@ -38,6 +44,8 @@ def test_a_planner_without_a_tour_is_reported_and_spoils_no_gap():
     assert [row["gap_mean"] for row in rows] == [0.0, None]
     result = {
         "houses": 2, "summary": rows, "not_installed": ["vroom"], "first_call": {"wall": 0.5, "cpu": 0.4},
+        "live": {"objects": 24, "houses": 1, "groups": {"all": LIVE}},
     }  # fmt: skip
     text = "\n".join(MODULE.lines(result))
     assert "2 failed" in text and "vroom: not installed" in text and "0.50 s" in text
+    assert "9 replans; first plan 20 ms, 95 % within 45 ms" in text and "8 proven" in text

@@ -1,0 +1,99 @@
+"""Replans beside a person who goes their own way, in a process of its own: the first plan, how good it is, its proof.
+
+Called by the planner benchmark with a number of objects and of houses; writes one JSON object. Run with `python -P`, as
+this folder has a module named like the package that it measures.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from experiments.house import House
+from planner.live import LiveReplanner
+from planner.plan import Status, VisitKind
+from planner.replanner import Stop
+from planner.route import XY, TaskState
+from planner.solver import solver
+
+REACH = 0.3  # m, spread of where a person stands to reach something
+LARGE = 15  # objects left from which on a first plan is a matter of search rather than of a small table
+
+
+def main() -> None:
+    """Arguments: objects, houses."""
+    objects, houses = int(sys.argv[1]), int(sys.argv[2])
+    house = House.load("apartment")
+    replans = [replan for seed in range(houses) for replan in task(house, objects, seed)]
+    found = {"all": replans, f"{LARGE} or more left": [r for r in replans if r["left"] >= LARGE]}
+    print(json.dumps({name: figures(group) for name, group in found.items() if group}))
+
+
+def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
+    """One task, every visit of it drawn at random from those possible: what each replan took."""
+    rng = np.random.default_rng([objects, seed])
+    episode = house.sample_episode(objects=objects, seed=seed)
+    approach = {key: xy(r.approach) for key, r in house.receptacles.items()}
+    deliveries = {name: approach[key] for name, key in episode.targets.items()}
+    loose = {o.name: (o.position[0], o.position[1]) for o in episode.objects}
+    carried: list[str] = []
+    with LiveReplanner(house.geodesics, solver("exact")) as guide:
+        guide.prepare(TaskState((episode.start.x, episode.start.y), dict(loose), (), deliveries))
+        while len(loose) + len(carried) > 1:
+            kind, name = possible(loose, carried)[int(rng.integers(len(possible(loose, carried))))]
+            if kind is VisitKind.PICK:
+                place = loose.pop(name)
+                carried.append(name)
+            else:
+                place = deliveries[name]
+                carried.remove(name)
+            here = xy(house.navmesh.snap(np.array(place) + rng.normal(0.0, REACH, 2)))
+            before = guide.replans
+            record = replan(guide, TaskState(here, dict(loose), tuple(carried), deliveries))
+            if guide.replans > before:
+                yield record
+
+
+def replan(guide: LiveReplanner, state: TaskState) -> dict[str, Any]:
+    """What the caller waits for, and what comes of it in the background."""
+    wall, own, cpu = time.perf_counter(), time.thread_time(), time.process_time()
+    first = guide.update(state).cost
+    record = {"wall": time.perf_counter() - wall, "cpu": time.thread_time() - own}
+    guide.wait()
+    record |= {"proof_wall": time.perf_counter() - wall, "proof_cpu": time.process_time() - cpu}
+    guide.poll(state)
+    best, plan = guide.route.cost, guide.route.plan
+    gap = 100 * (first / best - 1) if best else 0.0
+    return record | {"gap": gap, "proven": plan.status is Status.OPTIMAL, "left": len(state.loose)}
+
+
+def possible(loose: dict[str, XY], carried: list[str]) -> list[Stop]:
+    """Visits that can be made next."""
+    picks = [(VisitKind.PICK, name) for name in loose] if len(carried) < 2 else []
+    return [(VisitKind.PLACE, name) for name in carried] + picks
+
+
+def figures(replans: list[dict[str, Any]]) -> dict[str, Any]:
+    """Of a group of replans: times in s, gaps in %."""
+    columns = {name: [float(r[name]) for r in replans] for name in ("wall", "cpu", "proof_wall", "proof_cpu")}
+    gaps = [r["gap"] for r in replans]
+    return {
+        "replans": len(replans),
+        "proven": sum(r["proven"] for r in replans),
+        "gap_mean": float(np.mean(gaps)),
+        "gap_max": max(gaps),
+        **{f"{name}_median": float(np.median(values)) for name, values in columns.items()},
+        **{f"{name}_p95": float(np.percentile(values, 95)) for name, values in columns.items()},
+    }
+
+
+def xy(point: Any) -> XY:
+    """A point of the floor."""
+    return float(point[0]), float(point[1])
+
+
+if __name__ == "__main__":
+    main()
