@@ -28,6 +28,7 @@ OBJECT_BIT = 4
 
 PREFIX = "avatar/"
 BASE = "avatar/base"  # walks; does not turn
+SOLE = "avatar/sole"  # pushes objects; fixed to the base
 BODY = "avatar/body"  # turns on the base, and carries head and hands
 HEAD = "avatar/head"
 EYE = "avatar/eye"
@@ -164,7 +165,11 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
     )
     # Soft, and lower than any carried object: light things are pushed along the floor, never launched. It reaches
     # below the floor, so that it meets flat things with its side and never treads on them.
-    base.add_geom(
+    # A body of its own, since it never meets the house: what a body might meet is decided body by body.
+    sole = base.add_body(name=SOLE)
+    sole.fuse = 0
+    _set_inertia(sole, 0.0, (0.0, 0.0, 0.0))
+    sole.add_geom(
         name=FOOT,
         size=[TRUNK_RADIUS, 0.48, 0],
         pos=[0, 0, 0.18],

@@ -2,12 +2,13 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mjsim.assets import models_root
 from mjsim.errors import AssetError
+from mjsim.library import Library
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class Catalogue:
         categories: Category key -> category.
         receptacles: Receptacle key -> receptacle.
         objects: Object model key -> object model.
+        library: The models, once they are read.
     """
 
     name: str
@@ -86,6 +88,7 @@ class Catalogue:
     categories: Mapping[str, Category]
     receptacles: Mapping[str, Receptacle]
     objects: Mapping[str, ObjectModel]
+    library: Library = field(default_factory=Library, compare=False, repr=False)
 
     @classmethod
     def load(cls, house: str = "apartment") -> "Catalogue":

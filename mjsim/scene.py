@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.avatar import attach_avatar
+from mjsim.bounds import tighten
 from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject
 from mjsim.errors import AssetError, EpisodeError
+from mjsim.library import read_model
 from mjsim.receptacles import ReceptacleGeometry, receptacle_geometries
 from mjsim.rooms import RoomMap
 
@@ -111,16 +112,22 @@ class Scene:
 def compose_house(catalogue: Catalogue) -> mujoco.MjSpec:
     """Put the receptacles into the house, at their mounts, under the prefix `<receptacle>/`; no objects.
 
+    The files are read at the first call for a catalogue.
+
     Raises:
         AssetError: A model is malformed or a mount is missing.
     """
-    spec = _load(catalogue.house_path)
+    return catalogue.library.once("house", lambda: _read_house(catalogue)).copy()
+
+
+def _read_house(catalogue: Catalogue) -> mujoco.MjSpec:
+    spec = read_model(catalogue.house_path)
     spec.copy_during_attach = True
     for key, receptacle in catalogue.receptacles.items():
         mount = spec.site(f"mount:{key}")
         if mount is None:
             raise AssetError(f"{catalogue.house_path} has no site 'mount:{key}'; add one")
-        spec.attach(_load(receptacle.path, body="receptacle"), prefix=f"{key}/", site=mount)
+        spec.attach(read_model(receptacle.path, body="receptacle"), prefix=f"{key}/", site=mount)
     _set_options(spec)
     return spec
 
@@ -148,9 +155,10 @@ def compose(episode: Episode, catalogue: Catalogue, *, avatar: bool = True) -> S
     """
     _check_names(episode, catalogue)
     spec = compose_house(catalogue)
-    models = {o.model: _load(catalogue.objects[o.model].path, body="object") for o in episode.objects}
+    spec.copy_during_attach = True
     for placed in episode.objects:
-        _attach_object(spec, models[placed.model], placed)
+        model = catalogue.library.object_model(catalogue.objects[placed.model].path)
+        _attach_object(spec, model, placed)
     names = tuple(o.name for o in episode.objects)
     if avatar:
         start = episode.start
@@ -178,9 +186,11 @@ def compile_spec(spec: mujoco.MjSpec, what: str) -> mujoco.MjModel:
     # The broad phase visits every body of the house in every step; as one body it steps four times as fast.
     spec.compiler.fusestatic = True
     try:
-        return spec.compile()
+        model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise AssetError(f"{what} does not compile: {error}") from error
+    tighten(model)
+    return model
 
 
 def _set_options(spec: mujoco.MjSpec) -> None:
@@ -209,27 +219,6 @@ def _check_names(episode: Episode, catalogue: Catalogue) -> None:
             f"receptacles {unknown} of the episode are not in catalogue {catalogue.name!r}; "
             f"it has {sorted(catalogue.receptacles)}"
         )
-
-
-def _load(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
-    """Read a model, with its asset files named absolutely, since attaching mixes folders."""
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise AssetError(f"cannot read model {path}: {error}") from error
-    if body is not None and (spec.body(body) is None or spec.body(body).parent != spec.worldbody):
-        raise AssetError(f"model {path} has no top-level body {body!r}")
-    for mesh in spec.meshes:
-        mesh.file = _absolute(path.parent, spec.compiler.meshdir, mesh.file)
-    for texture in spec.textures:
-        texture.file = _absolute(path.parent, spec.compiler.texturedir, texture.file)
-        for face, file in enumerate(texture.cubefiles):
-            texture.cubefiles[face] = _absolute(path.parent, spec.compiler.texturedir, file)
-    return spec
-
-
-def _absolute(folder: Path, subfolder: str, file: str) -> str:
-    return str((folder / subfolder / file).resolve()) if file else file
 
 
 def _attach_object(spec: mujoco.MjSpec, model: mujoco.MjSpec, placed: PlacedObject) -> None:

@@ -57,9 +57,9 @@ def test_index_agrees_with_names(scene: Scene) -> None:
         assert joint.qposadr[0] == index.qpos[i]
         assert joint.dofadr[0] == index.dofs[i]
         assert index.position_of(name) == i
-        owned = {model.geom_bodyid[g] for g in index.geoms(name)}
+        owned = {model.body_rootid[model.geom_bodyid[g]] for g in index.geoms(name)}
         assert owned == {index.body(name)}
-    owned_bodies = model.geom_bodyid[index.geom_owner >= 0]
+    owned_bodies = model.body_rootid[model.geom_bodyid[index.geom_owner >= 0]]
     assert set(owned_bodies) == set(index.bodies)
     data = mujoco.MjData(model)
     assert len(set(index.trees)) == len(index.names)
