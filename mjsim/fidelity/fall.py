@@ -66,9 +66,8 @@ def drop(full: Full, walker: Walker, hand: int, item: int, receptacle: Receptacl
 
 
 def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, int]]:
-    """One control step, unless all sleeps that nobody holds; what happened."""
-    if full.calm(0.0):
-        return []
-    full.person.rig.advance()
+    """One control step, without physics if all sleeps that nobody holds; what happened."""
+    if not full.calm(0.0):
+        full.person.rig.advance()
     happened = list(full.person.monitor.check(held))
     return happened + [(EventKind.DISLODGED, item) for item in full.dislodged()]

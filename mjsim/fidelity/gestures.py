@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mjsim import kinematics
 from mjsim.avatar import EYE_FORWARD, EYE_HEIGHT
-from mjsim.fidelity.strides import BODY, HANDS, LIVE, Household, Rows, tick, write_row
+from mjsim.fidelity.strides import BODY, HAND_SPEEDS, HANDS, LIVE, Household, Rows, tick, write_row
 from mjsim.kernels import kernel
 from mjsim.kinematics import FORWARD, HEADING, LEFT, LOOK, PITCH, TURN, TURN_RATE, VX, VY, Gait, X, Y
 from mjsim.person import TURN_GAIN
@@ -16,6 +16,7 @@ from mjsim.person import TURN_GAIN
 Floats = NDArray[np.float64]
 
 STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # how a hand gets from one place to another
+_SPEEDS = HAND_SPEEDS - HANDS
 _SHIFT = 0.2  # share of a movement by which height follows or leads, as in `picking.lead_blend`
 _STANDING = 0.1  # m/s
 _STEADY = 0.5  # rad/s
@@ -106,6 +107,7 @@ def swing(
     body, first = live[BODY:HANDS], HANDS + 3 * hand
     start_f, start_l, start_u = live[first], live[first + 1], live[first + 2]
     goal_f, goal_l, goal_u = goal[0], goal[1], goal[2]
+    live[first + _SPEEDS : first + _SPEEDS + 3] = 0.0  # it begins and ends at rest
     for k in range(1, count + 1):
         if in_house:
             c, s = math.cos(body[HEADING]), math.sin(body[HEADING])
@@ -149,7 +151,7 @@ def let_go(
 @kernel
 def end(live: Floats, poses: Floats, script: Script, row: int, posture: Floats, house: Household) -> int:
     """The control step in which a motion has ended: the hands go to their postures."""
-    live[HANDS + 6 : HANDS + 12] = 0.0
+    live[HAND_SPEEDS : HAND_SPEEDS + 6] = 0.0
     tick(live, poses, posture, -1, house)
     return _note(live, poses, script, row)
 

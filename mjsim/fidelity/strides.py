@@ -65,6 +65,7 @@ class Rows(NamedTuple):
     object_positions: Floats
     object_quaternions: Floats
     state_hashes: NDArray[np.uint64]
+    health: Floats
 
     @classmethod
     def empty(cls, count: int, objects: int) -> "Rows":
@@ -72,6 +73,7 @@ class Rows(NamedTuple):
         return cls(
             np.empty(count), np.empty((count, 2)), np.empty(count), np.empty(count),
             np.empty((count, objects, 3)), np.empty((count, objects, 4)), np.empty(count, np.uint64),
+            np.empty((count, 7)),
         )  # fmt: skip
 
 
@@ -143,6 +145,11 @@ def write_row(step: int, live: Floats, poses: Floats, rows: Rows) -> None:
     rows.object_positions[step] = poses[:, :3]
     rows.object_quaternions[step] = poses[:, 3:]
     rows.state_hashes[step] = state_hash(live, poses)
+    # What is held is in line with its hand, and nothing else touches anything.
+    rows.health[step, :2], rows.health[step, 6] = 0.0, math.nan
+    for hand in range(2):
+        error = 0.0 if live[HOLDS + hand] >= 0.0 else math.nan
+        rows.health[step, 2 + hand] = rows.health[step, 4 + hand] = error
 
 
 @kernel

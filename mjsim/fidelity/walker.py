@@ -131,9 +131,8 @@ class Walker:
     def write(self, data: mujoco.MjData) -> None:
         """Bring poses of bodies, geoms, sites and cameras in step, for rendering and rays."""
         model = self._model
-        held = [self._index.trees[hold[0]] for hold in self.holds if hold is not None]
-        if not data.tree_awake[held].all():
-            mujoco.mj_resetData(model, data)  # all awake: what sleeps does not follow its coordinates
+        if data.ntree_awake < model.ntree:
+            mujoco.mj_resetData(model, data)  # what sleeps does not follow its coordinates
         data.time = self.live[TIME]
         data.qpos[self._qpos] = self.poses.ravel()
         self._rig.pose[:4] = self.live[BODY : BODY + 4]
@@ -172,8 +171,7 @@ class Walker:
         self, rows: Rows, ledger: Ledger, *, busy: bool = False, events: Sequence[WorldEvent] = ()
     ) -> Stretch:
         """What rows that end in the present state amount to."""
-        health = np.tile(self.health_sample.row, (len(rows.times), 1))
-        return Stretch(*rows, health, self.observation(ledger, busy=busy), tuple(events))
+        return Stretch(*rows, self.observation(ledger, busy=busy), tuple(events))
 
     def observation(self, ledger: Ledger, *, busy: bool = False) -> Observation:
         """The present state."""
