@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hud import checklist, sample, theme
+from hud import checklist, markers, minimap, sample, theme
 from hud.canvas import Canvas, Rect
 from hud.compose import Compositor, compose
 from hud.conditions import condition
@@ -177,14 +177,40 @@ DEFICIENCIES = {
 }
 
 
-@pytest.mark.parametrize("kind", sorted(DEFICIENCIES))
-def test_tones_stay_apart_for_colour_vision_deficiencies(kind: str) -> None:
-    tones = np.array([theme.TONES[k] for k in MessageKind], dtype=np.float64) / 255.0
-    linear = ((tones + 0.055) / 1.055) ** 2.4
-    seen = np.clip(linear @ np.array(DEFICIENCIES[kind]).T, 0.0, 1.0).astype(np.float32)
-    lab = cv2.cvtColor(seen[None], cv2.COLOR_LRGB2Lab)[0]
-    distances = [float(np.linalg.norm(lab[i] - lab[j])) for i in range(3) for j in range(i)]
-    assert min(distances) > 20.0
+NORMAL = {"none": np.eye(3)}
+
+
+def byte(rgba: tuple[float, ...]) -> tuple[float, ...]:
+    """Colour of a marker as 0..255."""
+    return tuple(255.0 * c for c in rgba[:3])
+
+
+# What has to be told apart from what it touches or could be taken for.
+PAIRS = {
+    "message: success, refusal": (theme.TONES[MessageKind.SUCCESS], theme.TONES[MessageKind.REFUSAL]),
+    "message: success, information": (theme.TONES[MessageKind.SUCCESS], theme.TONES[MessageKind.INFO]),
+    "message: refusal, information": (theme.TONES[MessageKind.REFUSAL], theme.TONES[MessageKind.INFO]),
+    "breadcrumb, its rim": (byte(markers.RED), byte(markers.WHITE)),
+    "breadcrumb, pin at the goal": (byte(markers.RED), byte(markers.SKY)),
+    "flag, its lower band": (byte(markers.YELLOW), byte(markers.NAVY)),
+    "bands of a pole": (byte(markers.WHITE), byte(markers.NAVY)),
+    "map: way, goal": (minimap.WAY, minimap.GOAL),
+    "map: thing, its rim": (minimap.THING, theme.PANEL),
+    "map: goal, its rim": (minimap.GOAL, theme.PANEL),
+    "map: person, its rim": (theme.ACCENT, theme.PANEL),
+    "map: person, way": (theme.ACCENT, minimap.WAY),
+    "current step, panel": (theme.ACCENT, theme.PANEL),
+    "progress, panel": (theme.PROGRESS, theme.PANEL),
+}
+
+
+@pytest.mark.parametrize("pair", sorted(PAIRS))
+@pytest.mark.parametrize("kind", sorted(NORMAL | DEFICIENCIES))
+def test_colours_stay_apart_for_colour_vision_deficiencies(kind: str, pair: str) -> None:
+    linear = ((np.array(PAIRS[pair], dtype=np.float64) / 255.0 + 0.055) / 1.055) ** 2.4
+    seen = np.clip(linear @ np.array((NORMAL | DEFICIENCIES)[kind]).T, 0.0, 1.0).astype(np.float32)
+    first, second = cv2.cvtColor(seen[None], cv2.COLOR_LRGB2Lab)[0]
+    assert float(np.linalg.norm(first - second)) > 20.0
 
 
 def test_tones_differ_by_more_than_their_colour() -> None:
