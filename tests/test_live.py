@@ -8,8 +8,11 @@ from planning_cases import Task, two_rooms
 
 from experiments import records
 from experiments.cli import main
+from experiments.house import House
+from experiments.records import EventLog
 from experiments.replaying.logged_plans import LoggedPlans
-from experiments.trial import TrialConfig, run_trial
+from experiments.trial import TrialConfig, prepare_session
+from mjsim.scene import compose
 from planner.checker import check
 from planner.errors import ProblemError, UnreachableError
 from planner.exact.solver import ExactSolver
@@ -20,7 +23,7 @@ from planner.plan import Plan, Status, VisitKind
 from planner.replanner import Replanner, left_of
 from planner.route import TaskState
 from planner.solver import SolveLimit, solver
-from planner.tour import pick, place, tour_length
+from planner.tour import pick, place, place_onboard, tour_length
 
 SEARCH = ExactSolver(table_bytes=0, passes=((2, 3_000), (6, 30_000)))
 
@@ -217,15 +220,61 @@ def test_what_is_known_must_be_about_the_same_objects(geodesics):
         next(SEARCH.improve(guide.problem(task.state), warm=known))
 
 
-def test_a_live_trial_logs_each_plan_shown_and_its_replay_shows_them(tmp_path):
-    run = tmp_path / "run"
-    config = TrialConfig(objects=16, assistance="optimal", seed=4, time_limit=8.0, live=True)
-    metrics = run_trial(config, run, topdown=False)
-    plans = json.loads((run / records.PLAN).read_text())
-    assert metrics["replans"] == sum(not plan.get("improved", False) for plan in plans) - 1
-    for plan in plans:
-        assert plan["lower_bound_m"] <= plan["cost_m"] + 1e-9
-    assert main(["replay", str(run)]) == 0
+class Stuck:
+    """A solver that hands out a first plan and then gets stuck, and notes who waits for it."""
+
+    name = "stuck"
+
+    def __init__(self):
+        self.free = threading.Event()
+        self.waiting = []
+
+    def solve(self, *_, **__):
+        raise AssertionError("nobody may ask for a finished plan")
+
+    def improve(self, problem, *, seed=0, limit=None):  # noqa: ARG002 - the interface of solvers
+        held = [place_onboard(problem, k) for k in range(len(problem.onboard))]
+        visits = held + one_after_another(*range(len(problem.shipments)))(problem)
+        cost = tour_length(problem.distances, problem.start, visits)
+        yield Plan(tuple(visits), cost, 0.0, Status.FEASIBLE, 0.0)
+        self.waiting.append(threading.get_ident())
+        assert self.free.wait(60)
+
+
+def test_a_session_goes_on_while_every_proof_is_stuck():
+    house, log, planner = House.load(), EventLog(), Stuck()
+    config = TrialConfig(objects=6, assistance="highlight", seed=3, live=True, regret=False)
+    scene = compose(house.sample_episode(objects=6, seed=3), house.catalogue)
+    planner.free.set()  # the familiarisation may wait
+    with LiveReplanner(house.geodesics, planner) as guide:
+        session, _ = prepare_session(config, house, scene, log, replanner=guide)
+        planner.free.clear()
+        assert session.run() == "all delivered"
+        assert guide.replans >= 2
+        assert len(planner.waiting) == guide.replans + 1  # the first one for the familiarisation
+        assert threading.get_ident() not in planner.waiting
+        planner.free.set()
+    plans = [event for event in log.events if event["event"] == "plan"]
+    assert len(plans) == guide.replans + 1
+    assert plans[0]["t"] == 0.0
+
+
+def test_the_command_line_runs_live_and_its_replay_shows_the_logged_plans(tmp_path, monkeypatch):
+    """Not even a planner that would plan otherwise changes what a replay shows."""
+    run = str(tmp_path / "run")
+    options = ["--objects", "16", "--seed", "4", "--user", "boltzmann:20", "--time-limit", "14", "--no-video"]
+    assert main(["run", "--live", *options, "--assistance", "optimal-regret", "--out", run]) == 0
+    metrics = json.loads((tmp_path / "run" / records.METRICS).read_text())
+    assert metrics["live"] is True
+    assert metrics["unjudged_visits"] == 0
+    plans = json.loads((tmp_path / "run" / records.PLAN).read_text())
+    assert metrics["replans"] == sum(not plan.get("improved", False) for plan in plans) - 1 >= 1
+    assert all(plan["lower_bound_m"] <= plan["cost_m"] + 1e-9 for plan in plans)
+    asked = []
+    monkeypatch.setattr(ExactSolver, "solve", lambda *_, **__: asked.append("solve"))
+    monkeypatch.setattr(ExactSolver, "improve", lambda *_, **__: asked.append("improve"))
+    assert main(["replay", run]) == 0
+    assert asked == []
 
 
 def test_a_better_plan_that_was_logged_is_handed_out_when_it_was_shown(mirrored):
