@@ -14,6 +14,7 @@ Joint coordinates are body-frame or house-frame positions themselves: every join
 starts, so `qpos` of `avatar/x` is the person's x in the house, and that of `avatar/left/z` the hand's height.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,6 +37,7 @@ TRUNK = "avatar/trunk"
 FOOT = "avatar/foot"
 HANDS = ("left", "right")
 GRIPS = (0, 1)
+GENTLE, FIRM = "gentle", "firm"  # how a hand holds
 
 TRUNK_RADIUS = 0.20
 EYE_HEIGHT = 1.60
@@ -51,6 +53,11 @@ ASIDE = (0.30, 0.42, 1.26)
 HAND_KP = 2000.0
 HAND_KV = 130.0
 HAND_FORCE = 80.0
+
+# Kind of weld -> time constant, s, and torque scale. A gentle one turns a fallen thing upright within the lift, slowly
+# enough that it kicks nothing beside it. A firm one stretches by less than 2 mm and twists by less than 2 degrees even
+# where a load brushes a door frame at walking speed.
+WELDS = {GENTLE: (0.08, 1.0), FIRM: (0.008, 2.0)}
 
 _TORQUESCALE = 10  # index in a weld's data
 _VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
@@ -68,9 +75,9 @@ class _Slide:
     range: tuple[float, float]
 
 
-def grip_name(hand: str, instance: str, grip: int) -> str:
-    """Name of the weld that holds `instance` in `hand` at its grip site 0 or 1."""
-    return f"{PREFIX}{hand}/holds/{instance}/{grip}"
+def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
+    """Name of the weld that holds `instance` in `hand` at its grip site 0 or 1, `GENTLE` or `FIRM`."""
+    return f"{PREFIX}{hand}/{kind}/{instance}/{grip}"
 
 
 def posture(hand: int, place: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -269,22 +276,20 @@ def _draw_hand(node: Any, hand: str, side: float) -> None:
 
 
 def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
-    """The pool of inactive site-to-site welds: every hand, object and grip. Inactive ones cost nothing."""
-    for name in object_names:
-        for grip in GRIPS:
-            site = f"{name}/grip_{grip}"
-            if spec.site(site) is None:
-                raise AssetError(f"object '{name}' has no site '{site}'; see docs/models.md, 'An object'")
-            for hand in HANDS:
-                weld = spec.add_equality(
-                    name=grip_name(hand, name, grip),
-                    type=mujoco.mjtEq.mjEQ_WELD,
-                    objtype=mujoco.mjtObj.mjOBJ_SITE,
-                    name1=f"{PREFIX}{hand}_grip",
-                    name2=site,
-                    active=False,
-                    # A load lags by its acceleration times the square of this time: 4 mm at 10 m/s^2.
-                    solref=[0.02, 1.0],
-                    solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
-                )
-                weld.data[_TORQUESCALE] = 0.5
+    """The pool of inactive site-to-site welds: every hand, object, grip and kind. Inactive ones cost nothing."""
+    for name, grip in itertools.product(object_names, GRIPS):
+        site = f"{name}/grip_{grip}"
+        if spec.site(site) is None:
+            raise AssetError(f"object '{name}' has no site '{site}'; see docs/models.md, 'An object'")
+        for hand, (kind, (time, torque)) in itertools.product(HANDS, WELDS.items()):
+            weld = spec.add_equality(
+                name=grip_name(hand, name, grip, kind),
+                type=mujoco.mjtEq.mjEQ_WELD,
+                objtype=mujoco.mjtObj.mjOBJ_SITE,
+                name1=f"{PREFIX}{hand}_grip",
+                name2=site,
+                active=False,
+                solref=[time, 1.0],
+                solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
+            )
+            weld.data[_TORQUESCALE] = torque

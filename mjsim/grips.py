@@ -30,7 +30,10 @@ class Grips:
             [
                 [
                     [
-                        _id(scene.model, mujoco.mjtObj.mjOBJ_EQUALITY, avatar.grip_name(h, n, k))
+                        [
+                            _id(scene.model, mujoco.mjtObj.mjOBJ_EQUALITY, avatar.grip_name(h, n, k, kind))
+                            for kind in (avatar.GENTLE, avatar.FIRM)
+                        ]
                         for k in avatar.GRIPS
                     ]
                     for n in names
@@ -59,9 +62,9 @@ class Grips:
         hand_point = self._data.site_xpos[self._hand_sites[hand]]
         return float(np.linalg.norm(hand_point - self._data.site_xpos[self._sites[item, grip]]))
 
-    def close(self, hand: int, item: int, grip: int) -> None:
-        """Weld object `item` to a hand; a sleeping object wakes."""
-        self._data.eq_active[self._welds[hand, item, grip]] = 1
+    def close(self, hand: int, item: int, grip: int, *, gently: bool = False) -> None:
+        """Weld object `item` to a hand, firmly or at first gently; a sleeping object wakes."""
+        self._data.eq_active[self._welds[hand, item, grip]] = (gently, not gently)
         self._closed[hand] = (item, grip)
 
     def open(self, hand: int) -> None:

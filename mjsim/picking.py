@@ -46,8 +46,9 @@ def pick(
         yield
     if grips.gap(hand, item, grip) > person.options.grip_distance:
         return False
-    grips.close(hand, item, grip)
+    grips.close(hand, item, grip, gently=True)
     yield from _lift(person, hand, place_for(hand, item), pitch)
+    grips.close(hand, item, grip)
     if grips.error(hand) > person.options.grip_error:
         grips.open(hand)
         return False

@@ -1,5 +1,6 @@
 """The person's body: where it stands, what it touches, what its hands can hold."""
 
+import itertools
 import math
 from collections.abc import Callable
 
@@ -119,12 +120,12 @@ def test_hands_hold_still_against_gravity(small_scene: Scene, data: mujoco.MjDat
 
 def test_every_hand_can_hold_every_object_at_either_grip(small_scene: Scene, data: mujoco.MjData) -> None:
     model = small_scene.model
-    assert model.neq == 2 * 2 * 2
+    assert model.neq == 2 * 2 * 2 * 2
     assert not data.eq_active.any()
     for hand in avatar.HANDS:
         for name in ("a", "b"):
-            for grip in avatar.GRIPS:
-                weld = model.equality(avatar.grip_name(hand, name, grip)).id
+            for grip, kind in itertools.product(avatar.GRIPS, avatar.WELDS):
+                weld = model.equality(avatar.grip_name(hand, name, grip, kind)).id
                 sites = (model.eq_obj1id[weld], model.eq_obj2id[weld])
                 assert [model.site(s).name for s in sites] == [f"avatar/{hand}_grip", f"{name}/grip_{grip}"]
 
