@@ -155,3 +155,103 @@ def test_plans_cost_what_brute_force_finds(problem):
 def test_numbers_are_not_silently_truncated():
     with pytest.raises(ProblemError, match="whole number"):
         problem_from_json(json.dumps({**PROBLEM, "onboard": [1.9]}))
+
+
+def claimed(tmp_path, capsys, problem, *options):
+    """Problem and certificate as files, and what the certificate says."""
+    claim = tmp_path / "claim.json"
+    code, printed = plan(tmp_path, capsys, problem, "--certificate", str(claim), *options)
+    assert code == 0
+    assert set(json.loads(printed.out)) == {"visits", "cost", "lower_bound", "status", "seconds"}
+    return claim, json.loads(claim.read_text())
+
+
+def checked(tmp_path, capsys, claim):
+    code = main(["plan", str(tmp_path / "problem.json"), "--check", str(claim)])
+    return code, capsys.readouterr()
+
+
+def scattered(count, capacity=2):
+    places = np.random.default_rng(count).uniform(0, 10, (5 + count, 2))
+    distances = np.linalg.norm(places[:, None] - places[None], axis=2)
+    shipments = [{"pickup": 5 + k, "delivery": 1 + k % 4} for k in range(count)]
+    return {
+        "distances": distances.tolist(),
+        "shipments": shipments,
+        "onboard": [2],
+        "capacity": capacity,
+    }
+
+
+@pytest.mark.parametrize(
+    ("problem", "planner"),
+    [
+        (PROBLEM, "exact"),
+        (scattered(9), "exact"),
+        (scattered(5, 3), "exact"),
+        (scattered(9), "ortools"),
+        (scattered(9), "greedy"),
+        (scattered(0), "exact"),
+    ],
+)
+def test_a_certificate_is_verified_from_its_files_alone(tmp_path, capsys, problem, planner):
+    claim, written = claimed(tmp_path, capsys, problem, "--planner", planner, "--time-limit", "0.3")
+    code, printed = checked(tmp_path, capsys, claim)
+    answer = json.loads(printed.out)
+    assert (code, answer["holds"]) == (0, True)
+    assert (answer["cost"], answer["lower_bound"]) == (written["cost"], written["lower_bound"])
+    assert 0 <= answer["derived_bound"] <= answer["cost"] + 5e-3
+    if planner == "exact":
+        assert answer["derived_bound"] == pytest.approx(answer["cost"], abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("forge", "fault"),
+    [
+        (lambda c: c["visits"].reverse(), "places what is not carried"),
+        (lambda c: c["visits"].pop(), "never done"),
+        (lambda c: c.update(cost=c["cost"] - 1, lower_bound=c["lower_bound"] - 1), "long, not"),
+        (lambda c: c.update(lower_bound=c["lower_bound"] - 1), "called optimal with a gap"),
+        (lambda c: c["certificate"].update(root=c["certificate"]["root"] + 5000), "its proof yields only"),
+    ],
+)
+def test_a_forged_claim_exits_with_one_and_says_why(tmp_path, capsys, forge, fault):
+    claim, written = claimed(tmp_path, capsys, scattered(9))
+    forge(written)
+    claim.write_text(json.dumps(written))
+    code, printed = checked(tmp_path, capsys, claim)
+    answer = json.loads(printed.out)
+    assert (code, answer["holds"], printed.err) == (1, False, "")
+    assert fault in answer["fault"]
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"visits": [["pick", 9]]}, "visits[0] is of number 9, but the problem has 9 to pick"),
+        ({"visits": [["place onboard", -1]]}, "number -1"),
+        ({"visits": [["throw", 1]]}, "visits[0] must be one of"),
+        ({"visits": 3}, "visits must be a list"),
+        ({"status": "perfect"}, "status must be one of"),
+        ({"cost": "3"}, "cost must be a finite number"),
+        ({"format": 2}, "format must be 1, got 2"),
+        (
+            {"certificate": {"proof": "full-table", "root": 10**400, "exact": [], "multipliers": []}},
+            "certificate.root",
+        ),
+        ({"certificate": {"proof": "full-table"}}, "a certificate is a JSON object with"),
+        ({"more": 1}, "a claim is a JSON object with"),
+    ],
+)
+def test_a_malformed_claim_exits_with_two_and_one_line(tmp_path, capsys, change, fault):
+    claim, written = claimed(tmp_path, capsys, scattered(9))
+    claim.write_text(json.dumps({**written, **change}))
+    code, printed = checked(tmp_path, capsys, claim)
+    assert (code, printed.out, len(printed.err.strip().splitlines())) == (2, "", 1)
+    assert fault in printed.err
+    assert "claim.json" in printed.err
+
+
+def test_only_one_of_problem_and_claim_comes_from_standard_input(capsys):
+    assert main(["plan", "-", "--check", "-"]) == 2
+    assert "standard input" in capsys.readouterr().err

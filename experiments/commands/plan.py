@@ -1,14 +1,21 @@
 """`mjsim plan`: solve a routing problem from a file."""
 
 import argparse
+import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from experiments.errors import ConfigError
+from mjsim.files import replacing
+from planner.checker import check
+from planner.claim_json import claim_from_json, claim_to_json
 from planner.errors import ProblemError
 from planner.problem_json import plan_to_json, problem_from_json
 from planner.solver import DEFAULT_SOLVER, SOLVERS, SolveLimit, solver
+
+T = TypeVar("T")
 
 DESCRIPTION = """\
 Solve a capacitated pickup-and-delivery problem with an open tour. Input, from FILE or - for standard input:
@@ -17,8 +24,15 @@ Solve a capacitated pickup-and-delivery problem with an open tour. Input, from F
 Indices count rows of the symmetric matrix distances, in metres; onboard holds the delivery index of each object
 that is carried at the start.
 Output, on standard output:
-  {"visits": [2, 1, 2], "cost": 13.0, "lower_bound": 13.0, "status": "optimal", "seconds": 0.001}
-Malformed input exits with 2 and one line that names the fault."""
+  {"visits": [1, 2, 2], "cost": 7.0, "lower_bound": 7.0, "status": "optimal", "seconds": 0.001}
+Malformed input exits with 2 and one line that names the fault.
+
+With --certificate OUT.json the visits by object and what proves the lower bound are written as well. Anybody can check
+that: --check OUT.json replays the tour against the constraints and derives the bound anew, by code that shares nothing
+with the planners, and answers
+  {"holds": true, "cost": 7.0, "lower_bound": 7.0, "derived_bound": 7.0, "status": "optimal"}
+derived_bound is what the check could see for itself. Where it is below lower_bound, the rest is the planner's word that
+its search was complete. A claim that does not hold exits with 1."""
 
 
 def add_parser(commands: Any) -> None:
@@ -37,25 +51,56 @@ def add_parser(commands: Any) -> None:
         "--time-limit",
         type=float,
         metavar="S",
-        help="seconds to search; without it, the planner's own budget of work",
+        help="seconds to search, to some 0.1 s; without it, the planner's own budget of work",
+    )
+    claim = parser.add_mutually_exclusive_group()
+    claim.add_argument(
+        "--certificate", type=Path, metavar="OUT.json", help="write what the answer claims and what proves it"
+    )
+    claim.add_argument(
+        "--check",
+        metavar="OUT.json",
+        help="plan nothing: check what --certificate wrote, - for standard input",
     )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, solve, print."""
+    """Read, solve, print; or check."""
+    if arguments.check is not None:
+        return _check(arguments.file, arguments.check)
     limit = SolveLimit(seconds=arguments.time_limit) if arguments.time_limit is not None else None
-    problem = _read(arguments.file)
-    print(plan_to_json(solver(arguments.planner).solve(problem, limit=limit)))
+    problem = _read(arguments.file, problem_from_json)
+    plan = solver(arguments.planner).solve(problem, limit=limit)
+    if arguments.certificate is not None:
+        with replacing(arguments.certificate) as temporary:
+            temporary.write_text(claim_to_json(plan) + "\n", encoding="utf-8")
+    print(plan_to_json(plan))
     return 0
 
 
-def _read(name: str) -> Any:
+def _check(problem_name: str, claim_name: str) -> int:
+    """Check a claim about a problem; 1 where it does not hold."""
+    if problem_name == claim_name == "-":
+        raise ConfigError("problem and certificate cannot both come from standard input; give a file for one")
+    problem = _read(problem_name, problem_from_json)
+    plan = _read(claim_name, lambda text: claim_from_json(text, problem))
+    try:
+        derived = check(problem, plan)
+    except ProblemError as error:
+        print(json.dumps({"holds": False, "fault": str(error)}))
+        return 1
+    numbers = {"cost": plan.cost, "lower_bound": plan.lower_bound, "derived_bound": derived}
+    print(json.dumps({"holds": True, **numbers, "status": plan.status.value}))
+    return 0
+
+
+def _read(name: str, parse: Callable[[str], T]) -> T:
     try:
         text = sys.stdin.read() if name == "-" else Path(name).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"cannot read {name}: {error}") from error
     try:
-        return problem_from_json(text)
+        return parse(text)
     except ProblemError as error:
         raise ProblemError(f"{name}: {error}") from error
