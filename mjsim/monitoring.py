@@ -117,8 +117,10 @@ class HealthMonitor:
     def _survey(self, data: mujoco.MjData) -> tuple[bool, float, float]:
         """Whether any object may be escaping, and overlaps of objects and of the trunk, m; marks every object."""
         index, rig, contact = self._index, self._rig, data.contact
+        # Strides differ with the number of contacts, and kernels with the strides.
+        geoms, dists = np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.dist)
         state, deepest, trunk = survey(
-            data.qpos, data.qvel, data.xipos, contact.geom, contact.dist, data.warning.number,
+            data.qpos, data.qvel, data.xipos, geoms, dists, data.warning.number,
             index.bodies, index.dofs, index.geom_owner, rig.trunk, rig.foot,
             self._limits, self._escapes.anchors, self._marks,
         )  # fmt: skip

@@ -1,0 +1,141 @@
+"""Carrying two objects through the house at full speed: how far welds stretch and twist, and what is lost on the way.
+
+A session is an ordinary world: somebody picks up two things that lie beside them and walks to another point of the
+house by the shortest way, at 1.4 m/s round every corner.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.house import House
+from experiments.participants.walking import path_length, point_along, project, wrap_angle
+from mjsim.actions import IDLE, Action, EventKind, Move, Pick
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.scene import compose
+from mjsim.world import World
+
+SEED = 2027
+SPEED = 1.4  # m/s
+LOOK_AHEAD = 0.3  # m
+BRAKING = 1.5  # m/s^2
+BESIDE = 0.55  # m
+SHORTEST = 6.0  # m
+LONGEST = 900  # control steps of a walk
+ARRIVED = 0.1  # m
+
+
+@dataclass(frozen=True)
+class Carry:
+    """A walk with full hands.
+
+    Attributes:
+        session: Its number; `run_session` repeats it.
+        models: What was carried, left and right.
+        lost: How many of them were lost on the way.
+        arrived: Whether the person got there.
+        length: Length of the way, m.
+        speed: Speed of the body at each control step, m/s, (T,).
+        turn: Its yaw rate, rad/s, (T,).
+        stretch: Weld errors, m, (T, 2), NaN where nothing is held.
+        twist: Weld errors, rad, (T, 2).
+        penetration: Deepest overlap, m, (T,).
+    """
+
+    session: int
+    models: tuple[str, str]
+    lost: int
+    arrived: bool
+    length: float
+    speed: NDArray[np.float64]
+    turn: NDArray[np.float64]
+    stretch: NDArray[np.float64]
+    twist: NDArray[np.float64]
+    penetration: NDArray[np.float64]
+
+
+def run_session(house: House, number: int) -> Carry:
+    """Run session `number`; the same number gives the same session, to the last bit."""
+    rng = np.random.default_rng([SEED, number])
+    path = _path(house, rng)
+    episode = _episode(house, number, path[0], rng)
+    world = World(compose(episode, house.catalogue))
+    for placed in episode.objects:
+        world.step(Pick(placed.name))
+        world.finish()
+    rows, lost = [], 0
+    heading = world.observation().heading
+    for _ in range(LONGEST):
+        o = world.observation()
+        step = world.step(_towards(path, o.position, o.heading))
+        lost += sum(event.kind is EventKind.GRIP_LOST for event in step.events)
+        o = step.observation
+        rate = wrap_angle(o.heading - heading) / world.control_timestep
+        heading = o.heading
+        rows.append((float(np.hypot(*o.velocity)), rate, *world.health_sample.row))
+        if np.linalg.norm(o.position - path[-1]) < ARRIVED:
+            break
+    table = np.array(rows)
+    first, second = (o.model for o in episode.objects)
+    return Carry(
+        session=number,
+        models=(first, second),
+        lost=lost,
+        arrived=bool(np.linalg.norm(world.observation().position - path[-1]) < ARRIVED),
+        length=float(path_length(path)),
+        speed=table[:, 0],
+        turn=table[:, 1],
+        stretch=table[:, 4:6],
+        twist=table[:, 6:8],
+        penetration=table[:, 2],
+    )
+
+
+def _path(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
+    """A shortest path of some length that begins where there is room to pick things up."""
+    while True:
+        start, goal = house.navmesh.sample(rng), house.navmesh.sample(rng)
+        around = [start + BESIDE * np.array([math.cos(a), math.sin(a)]) for a in np.arange(0, 6.2, 0.8)]
+        if all(house.navmesh.is_navigable(point) for point in around):
+            path = np.asarray(house.geodesics.shortest_path(start, goal).points)
+            if path_length(path) >= SHORTEST:
+                return path
+
+
+def _episode(house: House, number: int, start: NDArray[np.float64], rng: np.random.Generator) -> Episode:
+    heading = float(rng.uniform(-math.pi, math.pi))
+    categories = house.catalogue.categories
+    objects = []
+    for i, side in enumerate((0.8, -0.8)):
+        model = str(rng.choice(list(house.catalogue.objects)))
+        angle, yaw = heading + side, rng.uniform(-math.pi, math.pi)
+        x, y = (float(v) for v in start + BESIDE * np.array([math.cos(angle), math.sin(angle)]))
+        quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+        category = house.catalogue.objects[model].category
+        objects.append(PlacedObject(f"o{i}", category, model, (x, y), (x, y, 0.01), quaternion))
+    return Episode(
+        house=house.catalogue.name,
+        seed=number,
+        start=StartPose(float(start[0]), float(start[1]), heading),
+        objects=tuple(objects),
+        receptacles=tuple(house.catalogue.receptacles),
+        targets={o.name: categories[o.category].receptacle for o in objects},
+    )
+
+
+def _towards(path: NDArray[np.float64], position: NDArray[np.float64], heading: float) -> Action:
+    """Full speed along a path, the body turning after the walk; slower only at the very end."""
+    x, y = (float(v) for v in position)
+    arc, _ = project(path, x, y)
+    to_x, to_y = point_along(path, arc + LOOK_AHEAD)
+    left = math.hypot(path[-1, 0] - x, path[-1, 1] - y)
+    distance = math.hypot(to_x - x, to_y - y)
+    if distance < 1e-6:
+        return IDLE
+    speed = min(SPEED, math.sqrt(2.0 * BRAKING * left)) / distance
+    c, s = math.cos(heading), math.sin(heading)
+    dx, dy = to_x - x, to_y - y
+    turn = wrap_angle(math.atan2(dy, dx) - heading)
+    return Move(speed * (c * dx + s * dy), speed * (c * dy - s * dx), 5.0 * turn)

@@ -1,0 +1,194 @@
+"""Walking into everything: charges at 1 to 8 m/s into walls, corners, furniture and heaps of objects.
+
+A session is an ordinary world, in which somebody charges in any direction, pushes on, is then told to walk away by the
+shortest way, and stands still for a while. Whether the body went through something, got stuck or drifts is judged
+by its position and the floor plan alone, by nothing of what is tested.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from experiments.house import House
+from mjsim.actions import Move
+from mjsim.avatar import TRUNK_RADIUS
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.errors import PhysicsError
+from mjsim.footprint import footprint
+from mjsim.options import WorldOptions
+from mjsim.scene import compose
+from mjsim.world import World
+from planner.errors import UnreachableError
+
+SEED = 2028
+SPEEDS = (1.0, 8.0)  # m/s
+ACCELERATION = 12.0  # m/s^2; more than the body's servos have force for
+SECONDS = 36.0  # of a session
+CHARGE, PUSH, ESCAPE, STAND = (0.8, 2.5), (0.4, 1.2), 2.0, (1.0, 1.0)  # s
+HEAPED = 8  # objects
+NOT_STUCK = 0.2  # m in `ESCAPE` seconds
+ESCAPE_SPEED = 1.4  # m/s
+
+
+@dataclass
+class Walk:
+    """What a session found.
+
+    Attributes:
+        session: Its number; `run_session` repeats it.
+        speed: Commanded speed, m/s.
+        simulated: Simulated time, s.
+        tunnelled: Control steps at which the body's axis was in something solid or had crossed it.
+        stuck: Escapes that moved the body by less than `NOT_STUCK` m.
+        escapes: Escapes tried.
+        drift: How far the body moved in the last second of standing still, m, by occasion.
+        turned: How far it turned then, rad, by occasion.
+        overlap: Depth of the trunk in walls and furniture at each control step, m.
+        fastest: Speed of the fastest object, m/s.
+        ejections: Objects ejected.
+        object_tunnellings: Objects that tunnelled.
+        lost: Objects that are outside the house at the end.
+        error: How the physics failed, or None.
+    """
+
+    session: int
+    speed: float
+    simulated: float = 0.0
+    tunnelled: int = 0
+    stuck: int = 0
+    escapes: int = 0
+    drift: list[float] = field(default_factory=list)
+    turned: list[float] = field(default_factory=list)
+    overlap: list[float] = field(default_factory=list)
+    fastest: float = 0.0
+    ejections: int = 0
+    object_tunnellings: int = 0
+    lost: int = 0
+    error: str | None = None
+
+
+def run_session(house: House, number: int, seconds: float = SECONDS) -> Walk:
+    """Run session `number`; the same number gives the same session, to the last bit."""
+    return _Session(house, number).run(seconds)
+
+
+class _Session:
+    """One session under way."""
+
+    def __init__(self, house: House, number: int) -> None:
+        self._house = house
+        self._rng = np.random.default_rng([SEED, number])
+        self._found = Walk(number, float(self._rng.uniform(*SPEEDS)))
+        self._heap = house.navmesh.sample(self._rng)
+        scene = compose(_episode(house, number, self._heap, self._rng), house.catalogue)
+        self._solid = shapely.union_all([shapely.Polygon(p) for p in footprint(scene.model).obstacles])
+        shapely.prepare(self._solid)
+        options = WorldOptions(max_speed=self._found.speed, acceleration=ACCELERATION)
+        self._world = World(scene, options)
+        self._position = self._world.observation().position
+
+    def run(self, seconds: float) -> Walk:
+        found, world = self._found, self._world
+        try:
+            while world.observation().time < seconds:
+                self._charge()
+                self._escape()
+                self._stand()
+        except PhysicsError as error:
+            found.error = str(error)
+        o, health = world.observation(), world.health
+        found.simulated = o.time
+        found.ejections, found.object_tunnellings = health.ejections, health.tunnellings
+        inside = [world.scene.rooms.contains(p[:2], 0.3) and p[2] > -0.05 for p in o.object_positions]
+        found.lost = inside.count(False)
+        return found
+
+    def _charge(self) -> None:
+        """Run in some direction, every third time at the heap, then push on at another angle while turning."""
+        rng, o = self._rng, self._world.observation()
+        at_heap = rng.random() < 1 / 3
+        way = self._heap - o.position
+        course = math.atan2(way[1], way[0]) if at_heap else rng.uniform(-math.pi, math.pi)
+        for duration, veer in ((CHARGE, 0.0), (PUSH, rng.uniform(-1.6, 1.6))):
+            turn = rng.uniform(-2.5, 2.5)
+            for _ in range(self._steps(rng.uniform(*duration))):
+                self._go(course + veer, self._found.speed, turn)
+
+    def _escape(self) -> None:
+        """Walk away by the shortest way to somewhere else."""
+        start = self._position
+        goal = self._house.navmesh.sample(self._rng)
+        self._found.escapes += 1
+        for _ in range(self._steps(ESCAPE)):
+            here = self._house.navmesh.snap(self._position)
+            try:
+                path = self._house.geodesics.shortest_path(here, goal).points
+            except UnreachableError:
+                goal = self._house.navmesh.sample(self._rng)
+                continue
+            out = (
+                here - self._position
+            )  # back to where one can walk, if that is where the charge has left the body
+            ahead = next((p for p in path if np.linalg.norm(p - here) > 0.1), path[-1]) - here
+            size = float(np.linalg.norm(ahead))
+            way = out * 4.0 + (ahead / size if size > 0 else 0.0)
+            self._go(math.atan2(way[1], way[0]), ESCAPE_SPEED, 0.0)
+        self._found.stuck += bool(np.linalg.norm(self._position - start) < NOT_STUCK)
+
+    def _stand(self) -> None:
+        """Stop, and see whether the body stays where it is."""
+        for _ in range(self._steps(STAND[0])):
+            self._step(Move())
+        before = self._world.observation()
+        for _ in range(self._steps(STAND[1])):
+            self._step(Move())
+        after = self._world.observation()
+        self._found.drift.append(float(np.linalg.norm(after.position - before.position)))
+        self._found.turned.append(abs(after.heading - before.heading))
+
+    def _go(self, course: float, speed: float, turn: float) -> None:
+        """Walk in a direction of the house, whichever way the body faces."""
+        angle = course - self._world.observation().heading
+        self._step(Move(speed * math.cos(angle), speed * math.sin(angle), turn))
+
+    def _step(self, move: Move) -> None:
+        found, world = self._found, self._world
+        o = world.step(move).observation
+        trail = shapely.LineString([self._position, o.position])
+        found.tunnelled += bool(self._solid.intersects(trail))
+        gap = self._solid.distance(shapely.Point(o.position))
+        found.overlap.append(max(0.0, TRUNK_RADIUS - gap))
+        dofs = world.scene.index.dofs[:, None] + np.arange(3)
+        found.fastest = max(found.fastest, float(np.linalg.norm(world.data.qvel[dofs], axis=1).max()))
+        self._position = o.position
+
+    def _steps(self, seconds: float) -> int:
+        return max(1, round(seconds / self._world.control_timestep))
+
+
+def _episode(house: House, number: int, heap: NDArray[np.float64], rng: np.random.Generator) -> Episode:
+    """Somebody anywhere in the house, and objects that fall onto a heap."""
+    catalogue = house.catalogue
+    start = house.navmesh.sample(rng)
+    while np.linalg.norm(start - heap) < 1.0:
+        start = house.navmesh.sample(rng)
+    objects = []
+    for i, model in enumerate(rng.choice(list(catalogue.objects), HEAPED, replace=False)):
+        x, y = (float(v) for v in heap + rng.uniform(-0.15, 0.15, 2))
+        yaw = rng.uniform(-math.pi, math.pi)
+        quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+        category = catalogue.objects[str(model)].category
+        objects.append(
+            PlacedObject(f"o{i}", category, str(model), (x, y), (x, y, 0.01 + 0.25 * (i // 2)), quaternion)
+        )
+    return Episode(
+        house=catalogue.name,
+        seed=number,
+        start=StartPose(float(start[0]), float(start[1]), float(rng.uniform(-math.pi, math.pi))),
+        objects=tuple(objects),
+        receptacles=tuple(catalogue.receptacles),
+        targets={o.name: catalogue.categories[o.category].receptacle for o in objects},
+    )
