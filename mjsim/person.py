@@ -16,6 +16,7 @@ from mjsim.options import WorldOptions
 from mjsim.postures import move_hand
 from mjsim.rig import Rig
 from mjsim.scene import Scene
+from mjsim.soundings import Soundings
 
 # A motion sets the servos, yields once per control step, and returns whether it succeeded.
 Motion = Generator[None, None, bool]
@@ -33,6 +34,7 @@ class Person:
         held: Index of the object in the left and the right hand, or None.
         hand_velocities: How fast the hands' targets move where no motion moves them, m/s, shape (2, 3).
         moving_hand: Hand that a motion moves at present; the others keep their posture.
+        soundings: Tells how full receptacles are.
     """
 
     scene: Scene
@@ -44,6 +46,10 @@ class Person:
     held: list[int | None] = field(default_factory=lambda: [None, None])
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     moving_hand: int | None = None
+    soundings: Soundings = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.soundings = Soundings(self.scene)
 
     @property
     def dt(self) -> float:

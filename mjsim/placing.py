@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from mjsim.escapes import REST_STEPS
 from mjsim.person import Motion, Person, Steps, minimum_jerk, wrap
 from mjsim.receptacles import ReceptacleGeometry
-from mjsim.sight import first_hit
 
 Vector = NDArray[np.float64]
 
@@ -132,16 +131,13 @@ def fill_slots(person: Person, item: int, receptacle: ReceptacleGeometry, footpr
 
 def _surface(person: Person, item: int, receptacle: ReceptacleGeometry, at: Vector, extent: Vector) -> Vector:
     """Heights of what lies below a footprint, m above the centre of the volume, (25,)."""
-    ignore = {int(b) for b in person.carried_bodies()} | {int(person.scene.index.bodies[item])}
-    top = float(receptacle.half_size[2]) + _PROBE_ABOVE
-    heights = []
+    ignore = np.array([*person.carried_bodies(), person.scene.index.bodies[item]], np.int32)
     span = np.linspace(-1.0, 1.0, _PROBES)
-    for u, v in itertools.product(span, span):
-        local = np.array([at[0] + u * extent[0], at[1] + v * extent[1], top])
-        start = receptacle.center + receptacle.rotation @ local
-        distance, _ = first_hit(person.scene.model, person.data, start, (0.0, 0.0, -1.0), ignore=ignore)
-        heights.append(max(top - distance, -float(receptacle.half_size[2])))
-    return np.array(heights)
+    local = at + extent * np.stack(np.meshgrid(span, span, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = receptacle.center[:2] + local @ receptacle.rotation[:2, :2].T
+    top = float(receptacle.center[2] + receptacle.half_size[2]) + _PROBE_ABOVE
+    heights = person.soundings.heights(person.data, receptacle, points, top, ignore)
+    return np.asarray(np.maximum(heights - receptacle.center[2], -receptacle.half_size[2]))
 
 
 def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector) -> Vector:

@@ -1,5 +1,6 @@
 """Lines of sight and probing rays against the compiled model."""
 
+import math
 from collections.abc import Collection
 
 import mujoco
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 # Structure and furniture (0), ceilings (1), collision guards (3); not decoration (2) and not the person (4).
-_SOLID = np.array([1, 1, 0, 1, 0, 0], np.uint8)
+SOLID = np.array([1, 1, 0, 1, 0, 0], np.uint8)
 _MAX_SKIPS = 32
 
 
@@ -19,6 +20,7 @@ def first_hit(
     *,
     ignore: Collection[int] = (),
     static_only: bool = False,
+    reach: float = math.inf,
 ) -> tuple[float, int]:
     """Nearest solid geom along a ray.
 
@@ -29,6 +31,7 @@ def first_hit(
         direction: Direction (3,); distances are in units of its length.
         ignore: Body ids that the ray passes through.
         static_only: Whether it passes through everything that can move.
+        reach: Where the ray ends; what lies farther may be reported or not.
 
     Returns:
         Distance and geom id; infinity and -1 when nothing is hit.
@@ -37,8 +40,9 @@ def first_hit(
     along = np.array(direction, np.float64)
     geom = np.zeros(1, np.int32)
     travelled = 0.0
+    excluded = next(iter(ignore)) if len(ignore) == 1 else -1
     for _ in range(_MAX_SKIPS):
-        distance = mujoco.mj_ray(model, data, origin + travelled * along, along, _SOLID, 1, -1, geom)
+        distance = mujoco.mj_ray(model, data, origin + travelled * along, along, SOLID, 1, excluded, geom)
         if distance < 0:
             break
         travelled += distance
@@ -46,6 +50,8 @@ def first_hit(
         if body not in ignore and not (static_only and model.body_weldid[body] != 0):
             return travelled, int(geom[0])
         travelled += 1e-6
+        if travelled > reach:
+            break
     return float("inf"), -1
 
 
@@ -53,5 +59,5 @@ def sees(
     model: mujoco.MjModel, data: mujoco.MjData, eye: NDArray[np.float64], point: NDArray[np.float64]
 ) -> bool:
     """Whether nothing static lies between two points (3,), m."""
-    distance, _ = first_hit(model, data, eye, point - eye, static_only=True)
+    distance, _ = first_hit(model, data, eye, point - eye, static_only=True, reach=1.0)
     return distance >= 1.0

@@ -231,6 +231,8 @@ class Full:
 
     def dislodged(self) -> list[int]:
         """Delivered objects that have left their receptacles."""
+        if self._only_held_awake():
+            return []
         return [
             item
             for item, status in enumerate(self.ledger.status)
@@ -239,11 +241,15 @@ class Full:
 
     def calm(self, speed: float) -> bool:
         """Whether all that nobody holds sleeps, or is slower than `speed`, m/s."""
-        gripped = self.person.grips.gripped
-        if self.data.ntree_awake == 1 + len(gripped):  # the person is always awake, and wakes what it holds
+        if self._only_held_awake():
             return True
+        gripped = self.person.grips.gripped
         awake = np.flatnonzero(self.data.tree_awake[self.scene.index.trees])
         return all(self.person.speed(item) < speed for item in awake.tolist() if item not in gripped)
+
+    def _only_held_awake(self) -> bool:
+        """Whether all that nobody holds sleeps: the person is always awake, and wakes what it holds."""
+        return bool(self.data.ntree_awake == 1 + len(self.person.grips.gripped))
 
     def poses(self) -> NDArray[np.float64]:
         """Poses of all objects, m and wxyz, shape (n, 7)."""
