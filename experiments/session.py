@@ -286,7 +286,8 @@ class Session:
             status = observation.object_status
             minded = np.array([s is ObjectStatus.LOOSE for s in status])
             self._minded = status, minded
-        return Things(observation.object_names, observation.object_positions, minded)
+        # Kernels are compiled for arrays without gaps.
+        return Things(observation.object_names, np.ascontiguousarray(observation.object_positions), minded)
 
 
 def _position_of(observation: Observation, name: str) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ LOOK_AHEAD = 0.25  # m; longer cuts corners into the walls, shorter wobbles
 LOOK_BEYOND = 1.2  # m; farther than `STEP_AROUND_FROM`
 STEP_AROUND_FROM = 0.8  # m ahead
 CLEAR_OF_FEET = 0.40  # m from the body's axis: its radius and half an object
+LEAST_AHEAD = 0.6  # m ahead per metre aside on the way around a thing's far side; with less one would dither
 BRAKING = 1.5  # m/s^2 planned for, half of what the body can do
 TURN_GAIN = 5.0  # 1/s
 MAX_TURN = 2.5  # rad/s
@@ -137,8 +138,8 @@ def sidestep(
 ) -> tuple[float, float]:
     """Where to walk instead of straight to `target` so that things on the floor stay beside the feet, m.
 
-    Passes the nearest thing ahead on the side it is not on; on the other side if that is blocked; and straight on,
-    over it, if both are.
+    Passes the nearest thing ahead on the side it is not on; on the other side if that is blocked and takes no
+    turn aside; and else straight on, over it.
 
     Args:
         x: Where the person is, m.
@@ -171,6 +172,8 @@ def sidestep(
     side = -1.0 if nearest_across >= 0.0 else 1.0
     for sign in (side, -side):
         out = nearest_across + sign * CLEAR_OF_FEET
+        if sign != side and nearest_along < LEAST_AHEAD * abs(out):
+            break
         step_x = nearest_along * ahead_x - out * ahead_y
         step_y = nearest_along * ahead_y + out * ahead_x
         share = gap / math.sqrt(step_x * step_x + step_y * step_y)

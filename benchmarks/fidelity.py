@@ -1,0 +1,114 @@
+"""The same trials in every fidelity: whether the tiers agree, and how many simulated seconds each gives per core-second.
+
+Agreement is against the tier `full`, trial by trial. Speed is that of whole trials: world, session, participant and log,
+in CPU time, without the planner and without setting up.
+"""
+
+import os
+import statistics
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from experiments.agreement import Ran, in_every_fidelity
+from experiments.trial import TrialConfig
+from mjsim.options import FIDELITIES
+
+SEEDS = 50
+QUICK_SEEDS = 2
+OBJECTS = (6, 12, 18, 24)
+QUICK_OBJECTS = (6, 24)
+PEOPLE = (("optimal", "follower"), ("highlight", "nearest"))
+COMPARED = ("completion_time_s", "task_distance_m", "inverse_path_length", "normalized_deviations")
+SAME_DELIVERIES, TIME_DIFFERENCE = 1.0, 0.01  # targets
+
+
+def measure(*, seeds: int = 0, objects: Sequence[int] = (), quick: bool = False) -> dict[str, Any]:
+    """Run the benchmark; everything in it can be written as JSON.
+
+    Args:
+        seeds: Houses of each difficulty; 0 for 50, or 2 when `quick`.
+        objects: Difficulties.
+        quick: Few trials.
+    """
+    count = seeds or (QUICK_SEEDS if quick else SEEDS)
+    difficulties = tuple(objects) or (QUICK_OBJECTS if quick else OBJECTS)
+    cells = [(person, n) for person in PEOPLE for n in difficulties]
+    configs = [
+        TrialConfig(objects=n, assistance=assistance, user=user, seed=seed)
+        for (assistance, user), n in cells
+        for seed in range(count)
+    ]
+    results = in_every_fidelity(configs, workers=os.cpu_count() or 1)
+    rows = []
+    for i, ((assistance, user), n) in enumerate(cells):
+        trials = results[i * count : (i + 1) * count]
+        for fidelity in FIDELITIES:
+            row = compare([t["full"] for t in trials], [t[fidelity] for t in trials])
+            rows.append(
+                {"assistance": assistance, "user": user, "objects": n, "fidelity": fidelity, **row}
+            )
+    return {"seeds": count, "rows": rows}
+
+
+def compare(full: Sequence[Ran], tier: Sequence[Ran]) -> dict[str, Any]:
+    """Agreement of the same trials in two fidelities, and the speed of the second.
+
+    Differences are relative to the mean of `full` where that is not 0: of the means, and the largest of any trial.
+    """
+    row: dict[str, Any] = {
+        "same_deliveries": statistics.fmean(a.delivered == b.delivered for a, b in zip(full, tier, strict=True)),
+        "differing_seeds": [
+            b.config.seed for a, b in zip(full, tier, strict=True) if a.delivered != b.delivered
+        ],
+        "simulated_per_core_s": sum(r.simulated_s for r in tier) / sum(r.cpu_s for r in tier),
+    }
+    for name in COMPARED:
+        there = [float(r.metrics[name]) for r in full]
+        here = [float(r.metrics[name]) for r in tier]
+        mean = statistics.fmean(there)
+        gaps = [b - a for a, b in zip(there, here, strict=True)]
+        scale = mean if mean else 1.0
+        row[name] = {
+            "mean": statistics.fmean(here),
+            "difference": statistics.fmean(gaps) / scale,
+            "largest": max(gaps, key=abs) / scale,
+        }
+    return row
+
+
+def lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result as text: a table in Markdown, then what was aimed at."""
+    yield f"{result['seeds']} houses of each difficulty; differences are against `full`, of the mean (largest of any trial)"
+    yield ""
+    yield "| participant | objects | fidelity | same deliveries | time | distance | IPL | deviations | sim. s per core-s |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for row in result["rows"]:
+        yield "| " + " | ".join(_cells(row)) + " |"
+    yield ""
+    for row in result["rows"]:
+        if row["differing_seeds"]:
+            yield f"{row['user']}, {row['objects']} objects, {row['fidelity']}: other deliveries with seeds {row['differing_seeds']}"
+    others = [row for row in result["rows"] if row["fidelity"] != "full"]
+    same = min(row["same_deliveries"] for row in others)
+    worst = max(abs(row["completion_time_s"]["difference"]) for row in others)
+    yield _verdict("same deliveries, worst cell", f"{same:.1%}", same >= SAME_DELIVERIES, "= 100 %")
+    yield _verdict("mean completion time, worst cell", f"{worst:.2%}", worst <= TIME_DIFFERENCE, "<= 1 %")
+
+
+def _cells(row: dict[str, Any]) -> Iterator[str]:
+    yield from (row["user"], str(row["objects"]), row["fidelity"])
+    if row["fidelity"] == "full":
+        yield "-"
+        yield f"{row['completion_time_s']['mean']:.1f} s"
+        yield f"{row['task_distance_m']['mean']:.1f} m"
+        yield f"{row['inverse_path_length']['mean']:.3f}"
+        yield f"{row['normalized_deviations']['mean']:.3f}"
+    else:
+        yield f"{row['same_deliveries']:.0%}"
+        for name in COMPARED:
+            yield f"{row[name]['difference']:+.2%} ({row[name]['largest']:+.1%})"
+    yield f"{row['simulated_per_core_s']:.0f}"
+
+
+def _verdict(what: str, value: str, holds: bool, target: str) -> str:
+    return f"{what}: {value} ({target}: {'holds' if holds else 'MISSED'})"
