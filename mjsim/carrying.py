@@ -3,19 +3,19 @@
 How a hand does that is in `mjsim.postures`. What still gets caught, by a blow or from above, slips out of the hand.
 """
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim import avatar
-from mjsim.clearance import ClearanceField
+from mjsim.clearance import carry_clearance
 from mjsim.person import Person
 from mjsim.placing import object_corners
 from mjsim.postures import LOWEST, drawn_in, update_hands
 from mjsim.scene import Scene
 
-CARRY_BAND = (0.93, 1.60)  # heights that carried things take up, m
 _MOST_HELD_BACK = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
 _NO_CONTACTS = (np.zeros((0, 2), np.int32), np.zeros((0, 9)))
 _HOUSE, _PERSON = -1, -2  # who bears a geom, where no object does
@@ -31,10 +31,8 @@ class Carrying:
 
     def __init__(self, person: Person) -> None:
         scene = person.scene
-        low, high = CARRY_BAND
         self._person = person
-        self._clearance = ClearanceField.from_model(scene.model, low=low, high=high)
-        self.field = (self._clearance.distance, self._clearance.gradient, self._clearance.frame)
+        self.field = carry_clearance(scene).arrays
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._bearer = _bearers(scene)
         self._rest = np.array(avatar.REST)
@@ -95,7 +93,8 @@ class Carrying:
         """Whether a hand has for too long been stretched off its load, or held back by it; counts this step."""
         person = self._person
         error = person.grips.error(hand)
-        held_back = float(np.linalg.norm(person.rig.hands[hand] - person.rig.hand_targets[hand]))
+        x, y, z = person.rig.pose[4 + 3 * hand : 7 + 3 * hand].tolist()
+        held_back = math.dist((x, y, z), person.rig.hand_targets[hand].tolist())
         strained = error > person.options.grip_error or held_back > _MOST_HELD_BACK
         self._strained[hand] = self._strained[hand] + 1 if strained else 0
         return self._strained[hand] * person.dt > person.options.grip_patience

@@ -10,6 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 from mjsim.footprint import footprint
 from mjsim.kernels import kernel
+from mjsim.scene import Scene
 
 _BORDER = 0.4  # m of grid around the rooms
 
@@ -34,6 +35,11 @@ class ClearanceField:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frame", np.array([*self.origin, self.resolution]))
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Distance, gradient and frame, for kernels."""
+        return self.distance, self.gradient, self.frame
 
     @classmethod
     def from_model(
@@ -81,6 +87,33 @@ def clearance_at(
     high = (1 - a) * distance[i, j + 1] + a * distance[i + 1, j + 1]
     near_i, near_j = i + int(a > 0.5), j + int(b > 0.5)
     return (1 - b) * low + b * high, gradient[near_i, near_j, 0], gradient[near_i, near_j, 1]
+
+
+CARRY_BAND = (0.93, 1.60)  # heights that carried things take up, m
+
+
+def carry_clearance(scene: Scene) -> ClearanceField:
+    """Clearance at the heights of what is carried; worked out once per house."""
+    low, high = CARRY_BAND
+    return scene.catalogue.library.once(
+        ("clearance", low, high), lambda: ClearanceField.from_model(scene.model, low=low, high=high)
+    )
+
+
+@kernel
+def way_is_clear(
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    frame: NDArray[np.float64],
+) -> bool:
+    """Whether nothing static can lie between two points (3,), m, by the field of `carry_clearance` alone."""
+    low, high = CARRY_BAND
+    if min(start[2], end[2]) < low or max(start[2], end[2]) > high:
+        return False
+    room, _, _ = clearance_at(start[0], start[1], distance, gradient, frame)
+    return bool(math.hypot(end[0] - start[0], end[1] - start[1]) < room - 2.0 * frame[2])
 
 
 def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:

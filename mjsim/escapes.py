@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import EventKind
+from mjsim.clearance import carry_clearance, way_is_clear
 from mjsim.scene import Scene
 from mjsim.sight import first_hit
 from mjsim.survey import FAST, MOVED, PUSHED, SLOW
@@ -117,6 +118,7 @@ class Escapes:
     def __init__(self, scene: Scene) -> None:
         self._model, self._rooms, self._bodies = scene.model, scene.rooms, scene.index.bodies
         self.anchors = np.zeros((len(self._bodies), 3))
+        self._field = carry_clearance(scene).arrays
 
     def reset(self, data: mujoco.MjData) -> None:
         """Start from the present state."""
@@ -177,8 +179,12 @@ class Escapes:
 
     def _passed_through(self, data: mujoco.MjData, item: int) -> bool:
         """Whether something static that collides lies between where the object was and where it is."""
-        way = data.xipos[self._bodies[item]] - self.anchors[item]
-        distance, geom = first_hit(self._model, data, self.anchors[item], way, static_only=True)
+        body = int(self._bodies[item])
+        start, end = self.anchors[item], data.xipos[body]
+        if way_is_clear(start, end, *self._field):
+            return False
+        way = end - start
+        distance, geom = first_hit(self._model, data, start, way, ignore=(body,), static_only=True, reach=1.0)
         return distance < 1.0 and bool(self._model.geom_contype[geom] or self._model.geom_conaffinity[geom])
 
     def _outside(self, item: int) -> bool:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mjsim import avatar
 from mjsim.errors import AssetError
+from mjsim.kernels import kernel
 from mjsim.rig import Rig
 from mjsim.scene import Scene
 
@@ -59,8 +60,7 @@ class Grips:
 
     def gap(self, hand: int, item: int, grip: int) -> float:
         """Distance between a hand and a grip site, m."""
-        hand_point = self._data.site_xpos[self._hand_sites[hand]]
-        return float(np.linalg.norm(hand_point - self._data.site_xpos[self._sites[item, grip]]))
+        return site_gap(self._data.site_xpos, self._hand_sites[hand], self._sites[item, grip])
 
     def close(self, hand: int, item: int, grip: int, *, gently: bool = False) -> None:
         """Weld object `item` to a hand, firmly or at first gently; a sleeping object wakes."""
@@ -90,9 +90,10 @@ class Grips:
         if closed is None:
             return math.nan, math.nan
         hand_site, site = self._hand_sites[hand], self._sites[closed]
-        # The trace of the rotation from one to the other is 1 + 2 cos(angle).
-        cosine = 0.5 * (float(self._data.site_xmat[hand_site] @ self._data.site_xmat[site]) - 1.0)
-        return self.gap(hand, *closed), math.acos(min(1.0, max(-1.0, cosine)))
+        return (
+            site_gap(self._data.site_xpos, hand_site, site),
+            site_angle(self._data.site_xmat, hand_site, site),
+        )
 
     def memory(self) -> list[list[int] | None]:
         """Object and grip that each hand holds, JSON-ready; the welds themselves are part of the physics."""
@@ -105,6 +106,24 @@ class Grips:
     def reset(self) -> None:
         """Forget what was held; the state's welds are reset with the state."""
         self._closed = [None, None]
+
+
+@kernel
+def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
+    """Distance between two sites, m."""
+    total = 0.0
+    for axis in range(3):
+        total += (site_xpos[first, axis] - site_xpos[second, axis]) ** 2
+    return math.sqrt(total)
+
+
+@kernel
+def site_angle(site_xmat: NDArray[np.float64], first: int, second: int) -> float:
+    """Angle between two sites' frames, rad."""
+    trace = 0.0  # of the rotation from one to the other: 1 + 2 cos(angle)
+    for k in range(9):
+        trace += site_xmat[first, k] * site_xmat[second, k]
+    return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
 
 
 def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:

@@ -1,5 +1,6 @@
 """Which room a point on the floor lies in: the semantic locations of the checklist (PAPER section 5)."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.errors import AssetError
+from mjsim.kernels import kernel
 
 PREFIX = "room:"
 
@@ -79,7 +81,8 @@ class RoomMap:
 
     def contains(self, xy: ArrayLike, margin: float = 0.0) -> bool:
         """Whether the point (x, y), m, lies in some room, or within `margin` metres of one."""
-        return bool(self.distances(xy).min() <= margin)
+        x, y = xy if isinstance(xy, tuple) else np.asarray(xy, dtype=np.float64)[:2].tolist()
+        return nearest_rectangle(x, y, self.centers, self.half_sizes, self.axes) <= margin
 
     def label(self, key: str) -> str:
         """Label of a room.
@@ -97,6 +100,24 @@ class RoomMap:
         reach = np.einsum("kij,kj->ki", np.abs(self.axes), self.half_sizes)
         low, high = (self.centers - reach).min(axis=0), (self.centers + reach).max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+@kernel
+def nearest_rectangle(
+    x: float,
+    y: float,
+    centers: NDArray[np.float64],
+    half_sizes: NDArray[np.float64],
+    axes: NDArray[np.float64],
+) -> float:
+    """Distance from a point to the nearest of some rectangles, m; 0 inside; arrays as in `RoomMap`."""
+    nearest = math.inf
+    for k in range(len(centers)):
+        dx, dy = x - centers[k, 0], y - centers[k, 1]
+        u = max(abs(axes[k, 0, 0] * dx + axes[k, 1, 0] * dy) - half_sizes[k, 0], 0.0)
+        v = max(abs(axes[k, 0, 1] * dx + axes[k, 1, 1] * dy) - half_sizes[k, 1], 0.0)
+        nearest = min(nearest, math.hypot(u, v))
+    return nearest
 
 
 def _check_box(model: mujoco.MjModel, data: mujoco.MjData, site: int, name: str) -> None:

@@ -1,7 +1,7 @@
 """Composition of a house, its receptacles and an episode's objects into one compiled model (MjSpec)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -39,6 +39,10 @@ class SceneIndex:
     dofs: NDArray[np.int32]
     trees: NDArray[np.int32]
     geom_owner: NDArray[np.int32]
+    _rows: NDArray[np.intp] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_rows", self.qpos[:, None].astype(np.intp) + np.arange(7))
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, names: tuple[str, ...]) -> "SceneIndex":
@@ -82,7 +86,7 @@ class SceneIndex:
 
     def poses(self, qpos: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions (n, 3), m, and quaternions wxyz (n, 4) of all objects, copied out of a `qpos`."""
-        rows = qpos[self.qpos[:, None] + np.arange(7)]
+        rows = qpos[self._rows]
         return rows[:, :3], rows[:, 3:]
 
 
