@@ -11,6 +11,7 @@ REACH_TIME = 0.44
 APPROACH_TIME = 0.4  # longest wait for the hand to arrive after the reach
 ALIGN_TIME = 0.12
 LIFT_TIME = 0.64
+SEAT_TIME = 0.2  # longest wait for a load to sit in the hand; held gently, it does not before
 _SHIFT = 0.2  # share of a movement by which one of its two parts leads the other
 _CLOSE_ENOUGH = 0.012
 
@@ -78,7 +79,7 @@ def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) ->
         rig.hand_targets[hand] = lead_blend(start, goal, k / count, leading="up")
         person.look_towards(pitch)
         yield
-    for _ in range(person.steps(0.2)):
+    for _ in range(person.steps(SEAT_TIME)):
         if person.grips.error(hand) < 0.5 * person.options.grip_error:
             break
         yield

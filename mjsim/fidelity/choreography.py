@@ -20,7 +20,7 @@ from mjsim.fidelity.strides import BODY, HANDS
 from mjsim.fidelity.walker import Walker
 from mjsim.kinematics import HEADING, LOOK, X, Y
 from mjsim.person import FACE_TIMEOUT
-from mjsim.picking import ALIGN_TIME, LIFT_TIME, REACH_TIME
+from mjsim.picking import ALIGN_TIME, LIFT_TIME, REACH_TIME, SEAT_TIME
 from mjsim.placing import (
     DESCENT_SPEED,
     HAND_SPEED,
@@ -99,6 +99,7 @@ class Choreographer:
         goal = walker.place_for(hand, item)
         ahead = np.array([math.nan, math.nan, pitch])
         row = self._swing(script, row, hand, goal, person.steps(LIFT_TIME), UP_FIRST, ahead, False)
+        row = self._wait(script, row, hand, person.steps(SEAT_TIME))
         row = gestures.end(walker.live, walker.poses, script, row, walker.carry_posture, house)
         walker.live[:], walker.poses[:] = before
         return Plan(script, row, True)
