@@ -2,8 +2,10 @@
 
 import itertools
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +57,8 @@ Request = Step | Walk | Finish
 Outcome = StepResult | Stretch
 # Yields what a world is to do, takes what came of it, or is thrown the PhysicsError or KeyboardInterrupt that came.
 Play = Generator[Request, Outcome, T]
+# Takes a control step in each of several worlds.
+StepTogether = Callable[[Sequence[Step]], Sequence[StepResult | PhysicsError]]
 
 
 def drive(play: Play[T]) -> T:
@@ -75,7 +79,7 @@ def drive(play: Play[T]) -> T:
 def drive_many(
     plays: Iterable[tuple[str, Play[T]]],
     at_once: int,
-    step_together: Callable[[Sequence[Step]], Sequence[StepResult | PhysicsError]],
+    step_together: StepTogether,
 ) -> Iterator[tuple[str, T | Exception]]:
     """Run sessions side by side: all take a control step, then all decide, and so on.
 
@@ -114,18 +118,28 @@ def _go_on(play: Play[T], outcome: Outcome | PhysicsError | None) -> Request:
 
 def _perform(
     running: Mapping[str, tuple[Play[T], Request]],
-    step_together: Callable[[Sequence[Step]], Sequence[StepResult | PhysicsError]],
+    step_together: StepTogether,
 ) -> dict[str, Outcome | PhysicsError | None]:
     """Do what all sessions ask; what came of it, in the sessions' order."""
     steps = {name: request for name, (_, request) in running.items() if isinstance(request, Step)}
     results = dict(zip(steps, step_together(list(steps.values())) if steps else (), strict=True))
     outcomes: dict[str, Outcome | PhysicsError | None] = {}
     for name, (_, request) in running.items():
-        outcomes[name] = results[name] if name in results else attempt(request)
+        outcomes[name] = results[name] if name in results else _attempt(request)
     return outcomes
 
 
-def attempt(request: Request) -> Outcome | PhysicsError:
+@contextmanager
+def stepping(threads: int = 1) -> Iterator[StepTogether]:
+    """How to step many worlds at once, on so many threads; what comes of it does not depend on their number."""
+    if threads == 1:
+        yield lambda steps: [_attempt(step) for step in steps]
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        yield lambda steps: list(pool.map(_attempt, steps))
+
+
+def _attempt(request: Step | Walk | Finish) -> Any:
     """Do what a session asks; a failure of the physics is an answer like any other."""
     try:
         return request.perform()
