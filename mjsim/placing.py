@@ -18,7 +18,9 @@ _WALL_GAP = 0.012
 HOVER_GAP = 0.03
 RELEASE_GAP = 0.002
 _PROBE_ABOVE = 0.2
-_PROBES = 5
+_PROBES = np.linspace(-1.0, 1.0, 5)
+_GRID = np.stack(np.meshgrid(_PROBES, _PROBES, indexing="ij"), axis=-1).reshape(-1, 2)
+_SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
 HAND_SPEED = 0.9
 DESCENT_SPEED = 0.5
 _TOUCH = 0.0005
@@ -117,10 +119,10 @@ def fill_slots(person: Person, item: int, receptacle: ReceptacleGeometry, footpr
     extent = 0.5 * (footprint.high - footprint.low)[:2]
     room = np.maximum(half - extent - _WALL_GAP, 0.0)
     me = (np.array([*person.rig.position, 0.0]) - receptacle.center) @ receptacle.rotation
+    centres = [np.clip(half * side, -room, room) for side in _SLOTS]
     ranked = []
-    for sx, sy in itertools.product((-0.5, 0.5), repeat=2):
-        at = np.clip(half * (sx, sy), -room, room)
-        heights = _surface(person, item, receptacle, at, np.minimum(extent, half))
+    surfaces = _surfaces(person, item, receptacle, np.array(centres), np.minimum(extent, half))
+    for at, heights in zip(centres, surfaces, strict=True):
         fill = float(heights.max())
         # On a slope things tip over: what is missing below counts as if it were filled.
         cost = fill + (fill - float(heights.mean()))
@@ -129,15 +131,17 @@ def fill_slots(person: Person, item: int, receptacle: ReceptacleGeometry, footpr
     return [slot for _, _, slot in ranked]
 
 
-def _surface(person: Person, item: int, receptacle: ReceptacleGeometry, at: Vector, extent: Vector) -> Vector:
-    """Heights of what lies below a footprint, m above the centre of the volume, (25,)."""
+def _surfaces(
+    person: Person, item: int, receptacle: ReceptacleGeometry, centres: Vector, extent: Vector
+) -> Vector:
+    """Heights of what lies below a footprint at each of several centres (k, 2), m above the volume's, (k, 25)."""
     ignore = np.array([*person.carried_bodies(), person.scene.index.bodies[item]], np.int32)
-    span = np.linspace(-1.0, 1.0, _PROBES)
-    local = at + extent * np.stack(np.meshgrid(span, span, indexing="ij"), axis=-1).reshape(-1, 2)
+    local = (centres[:, None] + extent * _GRID).reshape(-1, 2)
     points = receptacle.center[:2] + local @ receptacle.rotation[:2, :2].T
     top = float(receptacle.center[2] + receptacle.half_size[2]) + _PROBE_ABOVE
     heights = person.soundings.heights(person.data, receptacle, points, top, ignore)
-    return np.asarray(np.maximum(heights - receptacle.center[2], -receptacle.half_size[2]))
+    lowest = -receptacle.half_size[2]
+    return np.asarray(np.maximum(heights - receptacle.center[2], lowest).reshape(len(centres), -1))
 
 
 def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector) -> Vector:

@@ -63,7 +63,8 @@ class Soundings:
 
     def _moving_near(self, data: mujoco.MjData, receptacle: ReceptacleGeometry, ignore: Ints) -> Ints:
         near = self._within_reach(data, receptacle, self._moving)
-        return near[~np.isin(self._model.geom_bodyid[near], ignore)]
+        bodies = self._model.geom_bodyid[near]
+        return np.asarray(near[(bodies[:, None] != ignore).all(axis=1)])
 
     def _within_reach(self, data: mujoco.MjData, receptacle: ReceptacleGeometry, geoms: Ints) -> Ints:
         offsets = data.geom_xpos[geoms, :2] - receptacle.center[:2]
