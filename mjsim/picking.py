@@ -45,6 +45,21 @@ def pick(
             break
         rig.hand_targets[hand] = rig.to_body(grips.point(item, grip))
         yield
+    success = yield from take(person, hand, item, place_for, pitch)
+    return success
+
+
+def take(
+    person: Person,
+    hand: int,
+    item: int,
+    place_for: Callable[[int, int], NDArray[np.float64]],
+    pitch: float,
+) -> Motion:
+    """Lift object `item`, which the hand has reached; the rest is as in `pick`."""
+    grips = person.grips
+    person.moving_hand = hand
+    grip = grips.nearest_grip(hand, item)
     if grips.gap(hand, item, grip) > person.options.grip_distance:
         return False
     grips.close(hand, item, grip, gently=True)

@@ -67,33 +67,28 @@ class Choreographer:
         self._tucked, self._aside = np.array(avatar.TUCKED), np.array(avatar.ASIDE)
         self._corners: dict[tuple[int, int], Vector] = {}
 
-    def turn(self, result: ActionResult) -> tuple[Script, int]:
-        """Brake and turn to what is picked or where it is placed; the script and its length.
+    def approach(self, result: ActionResult, hand: int, item: int) -> tuple[Script, int]:
+        """Turn to what is picked and reach for it, or turn to where it is placed; the script and its length.
 
         Data must be in step with the walk, which is left as it was.
         """
-        script = Script.empty(_MOST, len(self._walker.poses))
-        before = self._walker.live.copy(), self._walker.poses.copy()
+        walker = self._walker
+        script = Script.empty(_MOST, len(walker.poses))
+        before = walker.live.copy(), walker.poses.copy()
         if isinstance(result.action, Pick):
-            item = self._full.scene.index.position_of(str(result.object))
-            length = self._turn_to_object(script, item)
+            row, _ = self._reach(script, hand, item)
         else:
-            length = self._turn_to_receptacle(script, self._full.scene.receptacles[str(result.receptacle)])
-        self._walker.live[:], self._walker.poses[:] = before
-        return script, length
+            row = self._turn_to_receptacle(script, self._full.scene.receptacles[str(result.receptacle)])
+        walker.live[:], walker.poses[:] = before
+        return script, row
 
     def pick(self, hand: int, item: int) -> Plan:
         """Take object `item`; data must be in step with the walk, which is left as it was."""
         walker, person, house = self._walker, self._full.person, self._walker.house
         before = walker.live.copy(), walker.poses.copy()
         script = Script.empty(_MOST, len(walker.poses))
-        center, pitch = person.center(item), walker.pitch_target
-        row = self._turn_to_object(script, item)
-        heading = float(walker.live[BODY + HEADING])
-        grip = person.grips.grip_along(item, np.array([math.cos(heading), math.sin(heading), 0.0]))
-        point = person.grips.point(item, grip)
-        row = self._swing(script, row, hand, point, person.steps(REACH_TIME), ACROSS_FIRST, center, True)
-        row = self._wait(script, row, hand, _APPROACH)
+        pitch = walker.pitch_target
+        row, grip = self._reach(script, hand, item)
         walker.hold(hand, item, grip)
         row = self._wait(script, row, hand, person.steps(ALIGN_TIME))
         goal = walker.place_for(hand, item)
@@ -133,8 +128,16 @@ class Choreographer:
         incidents = tuple((released + step, kind, item) for step, kind, item in fall.incidents)
         return Plan(script, row, fall.success, incidents)
 
-    def _turn_to_object(self, script: Script, item: int) -> int:
-        return self._face(script, self._full.person.center(item), _ANYWHERE, _FACING)
+    def _reach(self, script: Script, hand: int, item: int) -> tuple[int, int]:
+        """Turn to an object and reach for it; the next row, and the grip that is nearest then."""
+        person = self._full.person
+        center = person.center(item)
+        row = self._face(script, center, _ANYWHERE, _FACING)
+        heading = float(self._walker.live[BODY + HEADING])
+        grip = person.grips.grip_along(item, np.array([math.cos(heading), math.sin(heading), 0.0]))
+        point = person.grips.point(item, grip)
+        row = self._swing(script, row, hand, point, person.steps(REACH_TIME), ACROSS_FIRST, center, True)
+        return self._wait(script, row, hand, _APPROACH), grip
 
     def _turn_to_receptacle(self, script: Script, receptacle: ReceptacleGeometry) -> int:
         heading = square_heading(self._full.person, receptacle)

@@ -1,6 +1,7 @@
 """Everything in physics: walking, reaching, carrying, letting go."""
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +23,7 @@ from mjsim.monitoring import HealthMonitor
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
 from mjsim.person import Motion, Person
-from mjsim.picking import pick
+from mjsim.picking import pick, take
 from mjsim.placing import place
 from mjsim.recording import StateHash, WorldState, set_physics, take_physics
 from mjsim.rig import Rig
@@ -144,12 +145,20 @@ class Full:
             return free[0], item
         return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item
 
-    def begin(self, result: ActionResult, *, pitch: float | None = None) -> None:
-        """Begin a feasible pick or place, after which the head looks to `pitch`, rad, or where it looks now."""
+    def begin(self, result: ActionResult) -> None:
+        """Begin a feasible pick or place."""
         hand, item = self.hand_for(result)
-        pitch = self.person.rig.pitch_target if pitch is None else pitch
+        self._begin(result, pick, hand, item, self.person.rig.pitch_target)
+
+    def take_up(self, result: ActionResult, hand: int, item: int, pitch: float) -> None:
+        """Go on with a pick at the grip, or with a place at the turn; the head looks to `pitch`, rad, afterwards."""
+        self._begin(result, take, hand, item, pitch)
+
+    def _begin(
+        self, result: ActionResult, picking: Callable[..., Motion], hand: int, item: int, pitch: float
+    ) -> None:
         if isinstance(result.action, Pick):
-            steps = pick(self.person, hand, item, self.carrying.place_for, pitch)
+            steps = picking(self.person, hand, item, self.carrying.place_for, pitch)
         else:
             steps = place(self.person, hand, item, self.scene.receptacles[str(result.receptacle)], pitch)
         self._motion = _Motion(steps, result.action, hand, item, result.receptacle)

@@ -25,13 +25,15 @@ from mjsim.stretch import Stretch
 
 
 @dataclass(eq=False)
-class _Turn:
-    """The person braking and turning before a pick or place.
+class _Approach:
+    """What of a pick or place comes before physics: braking, turning, and the reach of a pick.
 
     Attributes:
         script: The state after each control step.
         length: How many.
         result: The answer that it was begun with.
+        hand: Hand that does it.
+        item: Object that it does it to.
         pitch: Where the head was told to look before, rad.
         played: Control steps so far.
     """
@@ -39,6 +41,8 @@ class _Turn:
     script: Script
     length: int
     result: ActionResult
+    hand: int
+    item: int
     pitch: float
     played: int = 0
 
@@ -46,10 +50,11 @@ class _Turn:
 class Windows:
     """The tier `windows`.
 
-    With a pick or place that is feasible the person first brakes and turns, still without physics. Then a window
-    opens: physics starts from exactly the state of the walk, and always from a reset, so that what happens in a
-    window depends on that state alone. It closes after the first control step at which the motion has ended and
-    everything that nobody holds sleeps or is slow.
+    With a pick or place that is feasible the person first brakes and turns, and reaches for what is picked, still
+    without physics: hands touch nothing until they grip. Then a window opens. Its physics starts from exactly the
+    state of the walk, and always from a reset, so that what happens in a window depends on that state alone. It
+    closes after the first control step at which the motion has ended and everything that nobody holds sleeps or is
+    slow.
 
     Attributes:
         ledger: Who holds what, what is put away, what happened in the latest control step.
@@ -61,7 +66,7 @@ class Windows:
         self.ledger = self._full.ledger
         self._walker = Walker(scene, options, self._full.person.rig, self._full.carrying)
         self._choreographer = Choreographer(self._full, self._walker)
-        self._turn: _Turn | None = None
+        self._coming: _Approach | None = None
         self._open = False
         self._written = False
 
@@ -79,7 +84,7 @@ class Windows:
     @property
     def busy(self) -> bool:
         """Whether a pick or place is under way."""
-        return self._turn is not None or self._full.busy
+        return self._coming is not None or self._full.busy
 
     @property
     def health(self) -> Health:
@@ -100,7 +105,7 @@ class Windows:
         """Return to the episode's beginning."""
         self._full.reset()
         self._walker.reset(self._full.data)
-        self._turn, self._open, self._written = None, False, False
+        self._coming, self._open, self._written = None, False, False
 
     def step(self, action: Action) -> ActionResult | None:
         """Advance by one control step."""
@@ -113,16 +118,16 @@ class Windows:
             self._write()
             result = self._full.resolve(action, busy=self.busy)
             if result is not None and result.applied:
-                self._turn = self._turn_for(result)
+                self._coming = self._approach(result)
         self.ledger.events = []
         self._written = False
-        if self._turn is None:
+        if self._coming is None:
             self._walker.step(action if isinstance(action, Move) else IDLE)
-        elif self._turn.played < self._turn.length:
-            self._walker.play(self._turn.script, self._turn.played, self._turn.played + 1)
-            self._turn.played += 1
+        elif self._coming.played < self._coming.length:
+            self._walker.play(self._coming.script, self._coming.played, self._coming.played + 1)
+            self._coming.played += 1
         else:
-            self._open_window(self._turn)
+            self._open_window(self._coming)
         return result
 
     def walk(self, moves: NDArray[np.float64]) -> Stretch:
@@ -167,7 +172,7 @@ class Windows:
         """
         try:
             memory = json.loads(state.memory)
-            self._turn, self._open = None, "rig" in memory
+            self._coming, self._open = None, "rig" in memory
             if self._open:
                 self._full.restore(state)
                 return
@@ -184,17 +189,18 @@ class Windows:
             self._walker.write(self._full.data)
             self._written = True
 
-    def _turn_for(self, result: ActionResult) -> _Turn:
-        """How the person turns to what is to be picked, or to where something is to be placed."""
+    def _approach(self, result: ActionResult) -> _Approach:
+        """How the person gets to where physics has to begin."""
+        hand, item = self._full.hand_for(result)
         pitch = self._walker.pitch_target
-        script, length = self._choreographer.turn(result)
-        return _Turn(script, length, result, pitch)
+        script, length = self._choreographer.approach(result, hand, item)
+        return _Approach(script, length, result, hand, item, pitch)
 
-    def _open_window(self, turn: _Turn) -> None:
-        """Let the physics go on from where the person has turned to, with one control step."""
+    def _open_window(self, approach: _Approach) -> None:
+        """Let the physics go on from where the person has come to, with one control step."""
         enter(self._full, self._walker)
-        self._turn, self._open = None, True
-        self._full.begin(turn.result, pitch=turn.pitch)
+        self._coming, self._open = None, True
+        self._full.take_up(approach.result, approach.hand, approach.item, approach.pitch)
         self._full.advance(IDLE)
         self._close_if_calm()
 
