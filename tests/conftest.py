@@ -4,6 +4,7 @@ from pathlib import Path
 
 import mujoco
 import pytest
+from hypothesis import settings
 
 from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode
@@ -11,6 +12,10 @@ from mjsim.footprint import Footprint, footprint
 from mjsim.sampling import sample_episode
 from mjsim.scene import Scene, compile_house, compose
 from planner.navmesh import NavMesh
+
+# Whether a test passes must not depend on how busy the machine is.
+settings.register_profile("unhurried", deadline=None)
+settings.load_profile("unhurried")
 
 
 @pytest.fixture(scope="session")
