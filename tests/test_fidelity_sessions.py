@@ -1,0 +1,199 @@
+"""Trials outside of full physics: foreseen or stepped, alone or side by side, run or replayed, they are the same."""
+
+import json
+
+import numpy as np
+import pytest
+
+from experiments import records
+from experiments.agreement import run_in
+from experiments.errors import ReplayError
+from experiments.house import House
+from experiments.lockstep import Step, drive_many, stepping
+from experiments.participants.base import Foreseeing
+from experiments.participants.follower import Follower
+from experiments.records import EventLog, read_arrays, read_events, read_json
+from experiments.replaying.replay import replay
+from experiments.trial import TrialConfig, play_trial, prepare_session, run_trial
+from mjsim.errors import PhysicsError
+from mjsim.monitoring import HealthMonitor
+from mjsim.scene import compose
+
+FILES = (records.EVENTS, records.EPISODE, records.TRAJECTORY, records.RECORDING, records.PLAN)
+
+
+@pytest.fixture(scope="module")
+def house():
+    return House.load()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def frequent_checkpoints():
+    """Every 2 s, so that walks are cut short by some."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.recording.CHECKPOINT_PERIOD", 2.0)
+        yield
+
+
+@pytest.fixture(scope="module")
+def event_run(house, tmp_path_factory):
+    out = tmp_path_factory.mktemp("event") / "run"
+    run_trial(
+        TrialConfig(objects=3, assistance="optimal", seed=3, fidelity="event"),
+        out,
+        topdown=False,
+        house=house,
+    )
+    return out
+
+
+def played(house, config, *, foresight):
+    """Arrays, log and state hashes of a trial, and how many single control steps its session asked for."""
+    scene = compose(house.sample_episode(objects=config.objects, seed=config.seed), house.catalogue)
+    log = EventLog()
+    session, _ = prepare_session(config, house, scene, log, foresight=foresight)
+    play, singles = session.play(), 0
+    try:
+        request = next(play)
+        while True:
+            singles += isinstance(request, Step)
+            request = play.send(request.perform())
+    except StopIteration as over:
+        assert over.value == "all delivered"
+    arrays = {name: array.tobytes() for name, array in session.trajectory.arrays().items()}
+    hashes = session.recording.state_hashes()
+    return (
+        {**arrays, "log": log.events, "log_hash": log.hash, "hashes": hashes.tolist()},
+        singles,
+        len(hashes),
+    )
+
+
+@pytest.mark.parametrize("fidelity", ["windows", "event"])
+@pytest.mark.parametrize("assistance", ["optimal", "highlight", "none"])
+def test_what_is_foreseen_is_what_stepping_gives(house, fidelity, assistance):
+    config = TrialConfig(objects=3, assistance=assistance, seed=1, fidelity=fidelity)
+    foreseen, singles, steps = played(house, config, foresight=True)
+    stepped, all_single, _ = played(house, config, foresight=False)
+    assert {name for name in stepped if stepped[name] != foreseen[name]} == set()
+    assert all_single == steps - 1
+    assert singles < (0.6 if assistance == "none" else 0.2) * steps
+
+
+@pytest.mark.parametrize("start", [0.0, 15.0])
+def test_a_run_without_physics_replays_from_anywhere(event_run, house, start):
+    report = replay(event_run, start=start, house=house)
+    assert report.ended == "all delivered"
+    assert (report.first > 0) == (start > 0)
+    assert report.first + report.steps == len(np.load(event_run / records.TRAJECTORY)["time"])
+
+
+def test_a_replay_names_the_step_within_a_walk_that_differs(event_run, house, tmp_path):
+    """The record says that another way was walked: its hashes fit, the physics does not."""
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    for path in event_run.iterdir():
+        (copy / path.name).write_bytes(path.read_bytes())
+    for name, array in ((records.RECORDING, "state_hash"), (records.TRAJECTORY, "position")):
+        arrays = read_arrays(copy / name)
+        arrays[array][40] += np.ones((), arrays[array].dtype)
+        np.savez_compressed(copy / name, **arrays)
+        with pytest.raises(ReplayError, match="first bad step 40 "):
+            replay(copy, house=house)
+        (copy / name).write_bytes((event_run / name).read_bytes())
+    assert replay(copy, house=house).first == 0
+
+
+def test_the_fidelity_is_part_of_the_record(event_run):
+    start = read_events(event_run / records.EVENTS)[0]
+    assert start["fidelity"] == start["world"]["fidelity"] == "event"
+    assert read_json(event_run / records.METRICS)["fidelity"] == "event"
+
+
+def test_side_by_side_is_as_one_by_one(house, tmp_path):
+    """Three trials of each fidelity, two at a time, one of which cannot even begin."""
+    configs = [
+        TrialConfig(objects=objects, assistance="optimal", seed=2, fidelity=fidelity, time_limit=12.0)
+        for fidelity in ("full", "windows", "event")
+        for objects in (2, 41, 3)
+    ]
+    names = [f"{config.fidelity}-{config.objects}" for config in configs]
+    for way, threads in (("alone", 0), ("together", 1), ("threads", 2)):
+        folder = tmp_path / way
+        plays = [
+            (name, play_trial(config, folder / name, topdown=False, house=house))
+            for name, config in zip(names, configs, strict=True)
+        ]
+        with stepping(threads or 1) as step_together:
+            results = dict(drive_many(plays, 1 if not threads else 4, step_together))
+        assert {n for n, r in results.items() if isinstance(r, Exception)} == {
+            n for n in names if n.endswith("41")
+        }
+    for name in (n for n in names if not n.endswith("41")):
+        for file in FILES:
+            contents = {
+                (tmp_path / way / name / file).read_bytes() for way in ("alone", "together", "threads")
+            }
+            assert len(contents) == 1, (name, file)
+        metrics = [
+            read_json(tmp_path / way / name / records.METRICS) for way in ("alone", "together", "threads")
+        ]
+        assert len({json.dumps({**m, "wall_s": 0}) for m in metrics}) == 1
+
+
+def test_a_failure_of_the_physics_within_a_walk_leaves_every_step(house, tmp_path, monkeypatch):
+    check = HealthMonitor.check
+
+    def fails_late(self, held):
+        if self._rig.data.time > 8.0:
+            raise PhysicsError("the physics failed on purpose")
+        return check(self, held)
+
+    monkeypatch.setattr(HealthMonitor, "check", fails_late)
+    config = TrialConfig(objects=3, assistance="optimal", seed=3, fidelity="windows")
+    with pytest.raises(PhysicsError, match="on purpose"):
+        run_trial(config, tmp_path / "run", topdown=False, house=house)
+    kept = tmp_path / "run.failed"
+    last = read_events(kept / records.EVENTS)[-1]
+    assert last["reason"] == "physics error"
+    assert len(np.load(kept / records.TRAJECTORY)["time"]) == round(last["t"] / 0.04) + 1 > 200
+    assert replay(kept, house=house).failure == last["error"]
+
+
+def test_an_interrupted_run_without_physics_replays(house, tmp_path):
+    def interrupt(progress):
+        if progress.time > 5.0:
+            raise KeyboardInterrupt
+
+    config = TrialConfig(objects=3, assistance="optimal", seed=3, fidelity="event")
+    metrics = run_trial(config, tmp_path / "run", topdown=False, house=house, on_progress=interrupt)
+    assert metrics["ended"] == "interrupted"
+    assert metrics["completion_time_s"] >= metrics["simulated_s"] > 4.0
+    assert replay(tmp_path / "run", house=house).ended == "interrupted"
+
+
+def test_only_walkers_that_can_foresee_are_asked_to(house):
+    assert isinstance(Follower(house.known()), Foreseeing)
+
+    class Stepper:
+        needs = frozenset()
+
+        def act(self, percept):
+            raise NotImplementedError
+
+    assert not isinstance(Stepper(), Foreseeing)
+
+
+def test_the_tiers_deliver_the_same_in_about_the_same_time(house):
+    config = TrialConfig(objects=3, assistance="optimal", seed=1)
+    ran = {name: run_in(TrialConfig(objects=3, assistance="optimal", seed=1, fidelity=name), house)
+           for name in ("full", "windows", "event")}  # fmt: skip
+    full = ran["full"]
+    assert len(full.delivered) == config.objects
+    for other in ran.values():
+        assert other.delivered == full.delivered
+        assert other.metrics["completion_time_s"] == pytest.approx(
+            full.metrics["completion_time_s"], rel=0.03
+        )
+        assert other.metrics["task_distance_m"] == pytest.approx(full.metrics["task_distance_m"], rel=0.03)
+        assert other.cpu_s > 0
