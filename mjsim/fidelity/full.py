@@ -264,6 +264,11 @@ class Full:
         """Poses of all objects, m and wxyz, shape (n, 7)."""
         return np.array(self.data.qpos[self.scene.index.qpos[:, None] + np.arange(7)])
 
+    @property
+    def _undisturbed(self) -> bool:
+        """Whether only the person is awake, who always is, and what it holds."""
+        return bool(self.data.ntree_awake == 1 + len(self.person.grips.gripped))
+
     def _in_place(self, item: int) -> bool:
         key = self.scene.episode.targets[self.scene.index.names[item]]
         return self.scene.receptacles[key].contains(self.person.center(item), _DISLODGED_MARGIN)
