@@ -1,7 +1,7 @@
-"""The same trials in every fidelity: whether the tiers agree, and how many simulated seconds each gives per core-second.
+"""The same trials in every fidelity: whether the tiers agree, and how many simulated seconds a core-second gives.
 
-Agreement is against the tier `full`, trial by trial. Speed is that of whole trials: world, session, participant and log,
-in CPU time, without the planner and without setting up.
+Agreement is against the tier `full`, trial by trial. Speed is that of whole trials: world, session, participant and
+log, in CPU time, without the planner and without setting up.
 """
 
 import os
@@ -17,17 +17,21 @@ SEEDS = 50
 QUICK_SEEDS = 2
 OBJECTS = (6, 12, 18, 24)
 QUICK_OBJECTS = (6, 24)
-PEOPLE = (("optimal", "follower"), ("highlight", "nearest"))
+# Assistance, participant, planner: one that is quick where the plan is not shown and only counts deviations.
+PEOPLE = (("optimal", "follower", "exact"), ("highlight", "nearest", "greedy"))
 COMPARED = ("completion_time_s", "task_distance_m", "inverse_path_length", "normalized_deviations")
 SAME_DELIVERIES, TIME_DIFFERENCE = 1.0, 0.01  # targets
 
 
-def measure(*, seeds: int = 0, objects: Sequence[int] = (), quick: bool = False) -> dict[str, Any]:
+def measure(
+    *, seeds: int = 0, objects: Sequence[int] = (), workers: int = 0, quick: bool = False
+) -> dict[str, Any]:
     """Run the benchmark; everything in it can be written as JSON.
 
     Args:
         seeds: Houses of each difficulty; 0 for 50, or 2 when `quick`.
         objects: Difficulties.
+        workers: Processes; 0 for one per core.
         quick: Few trials.
     """
     count = seeds or (QUICK_SEEDS if quick else SEEDS)
@@ -38,15 +42,13 @@ def measure(*, seeds: int = 0, objects: Sequence[int] = (), quick: bool = False)
         for (assistance, user), n in cells
         for seed in range(count)
     ]
-    results = in_every_fidelity(configs, workers=os.cpu_count() or 1)
+    results = in_every_fidelity(configs, workers=workers or os.cpu_count() or 1)
     rows = []
     for i, ((assistance, user), n) in enumerate(cells):
         trials = results[i * count : (i + 1) * count]
         for fidelity in FIDELITIES:
             row = compare([t["full"] for t in trials], [t[fidelity] for t in trials])
-            rows.append(
-                {"assistance": assistance, "user": user, "objects": n, "fidelity": fidelity, **row}
-            )
+            rows.append({"assistance": assistance, "user": user, "objects": n, "fidelity": fidelity, **row})
     return {"seeds": count, "rows": rows}
 
 
@@ -56,7 +58,9 @@ def compare(full: Sequence[Ran], tier: Sequence[Ran]) -> dict[str, Any]:
     Differences are relative to the mean of `full` where that is not 0: of the means, and the largest of any trial.
     """
     row: dict[str, Any] = {
-        "same_deliveries": statistics.fmean(a.delivered == b.delivered for a, b in zip(full, tier, strict=True)),
+        "same_deliveries": statistics.fmean(
+            a.delivered == b.delivered for a, b in zip(full, tier, strict=True)
+        ),
         "differing_seeds": [
             b.config.seed for a, b in zip(full, tier, strict=True) if a.delivered != b.delivered
         ],
@@ -78,16 +82,17 @@ def compare(full: Sequence[Ran], tier: Sequence[Ran]) -> dict[str, Any]:
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
     """The result as text: a table in Markdown, then what was aimed at."""
-    yield f"{result['seeds']} houses of each difficulty; differences are against `full`, of the mean (largest of any trial)"
+    yield f"{result['seeds']} houses of each difficulty; differences from `full`: of the mean (largest of any trial)"
     yield ""
-    yield "| participant | objects | fidelity | same deliveries | time | distance | IPL | deviations | sim. s per core-s |"
+    yield "| participant | objects | fidelity | same deliveries | time | distance | IPL | deviations | s per core-s |"
     yield "|---|---|---|---|---|---|---|---|---|"
     for row in result["rows"]:
         yield "| " + " | ".join(_cells(row)) + " |"
     yield ""
     for row in result["rows"]:
         if row["differing_seeds"]:
-            yield f"{row['user']}, {row['objects']} objects, {row['fidelity']}: other deliveries with seeds {row['differing_seeds']}"
+            where = f"{row['user']}, {row['objects']} objects, {row['fidelity']}"
+            yield f"{where}: other deliveries with seeds {row['differing_seeds']}"
     others = [row for row in result["rows"] if row["fidelity"] != "full"]
     same = min(row["same_deliveries"] for row in others)
     worst = max(abs(row["completion_time_s"]["difference"]) for row in others)

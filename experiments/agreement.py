@@ -15,7 +15,7 @@ from experiments.records import EventLog
 from experiments.trial import TrialConfig, prepare_session
 from mjsim.observation import ObjectStatus
 from mjsim.options import FIDELITIES
-from mjsim.scene import compose
+from mjsim.scene import Scene, compose
 from planner.replanner import Replanner
 from planner.route import Route, TaskState
 from planner.solver import solver
@@ -53,9 +53,9 @@ class TimedReplanner(Replanner):
         return route
 
 
-def run_in(config: TrialConfig, house: House) -> Ran:
-    """Run a trial without any record on disk."""
-    scene = compose(house.sample_episode(objects=config.objects, seed=config.seed), house.catalogue)
+def run_in(config: TrialConfig, house: House, scene: Scene | None = None) -> Ran:
+    """Run a trial without any record on disk, in its composed episode if that is at hand."""
+    scene = scene or _scene(config, house)
     replanner = TimedReplanner(house.geodesics, solver(config.planner))
     log = EventLog()
     session, world = prepare_session(config, house, scene, log, replanner=replanner)
@@ -105,7 +105,12 @@ def _all(configs: Sequence[TrialConfig], workers: int) -> Iterator[dict[str, Ran
 
 def _one(config: TrialConfig) -> dict[str, Ran]:
     house = _house(config.house)
-    return {name: run_in(dataclasses.replace(config, fidelity=name), house) for name in FIDELITIES}
+    scene = _scene(config, house)
+    return {name: run_in(dataclasses.replace(config, fidelity=name), house, scene) for name in FIDELITIES}
+
+
+def _scene(config: TrialConfig, house: House) -> Scene:
+    return compose(house.sample_episode(objects=config.objects, seed=config.seed), house.catalogue)
 
 
 @cache

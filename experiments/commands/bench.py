@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from experiments.commands.options import int_list
 from experiments.errors import ConfigError
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
@@ -16,9 +17,9 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 DESCRIPTION = """\
 Run a benchmark of the source checkout and print what it measured. Figures are ratios where they can be, so that they
 hold on another machine as well. A module in benchmarks/ is a benchmark when it defines measure() -> dict of JSON values
-and lines(result) -> lines of text; measure may take the keywords quick, houses, count, hours, workers and only, and
-picture(result, path) may draw the result."""
-OPTIONS = ("quick", "houses", "count", "hours", "workers", "only")
+and lines(result) -> lines of text; measure may take the keywords quick, houses, count, hours, workers, only, seeds and
+objects, and picture(result, path) may draw the result."""
+OPTIONS = ("quick", "houses", "count", "hours", "workers", "only", "seeds", "objects")
 
 
 def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
@@ -70,6 +71,12 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--workers", type=positive, metavar="N", help="processes, where it uses several")
     parser.add_argument("--only", type=natural, metavar="N", help="one session alone, to look at it again")
+    parser.add_argument(
+        "--seeds", type=positive, metavar="N", help="houses of each difficulty, where the benchmark has them"
+    )
+    parser.add_argument(
+        "--objects", type=int_list, metavar="N,..", help="difficulties, where the benchmark has them"
+    )
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the result as well")
     parser.set_defaults(run=run)
 
