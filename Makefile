@@ -48,4 +48,5 @@ $(READY): pyproject.toml .ci/system-libraries
 	$(BIN)/pip install --quiet --editable '.[dev]'
 	$(BIN)/python -m planner.warmup
 	$(BIN)/python -m mjsim.warmup
+	$(BIN)/python -m experiments.warmup
 	@touch $@
