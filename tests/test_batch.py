@@ -52,6 +52,8 @@ def test_a_killed_batch_goes_on_where_it_stopped(tmp_path):
         ("highlight", 1),
     ]
     assert table["delivered"] == [6] * 4
+    assert table["regretful_visits"][:2] == [0, 0]  # followers
+    assert all(metres > 0 for metres in table["total_regret_m"][2:])
     assert len((tmp_path / "trials.csv").read_text().splitlines()) == 5
 
 
