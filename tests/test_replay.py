@@ -354,7 +354,8 @@ def test_what_was_worked_out_must_follow(copy, house, file, edit, fault):
         (1, "has log format 1, from before runs recorded state hashes"),
         (
             99,
-            "has log format 99; this version replays format 2 only, so use the version that wrote it: 0.1.0",
+            f"has log format 99; this version replays format {records.LOG_FORMAT} only, "
+            "so use the version that wrote it: 0.1.0",
         ),
     ],
 )
