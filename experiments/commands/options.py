@@ -5,6 +5,7 @@ import re
 
 from experiments.participants import participant_names
 from hud.conditions import condition_names
+from hud.options import option_names
 from mjsim.options import FIDELITIES, WorldOptions
 from mjsim.render import FAST, PROFILES
 from planner.solver import DEFAULT_SOLVER, SOLVERS
@@ -119,4 +120,6 @@ def add_frame(
 
 def assistance_help() -> str:
     """What `--assistance` can be."""
-    return f"assistance condition: {', '.join(condition_names())}, or package.module:attribute"
+    options = ", ".join(f"-{name}" for name in option_names())
+    names = ", ".join(condition_names())
+    return f"assistance condition: {names}, or package.module:attribute; {options} may follow"
