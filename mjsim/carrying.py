@@ -3,7 +3,6 @@
 How a hand does that is in `mjsim.postures`. What still gets caught, by a blow or from above, slips out of the hand.
 """
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,12 +10,12 @@ from numpy.typing import NDArray
 
 from mjsim import avatar
 from mjsim.clearance import carry_clearance
+from mjsim.inventory import LEFT, RIGHT
 from mjsim.person import Person
 from mjsim.placing import object_corners
-from mjsim.postures import LOWEST, drawn_in, update_hands
+from mjsim.postures import LOWEST, count_strain, drawn_in, update_hands
 from mjsim.scene import Scene
 
-_MOST_HELD_BACK = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
 _NO_CONTACTS = (np.zeros((0, 2), np.int32), np.zeros((0, 9)))
 _HOUSE, _PERSON = -1, -2  # who bears a geom, where no object does
 
@@ -39,21 +38,21 @@ class Carrying:
         self._postures = {p: np.array(p) for p in (avatar.CARRY, avatar.TUCKED, avatar.ASIDE)}
         self._goals = np.zeros((2, 3))
         self._yield = np.zeros((2, 2))
-        self._strained = [0, 0]
+        self._strained = np.zeros(2, np.int64)
 
     def reset(self) -> None:
         """Forget all contacts."""
         self._yield[:] = 0.0
-        self._strained = [0, 0]
+        self._strained[:] = 0
 
     def memory(self) -> dict[str, Any]:
         """How far the hands have given way and for how long they are strained, JSON-ready."""
-        return {"yield": self._yield.tolist(), "strained": list(self._strained)}
+        return {"yield": self._yield.tolist(), "strained": self._strained.tolist()}
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Take over what `memory` gave."""
         self._yield[:] = memory["yield"]
-        self._strained = list(memory["strained"])
+        self._strained[:] = memory["strained"]
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
         """Set the targets of the hands that no motion moves, and guard the walking command.
@@ -89,15 +88,19 @@ class Carrying:
         # Strides differ with the number of contacts, and kernels with the strides.
         return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame)
 
-    def slipped(self, hand: int) -> bool:
-        """Whether a hand has for too long been stretched off its load, or held back by it; counts this step."""
-        person = self._person
-        error = person.grips.error(hand)
-        x, y, z = person.rig.pose[4 + 3 * hand : 7 + 3 * hand].tolist()
-        held_back = math.dist((x, y, z), person.rig.hand_targets[hand].tolist())
-        strained = error > person.options.grip_error or held_back > _MOST_HELD_BACK
-        self._strained[hand] = self._strained[hand] + 1 if strained else 0
-        return self._strained[hand] * person.dt > person.options.grip_patience
+    def slipped(self) -> tuple[int, ...]:
+        """Hands that have for too long been stretched off their loads, or held back by them; counts this step."""
+        person, rig, options = self._person, self._person.rig, self._person.options
+        left, right = person.held
+        if left is None and right is None:
+            self._strained[:] = 0
+            return ()
+        patience = options.grip_patience / person.dt
+        found = count_strain(
+            rig.pose, rig.hand_targets, person.data.site_xpos, person.grips.pairs, left is not None,
+            right is not None, options.grip_error, patience, self._strained,
+        )  # fmt: skip
+        return tuple(hand for hand in (LEFT, RIGHT) if found & (1 << hand))
 
 
 def _load(person: Person, item: int) -> tuple[float, float]:

@@ -12,16 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import EventKind
-from mjsim.clearance import carry_clearance, way_is_clear
 from mjsim.scene import Scene
 from mjsim.sight import first_hit
-from mjsim.survey import FAST, MOVED, PUSHED, SLOW
+from mjsim.survey import FAST, MOVED, OUTSIDE, PUSHED, SLOW
 
 MOVED_DISTANCE = 0.02  # m, from where an object was last looked at
 
 FLIGHT = 1.0  # m, horizontally
 REST_STEPS = 4  # control steps in a row
-_OUTSIDE = 0.3  # m; rooms end at their walls, and doorways lie in between
 _LOWEST, _HIGHEST = -0.05, 3.0  # m
 
 
@@ -54,7 +52,7 @@ class Releases:
     def reset(self) -> None:
         """No hand holds anything, or has let go of anything."""
         self.falling: dict[int, Release] = {}
-        self._gripped: dict[int, Release] = {}
+        self._gripped: dict[int, tuple[float, list[float]]] = {}  # when and where, last
 
     @property
     def any(self) -> bool:
@@ -72,13 +70,11 @@ class Releases:
         Returns:
             Seconds from release to rest, of the objects that have been at rest for `REST_STEPS` steps now.
         """
-        for item, last in self._gripped.items():
+        for item, (last, (x, y, _)) in self._gripped.items():
             if item not in gripped:
-                self.falling[item] = last
+                self.falling[item] = Release(last, x, y)
         time = float(data.time)
-        self._gripped = {
-            item: Release(time, *data.xipos[self._bodies[item], :2].tolist()) for item in gripped
-        }
+        self._gripped = {item: (time, data.xipos[self._bodies[item]].tolist()) for item in gripped}
         settled = []
         for item, release in list(self.falling.items()):
             if item in gripped or marks[item] & PUSHED:
@@ -96,14 +92,14 @@ class Releases:
     def memory(self) -> dict[str, Any]:
         """Everything, JSON-ready."""
         return {
-            name: [[item, asdict(release)] for item, release in releases.items()]
-            for name, releases in (("falling", self.falling), ("gripped", self._gripped))
+            "falling": [[item, asdict(release)] for item, release in self.falling.items()],
+            "gripped": [[item, *last] for item, last in self._gripped.items()],
         }
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Take over what `memory` gave."""
         self.falling = {int(item): Release(**release) for item, release in memory["falling"]}
-        self._gripped = {int(item): Release(**release) for item, release in memory["gripped"]}
+        self._gripped = {int(item): (float(time), list(at)) for item, time, at in memory["gripped"]}
 
 
 class Escapes:
@@ -118,7 +114,6 @@ class Escapes:
     def __init__(self, scene: Scene) -> None:
         self._model, self._rooms, self._bodies = scene.model, scene.rooms, scene.index.bodies
         self.anchors = np.zeros((len(self._bodies), 3))
-        self._field = carry_clearance(scene).arrays
 
     def reset(self, data: mujoco.MjData) -> None:
         """Start from the present state."""
@@ -180,13 +175,11 @@ class Escapes:
     def _passed_through(self, data: mujoco.MjData, item: int) -> bool:
         """Whether something static that collides lies between where the object was and where it is."""
         body = int(self._bodies[item])
-        start, end = self.anchors[item], data.xipos[body]
-        if way_is_clear(start, end, *self._field):
-            return False
-        way = end - start
+        start = self.anchors[item]
+        way = data.xipos[body] - start
         distance, geom = first_hit(self._model, data, start, way, ignore=(body,), static_only=True, reach=1.0)
         return distance < 1.0 and bool(self._model.geom_contype[geom] or self._model.geom_conaffinity[geom])
 
     def _outside(self, item: int) -> bool:
         x, y, z = self.anchors[item].tolist()
-        return not (_LOWEST < z < _HIGHEST and self._rooms.contains((x, y), _OUTSIDE))
+        return not (_LOWEST < z < _HIGHEST and self._rooms.contains((x, y), OUTSIDE))

@@ -44,6 +44,8 @@ class Grips:
             np.intp,
         )
         self._closed: list[tuple[int, int] | None] = [None, None]
+        self.pairs = np.full((2, 2), -1, np.intp)
+        self.reset()
 
     def nearest_grip(self, hand: int, item: int) -> int:
         """Grip of object `item` that has to be turned least to align with a hand: 0 or 1."""
@@ -66,6 +68,7 @@ class Grips:
         """Weld object `item` to a hand, firmly or at first gently; a sleeping object wakes."""
         self._data.eq_active[self._welds[hand, item, grip]] = (gently, not gently)
         self._closed[hand] = (item, grip)
+        self._note()
 
     def open(self, hand: int) -> None:
         """Let go of what a hand holds, if anything."""
@@ -73,27 +76,12 @@ class Grips:
         if closed is not None:
             self._data.eq_active[self._welds[hand, closed[0], closed[1]]] = 0
             self._closed[hand] = None
-
-    @property
-    def gripped(self) -> tuple[int, ...]:
-        """Objects that are welded to a hand."""
-        return tuple(closed[0] for closed in self._closed if closed is not None)
+            self._note()
 
     def error(self, hand: int) -> float:
         """How far the weld of a hand is stretched, m; 0 when it holds nothing."""
         closed = self._closed[hand]
         return 0.0 if closed is None else self.gap(hand, *closed)
-
-    def errors(self, hand: int) -> tuple[float, float]:
-        """How far the weld of a hand is stretched, m, and twisted, rad; NaN when it holds nothing."""
-        closed = self._closed[hand]
-        if closed is None:
-            return math.nan, math.nan
-        hand_site, site = self._hand_sites[hand], self._sites[closed]
-        return (
-            site_gap(self._data.site_xpos, hand_site, site),
-            site_angle(self._data.site_xmat, hand_site, site),
-        )
 
     def memory(self) -> list[list[int] | None]:
         """Object and grip that each hand holds, JSON-ready; the welds themselves are part of the physics."""
@@ -102,10 +90,17 @@ class Grips:
     def recall(self, memory: list[list[int] | None]) -> None:
         """Take over what `memory` gave."""
         self._closed = [None if closed is None else (closed[0], closed[1]) for closed in memory]
+        self._note()
 
     def reset(self) -> None:
         """Forget what was held; the state's welds are reset with the state."""
         self._closed = [None, None]
+        self._note()
+
+    def _note(self) -> None:
+        self.gripped = tuple(closed[0] for closed in self._closed if closed is not None)
+        for hand, closed in enumerate(self._closed):
+            self.pairs[hand] = (-1, -1) if closed is None else (self._hand_sites[hand], self._sites[closed])
 
 
 @kernel

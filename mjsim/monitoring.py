@@ -12,10 +12,11 @@ import mujoco
 import numpy as np
 
 from mjsim.actions import EventKind
+from mjsim.clearance import carry_clearance
 from mjsim.errors import PhysicsError
 from mjsim.escapes import MOVED_DISTANCE, Escapes, Releases
 from mjsim.grips import Grips
-from mjsim.health import NOTHING, QUIET, Health, HealthSample, Pair
+from mjsim.health import QUIET, Health, HealthSample
 from mjsim.options import WorldOptions
 from mjsim.rig import Rig
 from mjsim.scene import Scene
@@ -39,6 +40,8 @@ class HealthMonitor:
             np.array([MOVED_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
         )
         self._marks = np.zeros(len(index.names), np.uint8)
+        self._sample = np.zeros(6)
+        self._field, self._rooms = carry_clearance(scene).arrays, scene.rooms.rectangles
         self._escapes = Escapes(scene)
         self._releases = Releases(scene)
         self.reset()
@@ -64,16 +67,19 @@ class HealthMonitor:
             PhysicsError: MuJoCo warned, or a position or velocity is not finite.
         """
         data = self._rig.data
-        escaping, deepest, trunk = self._survey(data)
+        escaping = self._survey(data, held)
+        deepest, trunk, left, right, left_angle, right_angle = self._sample.tolist()
         self._deepest, self._deepest_trunk = max(self._deepest, deepest), max(self._deepest_trunk, trunk)
-        lengths, angles = self._weld_errors(held)
+        # NaN loses every comparison, and so the second place in a maximum.
+        self._stretched = max(self._stretched, left, right)
+        self._twisted = max(self._twisted, left_angle, right_angle)
         gripped = self._grips.gripped
         settle = math.nan
         if gripped or self._releases.any:
             settled = self._releases.follow(data, gripped, self._marks)
             self._settle_times += settled
             settle = max(settled, default=math.nan)
-        self.sample = HealthSample(deepest, trunk, lengths, angles, settle)
+        self.sample = HealthSample(deepest, trunk, (left, right), (left_angle, right_angle), settle)
         if not escaping and not self._releases.falling:
             return ()
         return self._escapes.find(data, self._marks, self._releases, gripped)
@@ -114,34 +120,20 @@ class HealthMonitor:
             warnings=int(self._rig.data.warning.number.sum()),
         )
 
-    def _survey(self, data: mujoco.MjData) -> tuple[bool, float, float]:
-        """Whether any object may be escaping, and overlaps of objects and of the trunk, m; marks every object."""
+    def _survey(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:
+        """Whether any object may be escaping; samples and marks everything."""
         index, rig, contact = self._index, self._rig, data.contact
-        # Strides differ with the number of contacts, and kernels with the strides.
-        geoms, dists = np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.dist)
-        state, deepest, trunk = survey(
-            data.qpos, data.qvel, data.xipos, geoms, dists, data.warning.number,
-            index.bodies, index.dofs, index.geom_owner, rig.trunk, rig.foot,
-            self._limits, self._escapes.anchors, self._marks,
+        state = survey(
+            data.qpos, data.qvel, data.xipos, data.site_xpos, data.site_xmat, contact.geom, contact.dist,
+            data.warning.number, index.bodies, index.dofs, index.geom_owner, rig.trunk, rig.foot, self._limits,
+            self._grips.pairs, held[0] is not None, held[1] is not None, self._field, self._rooms,
+            self._escapes.anchors, self._marks, self._sample,
         )  # fmt: skip
         if state == WARNED:
             raise PhysicsError(_warning_text(data))
         if state == NOT_FINITE:
             raise PhysicsError(_not_finite_text(rig.model, data))
-        return state == ESCAPING, deepest, trunk
-
-    def _weld_errors(self, held: Sequence[int | None]) -> tuple[Pair, Pair]:
-        left, right = held
-        if left is None and right is None:
-            return NOTHING, NOTHING
-        (first, first_angle), (second, second_angle) = (
-            NOTHING if item is None else self._grips.errors(hand) for hand, item in enumerate(held)
-        )
-        # NaN loses every comparison.
-        for length, angle in ((first, first_angle), (second, second_angle)):
-            self._stretched = length if length > self._stretched else self._stretched
-            self._twisted = angle if angle > self._twisted else self._twisted
-        return (first, second), (first_angle, second_angle)
+        return bool(state == ESCAPING)
 
 
 def _warning_text(data: mujoco.MjData) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mjsim import avatar
 from mjsim.actions import Move
 from mjsim.grips import Grips
+from mjsim.kernels import kernel
 from mjsim.monitoring import HealthMonitor
 from mjsim.options import WorldOptions
 from mjsim.postures import move_hand
@@ -50,6 +51,9 @@ class Person:
 
     def __post_init__(self) -> None:
         self.soundings = Soundings(self.scene)
+        o = self.options
+        limits = (o.max_speed, o.acceleration, o.max_turn, o.turn_acceleration, o.max_look)
+        self._limits = np.array([*limits, *avatar.PITCH_RANGE, o.control_timestep])
 
     @property
     def dt(self) -> float:
@@ -88,23 +92,8 @@ class Person:
 
     def walk(self, move: Move) -> None:
         """Slew the body's velocity and the head towards what is asked, within the limits."""
-        o, motion = self.options, self.rig.motion
-        forward, left = move.forward, move.left
-        speed = math.hypot(forward, left)
-        if speed > o.max_speed:
-            forward, left = forward * (o.max_speed / speed), left * (o.max_speed / speed)
-        before_f, before_l = float(motion[0]), float(motion[1])
-        change_f, change_l = forward - before_f, left - before_l
-        size = math.hypot(change_f, change_l)
-        allowed = o.acceleration * self.dt
-        if size > allowed:
-            forward = before_f + change_f * (allowed / size)
-            left = before_l + change_l * (allowed / size)
-        motion[0], motion[1] = forward, left
-        self.turn_at(move.turn)
-        look = _clip(move.look, o.max_look)
-        if look:
-            self.rig.look_at_pitch(self.rig.pitch_target + look * self.dt)
+        forward, left, turn, look = float(move.forward), float(move.left), float(move.turn), float(move.look)
+        slew(self.rig.motion, forward, left, turn, look, self._limits)
 
     def turn_at(self, rate: float) -> None:
         """Slew the yaw rate towards `rate`, rad/s."""
@@ -158,6 +147,45 @@ def minimum_jerk(phase: float) -> float:
     """Progress 0..1 of the smoothest point-to-point movement at a phase (Flash and Hogan, 1985), clamped."""
     s = min(1.0, max(0.0, phase))
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+
+
+@kernel
+def slew(
+    motion: NDArray[np.float64],
+    forward: float,
+    left: float,
+    turn: float,
+    look: float,
+    limits: NDArray[np.float64],
+) -> None:
+    """What `Person.walk` does to `Rig.motion`.
+
+    Args:
+        motion: Commanded velocity (forward, left), yaw rate and pitch; changed.
+        forward: Wanted velocity forward, m/s.
+        left: Wanted velocity to the left, m/s.
+        turn: Wanted yaw rate, rad/s.
+        look: Wanted rate of the head's pitch, rad/s.
+        limits: Fastest walk, change of velocity, yaw rate, change of yaw rate, pitch rate, lowest and highest
+            pitch, and the control step; SI units, (8,).
+    """
+    max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
+    speed = math.hypot(forward, left)
+    if speed > max_speed:
+        forward, left = forward * (max_speed / speed), left * (max_speed / speed)
+    change_f, change_l = forward - motion[0], left - motion[1]
+    size = math.hypot(change_f, change_l)
+    allowed = acceleration * dt
+    if size <= allowed:
+        motion[0], motion[1] = forward, left
+    else:
+        motion[0] += change_f * (allowed / size)
+        motion[1] += change_l * (allowed / size)
+    change = min(max_turn, max(-max_turn, turn)) - motion[2]
+    motion[2] += min(turn_acceleration * dt, max(-turn_acceleration * dt, change))
+    look = min(max_look, max(-max_look, look))
+    if look != 0.0:
+        motion[3] = min(highest, max(lowest, motion[3] + look * dt))
 
 
 def _clip(value: float, limit: float) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.clearance import clearance_at
+from mjsim.grips import site_gap
 from mjsim.kernels import kernel
 
 Floats = NDArray[np.float64]
@@ -34,6 +35,8 @@ PUSH_BACK = 0.25  # m/s beyond the speed of approach
 RELAX = 0.9  # 1/s
 MOST_YIELD = 0.15  # m
 UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
+
+MOST_HELD_BACK = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
 
 POSTURE_GAIN = 7.0  # 1/s
 POSTURE_SPEED = 1.5  # m/s
@@ -248,3 +251,41 @@ def _give_way(
         if into < 0.0:
             motion[FORWARD] -= into * away_f
             motion[LEFT] -= into * away_l
+
+
+@kernel
+def count_strain(
+    pose: Floats, targets: Floats, site_xpos: Floats, pairs: NDArray[np.intp], left: bool, right: bool,
+    most_error: float, patience: float, strained: NDArray[np.int64],
+) -> int:  # fmt: skip
+    """Count for how many control steps each hand has been strained.
+
+    Args:
+        pose: `Rig.pose`.
+        targets: `Rig.hand_targets`.
+        site_xpos: Positions of all sites, m, (nsite, 3).
+        pairs: `Grips.pairs`.
+        left: Whether the left hand carries something.
+        right: Whether the right one does.
+        most_error: A weld stretched farther than this is strained, m.
+        patience: Control steps after which a load slips.
+        strained: Steps per hand, (2,); changed.
+
+    Returns:
+        Hands whose load slips: 1 for the left one, 2 for the right one, or their sum.
+    """
+    slipping = 0
+    for hand in range(2):
+        if not (left if hand == 0 else right):
+            strained[hand] = 0
+            continue
+        back = 0.0
+        for axis in range(3):
+            back += (pose[4 + 3 * hand + axis] - targets[hand, axis]) ** 2
+        first, second = pairs[hand, 0], pairs[hand, 1]
+        error = site_gap(site_xpos, first, second) if first >= 0 else 0.0
+        tense = error > most_error or math.sqrt(back) > MOST_HELD_BACK
+        strained[hand] = strained[hand] + 1 if tense else 0
+        if strained[hand] > patience:
+            slipping += 1 << hand
+    return slipping

@@ -81,8 +81,13 @@ class RoomMap:
 
     def contains(self, xy: ArrayLike, margin: float = 0.0) -> bool:
         """Whether the point (x, y), m, lies in some room, or within `margin` metres of one."""
-        x, y = xy if isinstance(xy, tuple) else np.asarray(xy, dtype=np.float64)[:2].tolist()
-        return nearest_rectangle(x, y, self.centers, self.half_sizes, self.axes) <= margin
+        x, y = np.asarray(xy, dtype=np.float64)[:2].tolist()
+        return bool(nearest_rectangle(x, y, *self.rectangles) <= margin)
+
+    @property
+    def rectangles(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Centres, half sizes and axes, for kernels."""
+        return self.centers, self.half_sizes, self.axes
 
     def label(self, key: str) -> str:
         """Label of a room.

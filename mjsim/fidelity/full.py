@@ -298,8 +298,9 @@ class Full:
 
     def _watch_grips(self) -> None:
         motion = self._motion
-        for hand, item in enumerate(self.person.held):
-            if item is None or not self.carrying.slipped(hand):
+        for hand in self.carrying.slipped():
+            item = self.person.held[hand]
+            if item is None:
                 continue
             self.person.grips.open(hand)
             self.ledger.lost(self.time, item)
