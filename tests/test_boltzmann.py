@@ -11,7 +11,9 @@ from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Choice
 from experiments.participants.boltzmann import draw
-from experiments.trial import TrialConfig, run_trial
+from experiments.records import EventLog
+from experiments.trial import TrialConfig, prepare_session, run_trial
+from mjsim.scene import compose
 from planner.judge import Judge
 
 TRUE = (0.0, 0.3, 0.8, 2.0, 3.0)
@@ -102,6 +104,18 @@ def test_a_cold_participant_regrets_nothing_and_a_hot_one_walks_more(tmp_path):
     assert hot["total_regret_m"] > 3
     assert hot["normalized_deviations"] > cold["normalized_deviations"]
     assert hot["task_distance_m"] > cold["task_distance_m"] + 3
+
+
+def test_foreseen_or_stepped_it_goes_the_same_way():
+    house, found = House.load(), []
+    config = TrialConfig(objects=4, assistance="none", seed=1, user="boltzmann:3", fidelity="event")
+    scene = compose(house.sample_episode(objects=4, seed=1), house.catalogue)
+    for foresight in (True, False):
+        log = EventLog()
+        session, _ = prepare_session(config, house, scene, log, foresight=foresight)
+        assert session.run() == "all delivered"
+        found.append((log.events, session.recording.state_hashes().tolist()))
+    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("text", ["", "warm", "-1", "nan", "inf"])
