@@ -107,6 +107,10 @@ class Worlds(Sequence[World]):
         """
         return self._each([world.finish for world in self._worlds])
 
+    def each(self, function: Callable[[World], T]) -> list[T]:
+        """Call a function with every world, on all threads; it may touch its own world alone."""
+        return self._each([_call(function, world) for world in self._worlds])
+
     def _check_count(self, count: int, what: str) -> None:
         if count != len(self._worlds):
             raise ActionError(f"{count} {what} for {len(self._worlds)} worlds; give one per world")
