@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from experiments import records
@@ -252,6 +252,7 @@ def test_a_changed_log(run, copy, house, data):
     path = folder / records.EVENTS
     log = bytearray(path.read_bytes())
     place = data.draw(st.integers(0, len(log) - 1))
+    assume(not log[:place].endswith(b'"format": '))  # of another format, nothing more is said
     time = json.loads(log.splitlines()[log[:place].count(b"\n")])["t"]
     log[place] ^= 1
     path.write_bytes(bytes(log))
