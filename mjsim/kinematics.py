@@ -23,7 +23,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from mjsim import avatar
+from mjsim import avatar, slewing
 from mjsim.footprint import footprint
 from mjsim.kernels import kernel
 from mjsim.options import WorldOptions
@@ -220,35 +220,18 @@ def command(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait
 ) -> None:
     """Slew the commands towards what `Move(forward, left, turn, look)` asks; `advance` carries them out."""
-    speed = math.sqrt(forward * forward + left * left)
-    if speed > gait.max_speed:
-        forward, left = forward * (gait.max_speed / speed), left * (gait.max_speed / speed)
-    slew_walk(body, forward, left, gait)
-    slew_turn(body, turn, gait)
-    look = min(gait.max_look, max(-gait.max_look, look))
-    if look != 0.0:
-        look_at(body, body[LOOK] + look * gait.dt, gait)
+    motion = body[FORWARD:SERVO]
+    slewing.slew_walk(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
+    slewing.slew_turn(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
+    slewing.slew_look(motion, look, gait.max_look, gait.lowest, gait.highest, gait.dt)
 
 
 @kernel
-def slew_walk(body: NDArray[np.float64], forward: float, left: float, gait: Gait) -> None:
-    """Change the commanded velocity towards one in the body frame; towards 0, 0 it brakes to a stand."""
-    change_f, change_l = forward - body[FORWARD], left - body[LEFT]
-    size = math.sqrt(change_f * change_f + change_l * change_l)
-    allowed = gait.acceleration * gait.dt
-    if size <= allowed:
-        body[FORWARD], body[LEFT] = forward, left
-    else:
-        body[FORWARD] += change_f * (allowed / size)
-        body[LEFT] += change_l * (allowed / size)
-
-
-@kernel
-def slew_turn(body: NDArray[np.float64], rate: float, gait: Gait) -> None:
-    """Change the commanded yaw rate towards `rate`, rad/s."""
-    change = min(gait.max_turn, max(-gait.max_turn, rate)) - body[TURN]
-    allowed = gait.turn_acceleration * gait.dt
-    body[TURN] += min(allowed, max(-allowed, change))
+def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
+    """Slew the walk to a stand and the yaw rate towards `turn`, rad/s."""
+    motion = body[FORWARD:SERVO]
+    slewing.slew_walk(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
+    slewing.slew_turn(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
 
 
 @kernel

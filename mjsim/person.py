@@ -17,6 +17,7 @@ from mjsim.options import WorldOptions
 from mjsim.postures import move_hand
 from mjsim.rig import Rig
 from mjsim.scene import Scene
+from mjsim.slewing import slew_look, slew_turn, slew_walk
 from mjsim.soundings import Soundings
 
 # A motion sets the servos, yields once per control step, and returns whether it succeeded.
@@ -170,22 +171,9 @@ def slew(
             pitch, and the control step; SI units, (8,).
     """
     max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
-    speed = math.hypot(forward, left)
-    if speed > max_speed:
-        forward, left = forward * (max_speed / speed), left * (max_speed / speed)
-    change_f, change_l = forward - motion[0], left - motion[1]
-    size = math.hypot(change_f, change_l)
-    allowed = acceleration * dt
-    if size <= allowed:
-        motion[0], motion[1] = forward, left
-    else:
-        motion[0] += change_f * (allowed / size)
-        motion[1] += change_l * (allowed / size)
-    change = min(max_turn, max(-max_turn, turn)) - motion[2]
-    motion[2] += min(turn_acceleration * dt, max(-turn_acceleration * dt, change))
-    look = min(max_look, max(-max_look, look))
-    if look != 0.0:
-        motion[3] = min(highest, max(lowest, motion[3] + look * dt))
+    slew_walk(motion, forward, left, max_speed, acceleration * dt)
+    slew_turn(motion, turn, max_turn, turn_acceleration * dt)
+    slew_look(motion, look, max_look, lowest, highest, dt)
 
 
 def _clip(value: float, limit: float) -> float:

@@ -54,8 +54,7 @@ def turn_step(
     if abs(error) < tolerance and speed < _STANDING and abs(body[TURN_RATE]) < _STEADY:
         body[FORWARD] = body[LEFT] = body[TURN] = 0.0
         return True
-    kinematics.slew_walk(body, 0.0, 0.0, gait)
-    kinematics.slew_turn(body, TURN_GAIN * error if abs(error) > 0.5 * tolerance else 0.0, gait)
+    kinematics.brake(body, TURN_GAIN * error if abs(error) > 0.5 * tolerance else 0.0, gait)
     glance(body, x, y, z, gait)
     return False
 
