@@ -13,6 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from experiments.house import House
+from experiments.participants.walking import point_along
 from mjsim.actions import Move
 from mjsim.avatar import TRUNK_RADIUS
 from mjsim.episode import Episode, PlacedObject, StartPose
@@ -28,9 +29,11 @@ SPEEDS = (1.0, 8.0)  # m/s
 ACCELERATION = 12.0  # m/s^2; more than the body's servos have force for
 SECONDS = 36.0  # of a session
 CHARGE, PUSH, ESCAPE, STAND = (0.8, 2.5), (0.4, 1.2), 2.0, (1.0, 1.0)  # s
-HEAPED = 8  # objects
+HEAPED, LAYER = 6, 0.33  # objects, and m from one to the next before they fall: more than any is long
+ROOM = 0.4  # m of free floor around a heap
 NOT_STUCK = 0.2  # m in `ESCAPE` seconds
 ESCAPE_SPEED = 1.4  # m/s
+LOOK_AHEAD = 0.3  # m
 
 
 @dataclass
@@ -82,7 +85,7 @@ class _Session:
         self._house = house
         self._rng = np.random.default_rng([SEED, number])
         self._found = Walk(number, float(self._rng.uniform(*SPEEDS)))
-        self._heap = house.navmesh.sample(self._rng)
+        self._heap = _free_place(house, self._rng)
         scene = compose(_episode(house, number, self._heap, self._rng), house.catalogue)
         self._solid = shapely.union_all([shapely.Polygon(p) for p in footprint(scene.model).obstacles])
         shapely.prepare(self._solid)
@@ -119,22 +122,15 @@ class _Session:
 
     def _escape(self) -> None:
         """Walk away by the shortest way to somewhere else."""
-        start = self._position
-        goal = self._house.navmesh.sample(self._rng)
+        house, start = self._house, self._position
+        goal = _far_point(house, house.navmesh.snap(start), self._rng)
         self._found.escapes += 1
         for _ in range(self._steps(ESCAPE)):
-            here = self._house.navmesh.snap(self._position)
-            try:
-                path = self._house.geodesics.shortest_path(here, goal).points
-            except UnreachableError:
-                goal = self._house.navmesh.sample(self._rng)
-                continue
-            out = (
-                here - self._position
-            )  # back to where one can walk, if that is where the charge has left the body
-            ahead = next((p for p in path if np.linalg.norm(p - here) > 0.1), path[-1]) - here
-            size = float(np.linalg.norm(ahead))
-            way = out * 4.0 + (ahead / size if size > 0 else 0.0)
+            here = house.navmesh.snap(self._position)
+            path = np.asarray(house.geodesics.shortest_path(here, goal).points)
+            # First of all back to where one can walk, if the charge has left the body elsewhere.
+            out, ahead = here - self._position, np.array(point_along(path, LOOK_AHEAD)) - here
+            way = 4.0 * out + ahead / LOOK_AHEAD
             self._go(math.atan2(way[1], way[0]), ESCAPE_SPEED, 0.0)
         self._found.stuck += bool(np.linalg.norm(self._position - start) < NOT_STUCK)
 
@@ -169,6 +165,26 @@ class _Session:
         return max(1, round(seconds / self._world.control_timestep))
 
 
+def _free_place(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
+    """A point of the floor with nothing around it."""
+    around = [ROOM * np.array([math.cos(a), math.sin(a)]) for a in np.arange(0, 6.2, 0.5)]
+    while True:
+        point = house.navmesh.sample(rng)
+        if all(house.navmesh.is_navigable(point + offset) for offset in around):
+            return point
+
+
+def _far_point(house: House, here: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """A point of the floor that is too far to arrive at during an escape."""
+    while True:
+        goal = house.navmesh.sample(rng)
+        try:
+            if house.geodesics.shortest_path(here, goal).geodesic_distance > 2.0 * ESCAPE * ESCAPE_SPEED:
+                return goal
+        except UnreachableError:
+            continue
+
+
 def _episode(house: House, number: int, heap: NDArray[np.float64], rng: np.random.Generator) -> Episode:
     """Somebody anywhere in the house, and objects that fall onto a heap."""
     catalogue = house.catalogue
@@ -177,12 +193,12 @@ def _episode(house: House, number: int, heap: NDArray[np.float64], rng: np.rando
         start = house.navmesh.sample(rng)
     objects = []
     for i, model in enumerate(rng.choice(list(catalogue.objects), HEAPED, replace=False)):
-        x, y = (float(v) for v in heap + rng.uniform(-0.15, 0.15, 2))
+        x, y = (float(v) for v in heap + rng.uniform(-0.1, 0.1, 2))
         yaw = rng.uniform(-math.pi, math.pi)
         quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
         category = catalogue.objects[str(model)].category
         objects.append(
-            PlacedObject(f"o{i}", category, str(model), (x, y), (x, y, 0.01 + 0.25 * (i // 2)), quaternion)
+            PlacedObject(f"o{i}", category, str(model), (x, y), (x, y, 0.01 + LAYER * i), quaternion)
         )
     return Episode(
         house=catalogue.name,

@@ -1,0 +1,86 @@
+"""One simulated hour of running into walls, corners, furniture and heaps of objects at 1 to 8 m/s."""
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from experiments.stress.pool import run_sessions
+from experiments.stress.verdicts import verdicts
+from experiments.stress.walking import SECONDS, Walk, run_session
+
+HOURS, QUICK = 1.0, 0.05
+SLOW = 2.0  # m/s: sessions up to this speed are reported apart
+TARGETS = (
+    ("control steps at which the body was in or had crossed something solid", "tunnelled", "<=", 0),
+    ("escapes that moved the body by less than 0.2 m in 2 s", "stuck", "<=", 0),
+    ("drift while standing, at most, mm in 1 s", "drift_max_mm", "<=", 1.0),
+    ("turning while standing, at most, degrees in 1 s", "turn_max_deg", "<=", 0.1),
+    ("steps that are not finite, or MuJoCo warnings", "errors", "<=", 0),
+    ("objects that tunnelled", "object_tunnellings", "<=", 0),
+    ("objects outside the house at the end", "lost", "<=", 0),
+)
+
+
+def measure(
+    quick: bool = False, hours: float | None = None, workers: int | None = None, only: int | None = None
+) -> dict[str, Any]:
+    """Run the benchmark; everything in it can be written as JSON.
+
+    Args:
+        quick: A few simulated minutes.
+        hours: Simulated time, h.
+        workers: Processes; one per core unless said.
+        only: Run this session alone, to look at a failure again.
+    """
+    total = math.ceil(3600.0 * (hours or (QUICK if quick else HOURS)) / SECONDS)
+    sessions = range(total) if only is None else range(only, only + 1)
+    return summarise(list(run_sessions(run_session, sessions, workers=workers or os.cpu_count() or 1)))
+
+
+def summarise(walks: Sequence[Walk]) -> dict[str, Any]:
+    """Figures over all sessions."""
+    overlap = 1e3 * np.concatenate([walk.overlap for walk in walks])
+    slow = 1e3 * np.concatenate([[0.0], *(walk.overlap for walk in walks if walk.speed <= SLOW)])
+    return {
+        "benchmark": "walking",
+        "simulated_s": sum(walk.simulated for walk in walks),
+        "sessions": len(walks),
+        "escapes": sum(walk.escapes for walk in walks),
+        "tunnelled": sum(walk.tunnelled for walk in walks),
+        "stuck": sum(walk.stuck for walk in walks),
+        "drift_max_mm": 1e3 * max(max(walk.drift, default=0.0) for walk in walks),
+        "turn_max_deg": math.degrees(max(max(walk.turned, default=0.0) for walk in walks)),
+        "errors": sum(walk.error is not None for walk in walks),
+        "ejections": sum(walk.ejections for walk in walks),
+        "object_tunnellings": sum(walk.object_tunnellings for walk in walks),
+        "lost": sum(walk.lost for walk in walks),
+        "fastest_object": max(walk.fastest for walk in walks),
+        "overlap_p99_mm": float(np.percentile(overlap, 99)),
+        "overlap_max_mm": float(overlap.max()),
+        "overlap_slow_p99_mm": float(np.percentile(slow, 99)),
+        "overlap_slow_max_mm": float(slow.max()),
+        "failures": [
+            {"session": walk.session, "speed": walk.speed, "stuck": walk.stuck, "tunnelled": walk.tunnelled}
+            for walk in walks
+            if walk.tunnelled or walk.stuck or walk.error or walk.lost or max(walk.drift, default=0.0) > 1e-3
+        ],
+    }
+
+
+def lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result for people."""
+    for failure in result["failures"]:
+        yield "failed: at {speed:.1f} m/s; --only {session} runs it again".format(**failure)
+    yield (
+        f"{result['simulated_s']:.0f} simulated s in {result['sessions']} sessions, {result['escapes']} escapes; "
+        f"fastest object {result['fastest_object']:.1f} m/s, {result['ejections']} ejected"
+    )
+    yield (
+        f"overlap of body and house, 99th percentile and maximum: {result['overlap_p99_mm']:.1f} and "
+        f"{result['overlap_max_mm']:.1f} mm; up to {SLOW:g} m/s {result['overlap_slow_p99_mm']:.1f} and "
+        f"{result['overlap_slow_max_mm']:.1f} mm"
+    )
+    yield from verdicts(result, TARGETS)
