@@ -141,7 +141,7 @@ def run_batch(
         workers, mp_context=multiprocessing.get_context("spawn"), initializer=_start_worker
     )
     try:
-        groups = _groups(missing, folder, _group_size(len(missing), workers, worlds))
+        groups = _groups(missing, folder, group_size(len(missing), workers, worlds))
         for failure in _results(pool, groups, workers, worlds, threads):
             if failure is None:
                 progress = dataclasses.replace(progress, done=progress.done + 1, failure=None)
@@ -160,7 +160,7 @@ def run_batch(
     return rows
 
 
-def _group_size(trials: int, workers: int, worlds: int) -> int:
+def group_size(trials: int, workers: int, worlds: int) -> int:
     """Trials in one task of a worker: so many that one can take the place of another that is over, but few enough
     that all workers have something to do."""
     return max(worlds, min(GROUP * worlds, trials // workers)) if worlds > 1 else 1

@@ -38,6 +38,8 @@ SHOWN = (
     ("wall_s", "wall time", "{:.1f} s"),
 )
 
+SHOW_EVERY = 1.0  # s of simulated time from one update of the progress bar to the next
+
 DESCRIPTION = """\
 Run one trial: a simulated person tidies a disorganized apartment under an assistance condition. Writes to --out
   episode.json     the disorganized house            metrics.json   the paper's metrics and the health of the physics
@@ -113,8 +115,13 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress(*columns, console=console) as bars:
         bar = bars.add_task(f"{config.assistance}, {config.user_name}", total=config.objects, clock=0.0)
 
+        shown = SessionProgress(-SHOW_EVERY, 0, 0)
+
         def show(progress: SessionProgress) -> None:
-            bars.update(bar, completed=progress.delivered, clock=progress.time)
+            nonlocal shown
+            if progress.delivered != shown.delivered or progress.time >= shown.time + SHOW_EVERY:
+                shown = progress
+                bars.update(bar, completed=progress.delivered, clock=progress.time)
 
         metrics = run_trial(config, arguments.out, film=film, on_progress=show)
     _show_metrics(console, metrics, arguments.out)
