@@ -45,7 +45,7 @@ class Walk:
         speed: Commanded speed, m/s.
         simulated: Simulated time, s.
         tunnelled: Control steps at which the body's axis was in something solid or had crossed it.
-        stuck: Escapes that moved the body by less than `NOT_STUCK` m.
+        stuck: Escapes in which the body got no farther than `NOT_STUCK` m from where it was.
         escapes: Escapes tried.
         drift: How far the body moved in the last second of standing still, m, by occasion.
         turned: How far it turned then, rad, by occasion.
@@ -125,6 +125,7 @@ class _Session:
         house, start = self._house, self._position
         goal = _far_point(house, house.navmesh.snap(start), self._rng)
         self._found.escapes += 1
+        farthest = 0.0
         for _ in range(self._steps(ESCAPE)):
             here = house.navmesh.snap(self._position)
             path = np.asarray(house.geodesics.shortest_path(here, goal).points)
@@ -132,7 +133,8 @@ class _Session:
             out, ahead = here - self._position, np.array(point_along(path, LOOK_AHEAD)) - here
             way = 4.0 * out + ahead / LOOK_AHEAD
             self._go(math.atan2(way[1], way[0]), ESCAPE_SPEED, 0.0)
-        self._found.stuck += bool(np.linalg.norm(self._position - start) < NOT_STUCK)
+            farthest = max(farthest, float(np.linalg.norm(self._position - start)))
+        self._found.stuck += farthest < NOT_STUCK
 
     def _stand(self) -> None:
         """Stop, and see whether the body stays where it is."""
