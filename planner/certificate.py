@@ -9,7 +9,7 @@ class Proof(enum.Enum):
 
     EXHAUSTIVE: every order of visits was tried, or left out because it cannot be shorter.
     FULL_TABLE: the cost-to-go of every set of objects left was computed.
-    RELAXATION: the same for a relaxed problem that keeps a subset of the objects exactly, with a price on each pick;
+    RELAXATION: the same for a relaxed problem that counts objects by groups only, with a price on each pick;
         where the bound exceeds the relaxation's, a search left out only states that cannot lead to a shorter tour.
     SPANNING_TREE: a tour connects all its locations.
     """
@@ -29,11 +29,11 @@ class Certificate:
         root: What the proof gives without any search, units: the relaxation at the start of the tour, the length of
             the spanning tree, the optimum by the table or by trying all. Up to here a checker can follow. Where a
             plan's lower bound is higher, the rest is the word of the solver that its search was complete.
-        exact: Shipments that the relaxation keeps exactly, those first that matter most.
+        groups: Shipments that the relaxation counts together, each in one group.
         multipliers: Price of picking each shipment in the relaxation, units.
     """
 
     proof: Proof
     root: int
-    exact: tuple[int, ...] = ()
+    groups: tuple[tuple[int, ...], ...] = ()
     multipliers: tuple[int, ...] = ()

@@ -13,7 +13,7 @@ from planner.tour import pick, place, place_onboard
 FORMAT = 1
 LARGEST = 1 << 53  # whole numbers up to here are exact as floats
 FIELDS = ("format", "visits", "cost", "lower_bound", "status", "certificate")
-CERTIFICATE_FIELDS = ("proof", "root", "exact", "multipliers")
+CERTIFICATE_FIELDS = ("proof", "root", "groups", "multipliers")
 
 
 def claim_to_json(plan: Plan) -> str:
@@ -28,7 +28,7 @@ def claim_to_json(plan: Plan) -> str:
         raw = {
             "proof": certificate.proof.value,
             "root": certificate.root,
-            "exact": list(certificate.exact),
+            "groups": [list(members) for members in certificate.groups],
             "multipliers": list(certificate.multipliers),
         }
     return json.dumps(
@@ -75,13 +75,11 @@ def _certificate(raw: Any) -> Certificate:
     return Certificate(
         _choice("certificate.proof", fields["proof"], Proof),
         _whole("certificate.root", fields["root"]),
-        *(
-            tuple(
-                _whole(f"certificate.{name}[{k}]", value)
-                for k, value in enumerate(_list(f"certificate.{name}", fields[name]))
-            )
-            for name in ("exact", "multipliers")
+        tuple(
+            _numbers(f"certificate.groups[{k}]", members)
+            for k, members in enumerate(_list("certificate.groups", fields["groups"]))
         ),
+        _numbers("certificate.multipliers", fields["multipliers"]),
     )
 
 
@@ -130,6 +128,10 @@ def _whole(name: str, raw: Any) -> int:
     if isinstance(raw, bool) or not isinstance(raw, int) or abs(raw) > LARGEST:
         raise ProblemError(f"{name} must be a whole number up to 2^53, got {json.dumps(raw)}")
     return raw
+
+
+def _numbers(name: str, raw: Any) -> tuple[int, ...]:
+    return tuple(_whole(f"{name}[{k}]", value) for k, value in enumerate(_list(name, raw)))
 
 
 def _number(name: str, raw: Any) -> float:

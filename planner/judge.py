@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from planner.certificate import Certificate, Proof
+from planner.exact.groups import alone
 from planner.exact.instance import Instance, make_instance
 from planner.exact.relaxation import Table, after_pick, fill, new_table
 from planner.exact.solver import ExactSolver
-from planner.exact.warm import Warm
+from planner.exact.warm import Warm, same_groups
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
@@ -157,11 +158,11 @@ def _known(plan: Plan, visit: Visit) -> Warm | None:
     gone = visit.shipment if visit.kind is VisitKind.PICK else None
     left = [k for k in range(len(certificate.multipliers)) if k != gone]
     number = {k: i for i, k in enumerate(left)}
-    exact = tuple(number[k] for k in certificate.exact if k in number)
     prices = tuple(certificate.multipliers[k] for k in left)
     picked = [v.shipment for v in plan.visits if v.kind is VisitKind.PICK]
     return Warm(
-        Certificate(Proof.RELAXATION, 0, exact, prices), tuple(number[k] for k in picked if k in number)
+        Certificate(Proof.RELAXATION, 0, same_groups(certificate.groups, left), prices),
+        tuple(number[k] for k in picked if k in number),
     )
 
 
@@ -188,7 +189,7 @@ def _holds(kept: _Kept, names: list[str], state: TaskState, spots: Spots) -> boo
 def _keep(
     problem: RoutingProblem, instance: Instance, names: list[str], state: TaskState, spots: Spots
 ) -> _Kept:
-    table = new_table(instance, len(names))
+    table = new_table(instance, alone(len(names)))
     fill(instance, table)
     located = sorted({s.delivery for s in problem.shipments} | set(problem.onboard))
     at = {s.delivery: spots[VisitKind.PLACE, n] for s, n in zip(problem.shipments, names, strict=True)}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from planner.certificate import Certificate, Proof
 from planner.exact.solver import ExactSolver
-from planner.exact.warm import Warm
+from planner.exact.warm import Warm, same_groups
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
@@ -109,7 +109,7 @@ class LiveReplanner(Replanner):
         self._thread: threading.Thread | None = None
         self._stops: list[Stop] = []  # the shown ones, from the state of the proof on
         self._prices: dict[str, int] = {}
-        self._important: list[str] = []
+        self._groups: list[list[str]] = []
 
     def __enter__(self) -> "LiveReplanner":
         return self
@@ -229,8 +229,7 @@ class LiveReplanner(Replanner):
         certificate = plan.certificate
         if certificate is not None and certificate.proof is Proof.RELAXATION:
             self._prices.update(zip(names, certificate.multipliers, strict=True))
-            exact = [names[k] for k in certificate.exact]
-            self._important = exact + [name for name in self._important if name not in exact]
+            self._groups = [[names[k] for k in members] for members in certificate.groups]
 
     def _warm(self, state: TaskState, names: list[str]) -> Warm | None:
         """What is known of these objects; what is new costs the average."""
@@ -239,7 +238,6 @@ class LiveReplanner(Replanner):
             return None
         average = sum(known) // len(known)
         prices = tuple(self._prices.get(name, average) for name in names)
-        exact = tuple(names.index(name) for name in self._important if name in names)
         picks = [v.object for v in self._route.visits if v.kind is VisitKind.PICK and v.object in names]
         order = picks + [name for name in names if name not in picks]
         astray = [
@@ -248,7 +246,7 @@ class LiveReplanner(Replanner):
             if name not in picks or math.dist(self._planned[name], state.loose[name]) > MOVED
         ]
         index = names.index
-        certificate = Certificate(Proof.RELAXATION, 0, exact, prices)
+        certificate = Certificate(Proof.RELAXATION, 0, same_groups(self._groups, names), prices)
         return Warm(certificate, tuple(map(index, order)), tuple(map(index, astray)))
 
 

@@ -20,7 +20,7 @@ from planner.solver import SolveLimit, Solver
 from planner.tour import UNIT, integer_metric, possible_next
 
 RADIUS = 1.0  # m
-MOST_EXACT = 10  # objects that the bound of the pass keeps exactly
+MOST_ROWS = 1 << 14  # of the table of the bound of the pass
 MOST_STATES = 3_000_000  # of the pass: some 200 MB
 SMALLEST_RADIUS = 0.1  # m; below this a pass is not tried again
 
@@ -146,9 +146,8 @@ def _around(
     best = int(metric[order[:-1], order[1:]].sum())
     deadline = Deadline(None, limit.stop if limit else None)
     bound = _bound(instance, plan, best, deadline)
-    prices = int(bound.table.multipliers.sum())
     relaxed = costs_in(bound.instance, bound.table)
-    least = {bound.order[k] if k >= 0 else k: cost - prices for k, cost in relaxed.items()}
+    least = {k: cost - bound.prices for k, cost in relaxed.items()}
     while True:
         longest = best + math.floor(radius / UNIT)
         costs = costs_by_pass(bound, longest, MOST_STATES, deadline)
@@ -163,10 +162,10 @@ def _bound(instance: Instance, plan: Plan, best: int, deadline: Deadline) -> Bou
     """A tight bound, from the plan's prices."""
     certificate = plan.certificate
     if certificate is not None and certificate.proof is Proof.RELAXATION:
-        bound = warm_bound(instance, certificate, MOST_EXACT)
+        bound = warm_bound(instance, certificate, MOST_ROWS)
     else:
         bound = first_bound(instance, best)
-    return grown(bound, best, MOST_EXACT, deadline)
+    return grown(bound, best, MOST_ROWS, deadline)
 
 
 def ranked(problem: RoutingProblem, costs: Costs, longest: int, least: Costs) -> tuple[Regret, ...]:

@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 from planner.checker import check
 from planner.exact.annealing import anneal, decode, propose, tour_actions
 from planner.exact.beam import beam_pass
-from planner.exact.deadline import Deadline
+from planner.exact.deadline import NEVER
+from planner.exact.groups import alone, numbered
 from planner.exact.instance import make_instance, to_visits
-from planner.exact.multipliers import first_bound, grown
+from planner.exact.multipliers import first_bound, grown, told_apart
 from planner.exact.relaxation import fill, new_table, walk
+from planner.exact.search import row_of
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
@@ -23,7 +25,6 @@ from planner.tour import integer_metric, tour_length
 
 seeds = st.integers(0, 2**32 - 1)
 TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
-NEVER = Deadline(None)
 
 
 def random_problem(seed, shipments, onboard=0, bins=6, planar=True):
@@ -103,11 +104,11 @@ def test_search_and_table_agree(seed, n, onboard, bins, planar):
 
 
 @settings(max_examples=25, deadline=None)
-@given(seed=seeds, n=st.integers(4, 11), width=st.integers(1, 30), size=st.integers(0, 4))
-def test_a_narrow_search_claims_no_more_than_it_knows(seed, n, width, size):
+@given(seed=seeds, n=st.integers(4, 11), width=st.integers(1, 30), rows=st.integers(1, 200))
+def test_a_narrow_search_claims_no_more_than_it_knows(seed, n, width, rows):
     problem = random_problem(seed, n, seed % 3)
     optimum = ExactSolver(table_bytes=1 << 30).solve(problem)
-    plan = ExactSolver(table_bytes=0, passes=((size, width),)).solve(problem)
+    plan = ExactSolver(table_bytes=0, passes=((rows, width),)).solve(problem)
     check(problem, plan)
     assert plan.lower_bound <= optimum.cost + 1e-6
     if plan.status is Status.OPTIMAL:
@@ -115,13 +116,13 @@ def test_a_narrow_search_claims_no_more_than_it_knows(seed, n, width, size):
 
 
 @settings(max_examples=40, deadline=None)
-@given(seed=seeds, n=st.integers(4, 9), width=st.integers(1, 20), size=st.integers(0, 4))
-def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, width, size):
+@given(seed=seeds, n=st.integers(4, 9), width=st.integers(1, 20), rows=st.integers(1, 100))
+def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, width, rows):
     problem = random_problem(seed, n, seed % 3)
     instance = make_instance(problem, integer_metric(problem.distances))
     optimum = integer_length(problem, ExactSolver(table_bytes=1 << 30).solve(problem))
     poor = optimum + optimum // 3  # far from optimal, so that the claim rests on the states that were dropped
-    bound = grown(first_bound(instance, poor), poor, size, NEVER)
+    bound = grown(first_bound(instance, poor), poor, rows, NEVER)
     found = beam_pass(bound, poor, width, 10**9, NEVER)
     assert found.lower <= optimum <= found.upper
     if found.actions is not None:
@@ -130,27 +131,27 @@ def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, wi
 
 
 @settings(max_examples=30, deadline=None)
-@given(seed=seeds, n=st.integers(1, 7), s=st.integers(0, 7))
-def test_the_relaxation_bounds_every_state_for_any_multipliers(seed, n, s):
-    s = min(s, n)
+@given(seed=seeds, n=st.integers(1, 7), groups=st.integers(1, 7))
+def test_the_relaxation_bounds_every_state_for_any_multipliers_and_groups(seed, n, groups):
     rng = np.random.default_rng(seed)
     problem = random_problem(seed, n, bins=3)
     instance = make_instance(problem, integer_metric(problem.distances))
-    exact, relaxed = new_table(instance, n), new_table(instance, s)
+    group = numbered(rng.integers(0, groups, n)) if groups < 7 else alone(n)
+    exact, relaxed = new_table(instance, alone(n)), new_table(instance, group)
     relaxed.multipliers[:] = rng.integers(-20_000, 40_000, n)
     fill(instance, exact)
     fill(instance, relaxed)
-    tight = s == n
+    separate = len(set(group)) == n
     for left in range(1 << n):
-        row = ((left >> s).bit_count() << s) | (left & ((1 << s) - 1))
-        price = sum(int(relaxed.multipliers[j]) for j in range(n) if left >> j & 1)
+        inside = [j for j in range(n) if left >> j & 1]
+        row = row_of(relaxed, left)
+        assert row == sum(int(relaxed.stride[j]) for j in inside)
+        price = sum(int(relaxed.multipliers[j]) for j in inside)
         pairs = [(relaxed.bin[row], exact.bin[left])]
-        pairs += [(relaxed.object[row, i], exact.object[left, i]) for i in range(n) if not left >> i & 1]
+        pairs += [(relaxed.object[row, i], exact.object[left, i]) for i in range(n) if i not in inside]
         for bound, truth in pairs:
             assert (bound - price <= truth).all()
-            tight = tight and bool((bound - price == truth).all())
-    if s == n:
-        assert tight
+            assert not separate or (bound - price == truth).all()
 
 
 @settings(max_examples=20, deadline=None)
@@ -158,18 +159,19 @@ def test_the_relaxation_bounds_every_state_for_any_multipliers(seed, n, s):
 def test_fitted_multipliers_bound_the_optimum_and_growing_does_not_harm(seed, n, onboard):
     problem = random_problem(seed, n, onboard)
     instance = make_instance(problem, integer_metric(problem.distances))
-    table = new_table(instance, n)
+    table = new_table(instance, alone(n))
     fill(instance, table)
     optimum, _ = walk(instance, table, np.empty(2 * n + 2, np.int64))
     bound = first_bound(instance, optimum)
     roots = [bound.root]
-    for size in range(1, n + 1):
-        bound = grown(bound, optimum, size, NEVER)
+    roots.append(told_apart(bound, optimum, 1 << n, NEVER).root)
+    for rows in [3 << k for k in range(n)]:
+        bound = grown(bound, optimum, rows, NEVER)
         roots.append(bound.root)
     assert all(root <= optimum for root in roots)
-    assert roots == sorted(roots)
+    assert roots[0] <= roots[1]
+    assert roots[2:] == sorted(roots[2:]) and roots[2] >= roots[0]
     assert roots[-1] == optimum
-    assert sorted(bound.order) == list(range(n))
 
 
 def dropped_every_way(instance, order):

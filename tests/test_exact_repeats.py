@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.exact.search import smallest_but
+from planner.exact.nodes import smallest_but
 from planner.exact.solver import ExactSolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem, Shipment
 from planner.solver import SolveLimit
 
-SEARCH = ExactSolver(table_bytes=0, passes=((2, 300), (4, 600)))
+SEARCH = ExactSolver(table_bytes=0, passes=((60, 300), (200, 600)))
 
 IN_ANOTHER_PROCESS = """
 import sys
@@ -25,7 +25,7 @@ from planner.exact.solver import ExactSolver
 from planner.problem import RoutingProblem, Shipment
 d = np.load(sys.stdin.buffer)
 problem = RoutingProblem(d, 0, tuple(Shipment(7 + k, 1 + k % 6) for k in range(len(d) - 7)))
-plan = ExactSolver(table_bytes=0, passes=((2, 300), (4, 600))).solve(problem, seed=3)
+plan = ExactSolver(table_bytes=0, passes=((60, 300), (200, 600))).solve(problem, seed=3)
 print([v.location for v in plan.visits], plan.lower_bound.hex())
 """
 

@@ -25,7 +25,7 @@ from planner.route import TaskState
 from planner.solver import SolveLimit, solver
 from planner.tour import pick, place, place_onboard, tour_length
 
-SEARCH = ExactSolver(table_bytes=0, passes=((2, 3_000), (6, 30_000)))
+SEARCH = ExactSolver(table_bytes=0, passes=((100, 3_000), (1_000, 30_000)))
 
 
 @pytest.fixture(scope="module")

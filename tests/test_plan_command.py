@@ -236,7 +236,7 @@ def test_a_forged_claim_exits_with_one_and_says_why(tmp_path, capsys, forge, fau
         ({"cost": "3"}, "cost must be a finite number"),
         ({"format": 2}, "format must be 1, got 2"),
         (
-            {"certificate": {"proof": "full-table", "root": 10**400, "exact": [], "multipliers": []}},
+            {"certificate": {"proof": "full-table", "root": 10**400, "groups": [], "multipliers": []}},
             "certificate.root",
         ),
         ({"certificate": {"proof": "full-table"}}, "a certificate is a JSON object with"),

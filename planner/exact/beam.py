@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from planner.exact.deadline import Deadline
 from planner.exact.multipliers import Bound
+from planner.exact.nodes import NO_PARENT, keep_best, new_nodes
 from planner.exact.relaxation import INFINITE
-from planner.exact.search import NO_PARENT, PLACE_BITS, expand, keep_best, new_nodes, offer_roots
+from planner.exact.search import PLACE_BITS, expand, offer_roots
 
 FIRST_ROOM = 1 << 12
 
@@ -19,7 +20,7 @@ class Pass:
 
     Attributes:
         upper: Length of the best tour known, units.
-        actions: Actions of that tour in the problem's numbering, or None if the pass found none shorter.
+        actions: Actions of that tour, or None if the pass found none shorter.
         lower: No tour is shorter than this, units.
         expanded: How many states were expanded.
     """
@@ -43,8 +44,7 @@ def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadlin
     Returns:
         The result; its lower bound is that of the root if the pass was given up.
     """
-    n = len(bound.order)
-    prices = int(bound.table.multipliers.sum())
+    n, prices = len(bound.instance.home), bound.prices
     limit = upper + prices
     history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
     here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
@@ -54,9 +54,12 @@ def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadlin
         if expanded > most or deadline.over():
             return Pass(upper, None, bound.root, expanded)
         here, worse = keep_best(here, width)
-        here, after, early, count, end = expand(bound.instance, bound.table, here, after, limit, width)
+        found = expand(bound.instance, bound.table, here, after, limit, width, deadline)
+        if found is None:
+            return Pass(upper, None, bound.root, expanded)
+        here, after, early, states, end = found
         dropped = min(dropped, worse, early)
-        expanded += count
+        expanded += states
         size = here.size[0]
         history.append((here.key[:size].copy(), here.parent[:size].copy()))
         if end >= 0:
@@ -70,7 +73,7 @@ def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadlin
 def _actions(
     bound: Bound, history: list[tuple[NDArray[np.int64], NDArray[np.int64]]], layer: int, end: int
 ) -> list[int]:
-    """Follow the parents back from the end of a tour; actions in the problem's numbering."""
+    """Follow the parents back from the end of a tour."""
     keys = []
     k = end
     while True:
@@ -81,14 +84,14 @@ def _actions(
         layer -= 0 if parent & 1 else 1
         k = parent >> 1
     m = len(bound.instance.bins)
-    left = (1 << len(bound.order)) - 1
+    left = (1 << len(bound.instance.home)) - 1
     actions = []
     for key in reversed(keys):
         place = key & ((1 << PLACE_BITS) - 1)
         picked = left ^ (key >> PLACE_BITS)
         left ^= picked
         if picked:
-            actions.append(bound.order[picked.bit_length() - 1])
+            actions.append(picked.bit_length() - 1)
         if place < m * m:
             actions.append(-1 - place // m)
     return actions

@@ -16,3 +16,6 @@ class Deadline:
         """Whether it has passed."""
         wished = self.stop is not None and self.stop.is_set()
         return wished or (self.at is not None and time.perf_counter() >= self.at)
+
+
+NEVER = Deadline(None)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.errors import InfeasibleError
+from planner.exact.deadline import NEVER, Deadline
 from planner.plan import Visit
 from planner.problem import RoutingProblem
 from planner.tour import pick, place, place_onboard
@@ -29,7 +30,9 @@ class Found:
     bound: int
 
 
-def best_first(problem: RoutingProblem, distances: Matrix, metric: Matrix, most_states: int) -> Found:
+def best_first(
+    problem: RoutingProblem, distances: Matrix, metric: Matrix, most_states: int, deadline: Deadline = NEVER
+) -> Found:
     """Search states by cost so far plus the farthest errand left (A*).
 
     In a metric, what belongs where one is, is dropped at once: that is free and never wrong. Otherwise a detour over
@@ -40,6 +43,7 @@ def best_first(problem: RoutingProblem, distances: Matrix, metric: Matrix, most_
         distances: Length of each leg, integers, (k, k).
         metric: The same, closed to a metric.
         most_states: How many states may be expanded.
+        deadline: Give up when it is over.
     """
     search = _Search(problem, distances.tolist(), metric.tolist(), at_once=np.array_equal(distances, metric))
     start = search.arrive(problem.start, (1 << len(problem.shipments)) - 1, problem.onboard)
@@ -53,7 +57,7 @@ def best_first(problem: RoutingProblem, distances: Matrix, metric: Matrix, most_
             continue
         if not state[1] and not state[2]:
             return Found(search.visits(state, before), so_far)
-        if len(closed) == most_states:
+        if len(closed) == most_states or (len(closed) % 16 == 0 and deadline.over()):
             return Found(None, estimate)
         closed.add(state)
         for leg, following in search.moves(state):

@@ -1,23 +1,22 @@
 """Lagrangian multipliers that make the relaxed tour pick each object about once."""
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.deadline import Deadline
+from planner.exact.deadline import NEVER, Deadline
+from planner.exact.groups import numbered, together, with_one_alone
 from planner.exact.instance import Instance
-from planner.exact.relaxation import Table, fill, new_table, walk
+from planner.exact.relaxation import Table, fill, new_table, rows_of, walk
 from planner.kernels import kernel
 
-MEMORY = 0.97  # of a step in the record of which objects are picked too often or too rarely
+MEMORY = 0.97  # of a step in the record of what is picked too often or too rarely
 MOMENTUM = 0.8
-MOST_BYTES = 1 << 25  # of a table
-FIRST_STEPS = 150
-MOST_STEPS, LEAST_STEPS = 30, 3  # after each growth: fewer as tables get larger
-PATIENCE = 5  # steps without a better bound before the step shrinks
-SHRINK = 0.7
-RESTART = 0.2  # least step after growing; the relaxed tour changes, so there is something to gain again
+FIRST_STEPS, FIRST_STRIDES = 150, (1.0, 0.02)
+MOST_STEPS, LEAST_STEPS, STRIDES = 30, 4, (0.2, 0.03)
+STEP_ROWS = 60_000  # filled in a fit with many rows, at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,149 +24,163 @@ class Bound:
     """A lower bound of the cost-to-go from every state of an instance.
 
     Attributes:
-        order: Object `order[k]` of the problem is object k of the permuted instance.
-        instance: The permuted instance: the first `table.s` objects are kept exactly.
+        instance: The instance.
         table: Relaxed cost-to-go.
         root: Bound at the root, units.
-        trouble: How far the relaxed tours were from picking each object once, lately, (n,).
-        step: Step size that the fit ended with.
+        trouble: How far relaxed tours, recent ones most, were from picking each object once, (n,).
     """
 
-    order: tuple[int, ...]
     instance: Instance
     table: Table
     root: int
     trouble: NDArray[np.float64]
-    step: float
+
+    @property
+    def prices(self) -> int:
+        """Sum of all multipliers."""
+        return int(self.table.multipliers.sum())
 
 
 def first_bound(instance: Instance, upper: int) -> Bound:
-    """Fit multipliers with no object kept exactly.
+    """Fit multipliers with all objects in one group: some 10 ms.
 
     Args:
         instance: The instance.
         upper: Length of a known tour, units.
     """
     n = len(instance.home)
-    return _fit(tuple(range(n)), instance, new_table(instance, 0), np.zeros(n), upper, FIRST_STEPS, 1.0)
+    table = new_table(instance, together(n))
+    bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STRIDES, NEVER)
+    return cast(Bound, bound)  # it never runs out of time
 
 
-def grown(bound: Bound, upper: int, size: int, deadline: Deadline) -> Bound:
-    """Keep more objects exactly, each time the one that the relaxed tour treats worst, and fit again.
+def grown(bound: Bound, upper: int, most_rows: int, deadline: Deadline) -> Bound:
+    """Count fewer objects together and fit again, until the gap closes, the table is full grown, or time is over.
+
+    Each time the object that the relaxed tours treat worst gets a group of its own.
 
     Args:
         bound: The bound so far.
         upper: Length of a known tour, units.
-        size: How many objects to keep exactly in the end; fewer if the gap closes before or the
-            table would grow too large.
+        most_rows: Of the table.
         deadline: Stop growing when it is over.
     """
-    n, m = bound.instance.to_bin.shape
-    while bound.table.s < min(size, n) and bound.root < upper and not deadline.over():
-        s = bound.table.s
-        if 4 * (m * m + n) * (n - s) << (s + 1) > MOST_BYTES:
+    warm = not bound.trouble.any()  # prices from elsewhere: find out first how good they are here
+    while bound.root < upper:
+        group: NDArray[np.int64] | None = bound.table.group
+        if not warm:
+            group = with_one_alone(bound.table.group, bound.trouble, most_rows)
+        elif rows_of(bound.table.group) > most_rows:
             break
-        worst = s + int(np.argmax(bound.trouble[s:]))
-        swap = np.arange(len(bound.order))
-        swap[[s, worst]] = worst, s
-        bound = _fit(
-            tuple(bound.order[k] for k in swap),
-            bound.instance.permuted(swap.tolist()),
-            new_table(bound.instance, s + 1),
-            bound.table.multipliers[swap].astype(np.float64),
-            upper,
-            max(LEAST_STEPS, min(MOST_STEPS, 2000 >> (s + 1))),
-            max(bound.step, RESTART),
-        )
+        warm = False
+        if group is None:
+            break
+        steps = max(LEAST_STEPS, min(MOST_STEPS, STEP_ROWS // rows_of(group)))
+        fitted = _refitted(bound, group, upper, steps, deadline)
+        if fitted is None:
+            break
+        bound = fitted
     return bound
 
 
-def _fit(
-    order: tuple[int, ...],
+def told_apart(bound: Bound, upper: int, most_rows: int, deadline: Deadline) -> Bound:
+    """Count the objects for each bin together if that gives a better bound.
+
+    Where bins are far apart, a relaxed tour that need not visit each as often as there are objects for it is a poor
+    one, and no other small table notices that.
+
+    Args:
+        bound: The bound so far.
+        upper: Length of a known tour, units.
+        most_rows: Of the table.
+        deadline: Leave the bound as it is when this is over.
+    """
+    group = numbered(bound.instance.home)
+    if bound.root >= upper or rows_of(group) > most_rows:
+        return bound
+    fitted = _refitted(bound, group, upper, MOST_STEPS, deadline)
+    return bound if fitted is None or fitted.root <= bound.root else fitted
+
+
+def _refitted(
+    bound: Bound, group: NDArray[np.int64], upper: int, steps: int, deadline: Deadline
+) -> Bound | None:
+    table = new_table(bound.instance, group)
+    start = bound.table.multipliers.astype(np.float64)
+    return fit(bound.instance, table, start, upper, steps, STRIDES, deadline)
+
+
+def fit(
     instance: Instance,
     table: Table,
     multipliers: NDArray[np.float64],
     upper: int,
     steps: int,
-    step: float,
-) -> Bound:
-    trouble = np.zeros(len(order))
-    root, step = improve(instance, table, multipliers, upper, steps, step, trouble)
-    return Bound(order, instance, table, int(root), trouble, float(step))
-
-
-@kernel
-def improve(
-    inst: Instance,
-    table: Table,
-    multipliers: NDArray[np.float64],
-    upper: int,
-    steps: int,
-    step: float,
-    trouble: NDArray[np.float64],
-) -> tuple[int, float]:
-    """Subgradient ascent; leaves the best table behind.
+    strides: tuple[float, float],
+    deadline: Deadline,
+) -> Bound | None:
+    """Subgradient ascent with momentum (Held, Wolfe and Crowder 1974).
 
     Args:
-        inst: The instance.
-        table: Receives the table.
-        multipliers: Where to start.
+        instance: The instance.
+        table: Receives the best table.
+        multipliers: Where to start, (n,).
         upper: Length of a known tour.
         steps: How many tables to try.
-        step: Step size to start with.
-        trouble: Receives how far the tours were from picking each object once, lately.
+        strides: Length of the first and the last step, as a share of what would close the gap.
+        deadline: Stop when it is over.
 
     Returns:
-        The best bound at the root, and the step size at the end.
+        The best bound; None if the deadline was over before.
     """
-    n = inst.home.size
-    actions = np.empty(2 * n + 2, np.int64)
-    current = multipliers.copy()
-    kept = np.empty(n, np.int32)
-    for j in range(n):  # loops rather than slices: they compile much faster
-        kept[j] = np.rint(multipliers[j])
-    direction = np.zeros(n)
-    best, failures = -1, 0
+    n = len(instance.home)
+    actions: NDArray[np.int64] = np.empty(2 * n + 2, np.int64)
+    current, direction = multipliers.copy(), np.zeros(n)
+    best, kept = -1, table.multipliers.copy()
+    trouble = np.zeros(n)
     for k in range(steps):
-        for j in range(n):
-            table.multipliers[j] = np.rint(current[j])
-        value, surplus = _evaluate(inst, table, actions)
+        table.multipliers[:] = np.rint(current)
+        if not fill(instance, table, deadline):
+            return None
+        total, count = walk(instance, table, actions)
+        value = int(total) - int(table.multipliers.sum())
         if value > best:
-            best, failures = value, 0
-            for j in range(n):
-                kept[j] = table.multipliers[j]
-        else:
-            failures += 1
-            if failures == PATIENCE:
-                step, failures = step * SHRINK, 0
-        norm = 0.0
-        for j in range(n):
-            trouble[j] = MEMORY * trouble[j] + abs(surplus[j])
-            norm += surplus[j] * surplus[j]
-        if norm == 0.0 or best >= upper or k == steps - 1:
+            best = value
+            kept[:] = table.multipliers
+        if best >= upper or k == steps - 1:
             break
-        scale = step * (1.002 * upper - value) / norm
-        for j in range(n):
-            direction[j] = scale * surplus[j] + MOMENTUM * direction[j]
-            current[j] += direction[j]
-    changed = False
-    for j in range(n):
-        changed |= table.multipliers[j] != kept[j]
-        table.multipliers[j] = kept[j]
-    if changed:
-        fill(inst, table)
-    return best, step
+        stride = strides[0] * (strides[1] / strides[0]) ** (k / steps)
+        if not step(actions[:count], 1.002 * upper - value, stride, current, direction, trouble):
+            break
+    if (table.multipliers != kept).any():
+        table.multipliers[:] = kept
+        if not fill(instance, table, deadline):
+            return None
+    return Bound(instance, table, best, trouble)
 
 
 @kernel
-def _evaluate(inst: Instance, table: Table, actions: NDArray[np.int64]) -> tuple[int, NDArray[np.int64]]:
-    """The bound at the root, and how much too often its tour picks each object."""
-    fill(inst, table)
-    total, count = walk(inst, table, actions)
-    surplus = np.full(inst.home.size, -1, np.int64)
-    for action in actions[:count]:
+def step(
+    actions: NDArray[np.int64],
+    gap: float,
+    stride: float,
+    current: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    trouble: NDArray[np.float64],
+) -> bool:
+    """Make what a relaxed tour picks too often dearer; False if it picks each object once."""
+    n = current.size
+    surplus = np.full(n, -1.0)
+    for action in actions:
         if action >= 0:
-            surplus[action] += 1
-    for j in range(inst.home.size):
-        total -= table.multipliers[j]
-    return total, surplus
+            surplus[action] += 1.0
+    norm = 0.0
+    for j in range(n):  # loops rather than slices: they compile much faster
+        norm += surplus[j] * surplus[j]
+        trouble[j] = MEMORY * trouble[j] + abs(surplus[j])
+    if norm == 0.0:
+        return False
+    for j in range(n):
+        direction[j] = stride * gap / norm * surplus[j] + MOMENTUM * direction[j]
+        current[j] += direction[j]
+    return True

@@ -9,34 +9,44 @@ object j holding it and one for d. Leaving what belongs here is free and always 
     Y(U, i)    = min( D(i, c_i) + E(U, c_i),   min_{j in U} D(i, j) + W(U - j, j, c_i) )
     E(U, b)    = min_{i in U} D(b, i) + Y(U - i, i);    E({}, b) = 0
 
-The relaxation (Christofides, Mingozzi and Toth 1981) keeps the first s objects exactly and of the others only
-how many are left; those may be picked repeatedly, though not twice in a row. Each pick of j costs a multiplier
-more; subtracting the multipliers of U gives a lower bound of the cost-to-go from every U, for any multipliers.
-With s = n and no multipliers the table is exact.
+The relaxation (Christofides, Mingozzi and Toth 1981) puts objects into groups and keeps of each group only how
+many are left; any of a group may then be picked, though none twice in a row. Each pick of j costs a multiplier
+more; subtracting the multipliers of U gives a lower bound of the cost-to-go from every U, for any multipliers and
+groups. With each object in a group of its own and no multipliers the table is exact.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.exact.deadline import NEVER, Deadline
 from planner.exact.instance import Instance
 from planner.kernels import kernel
 
 INFINITE = 1 << 29
+SLICE = 1 << 13  # rows that are filled between looks at the clock: some 5 ms
 
 
 class Table(NamedTuple):
-    """Cost-to-go of the relaxed problem, multipliers of picks included; row k 2^s + M for k others, subset M.
+    """Cost-to-go of the relaxed problem, multipliers of picks included; a row for each way to be left of the groups.
+
+    Row r has r / (number of rows of all groups before) mod (size + 1) of a group left. Where every object is a group
+    of its own, the row is the subset of the objects left.
 
     Attributes:
-        s: How many objects (the first ones) are kept exactly.
+        group: Group of each object, numbered from 0, (n,) int64.
+        size: How many objects each group has, (groups,) int64.
+        stride: By how many rows picking an object goes down, (n,) int64.
         bin: E and V, (rows, m, m) int32, entry [b, d].
-        object: Y, (rows, n) int32; only where object i is not in the row's subset.
+        object: Y, (rows, n) int32; only where not all of the group of object i are left.
         multipliers: Price of a pick, (n,) int32.
     """
 
-    s: int
+    group: NDArray[np.int64]
+    size: NDArray[np.int64]
+    stride: NDArray[np.int64]
     bin: NDArray[np.int32]
     object: NDArray[np.int32]
     multipliers: NDArray[np.int32]
@@ -48,20 +58,44 @@ def add(a: Any, b: Any) -> Any:
     return np.int32(a + b)
 
 
-@kernel
-def new_table(inst: Instance, s: int) -> Table:
-    """An unfilled table."""
+def rows_of(group: NDArray[np.int64]) -> int:
+    """How many rows the table of these groups has."""
+    return math.prod(int(k) + 1 for k in np.bincount(group))
+
+
+def new_table(inst: Instance, group: NDArray[np.int64]) -> Table:
+    """An unfilled table with no multipliers.
+
+    Args:
+        inst: The instance.
+        group: Group of each object, numbered from 0, (n,).
+    """
     n, m = inst.to_bin.shape
-    rows = (n - s + 1) << s
-    return Table(s, np.empty((rows, m, m), np.int32), np.empty((rows, n), np.int32), np.zeros(n, np.int32))
+    size = np.bincount(group).astype(np.int64)
+    below = np.ones(len(size) + 1, np.int64)
+    below[1:] = np.cumprod(size + 1)
+    rows = int(below[-1])
+    return Table(
+        group,
+        size,
+        below[:-1][group] if n else group,
+        np.empty((rows, m, m), np.int32),
+        np.empty((rows, n), np.int32),
+        np.zeros(n, np.int32),
+    )
+
+
+def table_bytes(inst: Instance, rows: int) -> int:
+    """Memory of a table."""
+    n, m = inst.to_bin.shape
+    return int(4 * (m * m + n) * rows)
 
 
 @kernel
-def row_without(row: int, j: int, s: int) -> int:
-    """Row after picking j, or -1 where it is not there to be picked."""
-    if j < s:
-        return row ^ (1 << j) if (row >> j) & 1 else -1
-    return row - (1 << s) if row >> s else -1
+def row_without(table: Table, row: int, j: int) -> int:
+    """Row after picking j, or -1 where none of its group is there to be picked."""
+    left = row // table.stride[j] % (table.size[table.group[j]] + 1)
+    return int(row - table.stride[j]) if left else -1
 
 
 @kernel
@@ -73,23 +107,54 @@ def after_pick(inst: Instance, table: Table, row: int, j: int, d: int) -> int:
     return int(table.multipliers[j] + min(first, second))
 
 
+def fill(inst: Instance, table: Table, deadline: Deadline = NEVER) -> bool:
+    """Compute all rows, smaller ones first; whether that was done before the deadline."""
+    rows = table.bin.shape[0]
+    for first in range(0, rows, SLICE):
+        if first and deadline.over():
+            return False
+        fill_rows(inst, table, first, min(rows, first + SLICE))
+    return True
+
+
 @kernel
-def fill(inst: Instance, table: Table) -> None:
-    """Compute all rows, smaller subsets first."""
+def left_of(table: Table, row: int) -> NDArray[np.int64]:
+    """How many of each group are left in a row."""
+    left = np.empty(table.size.size, np.int64)
+    for g in range(left.size):
+        left[g] = row % (table.size[g] + 1)
+        row //= table.size[g] + 1
+    return left
+
+
+@kernel
+def count_on(table: Table, left: NDArray[np.int64]) -> None:
+    """From one row to the next."""
+    for g in range(left.size):
+        left[g] += 1
+        if left[g] <= table.size[g]:
+            break
+        left[g] = 0
+
+
+@kernel
+def fill_rows(inst: Instance, table: Table, first: int, last: int) -> None:
+    """Compute some rows; all before must have been."""
     n, m = inst.to_bin.shape
     w = np.empty((m, n), np.int32)  # W with its pick, [d, j]; infinite where j cannot be picked
     stay = np.empty(n, np.int32)  # Y with its pick; the same
-    for row in range(table.bin.shape[0]):
+    left = left_of(table, first)
+    for row in range(first, last):
         e = table.bin[row]
         for j in range(n):
-            left = row_without(row, j, table.s)
-            if left < 0:
+            if left[table.group[j]] == 0:
                 stay[j] = INFINITE
                 for d in range(m):
                     w[d, j] = INFINITE
                 continue
-            stay[j] = add(table.object[left, j], table.multipliers[j])
-            _picked(inst, table, left, j, w)
+            after = row - table.stride[j]
+            stay[j] = add(table.object[after, j], table.multipliers[j])
+            _picked(inst, table, after, j, w)
         for b in range(m):
             e[b, b] = _least(inst.from_bin[b], stay) if row else 0
         for d in range(m):
@@ -97,10 +162,11 @@ def fill(inst: Instance, table: Table) -> None:
                 if b != d:
                     e[b, d] = min(add(inst.bins[b, d], e[d, d]), _least(inst.from_bin[b], w[d]))
         for i in range(n):  # no object follows itself, as `between` is infinite there
-            if i >= table.s or not (row >> i) & 1:
+            if left[table.group[i]] < table.size[table.group[i]]:
                 c = inst.home[i]
                 drop = add(inst.to_bin[i, c], e[c, c])
                 table.object[row, i] = min(drop, _least(inst.between[i], w[c]))
+        count_on(table, left)
 
 
 @kernel
@@ -155,7 +221,7 @@ def choose(
     if second >= 0:
         return best, action
     for j in range(inst.home.size):
-        left = row_without(row, j, table.s)
+        left = row_without(table, row, j)
         if left < 0 or j == at:
             continue
         if first >= 0:
@@ -193,7 +259,7 @@ def walk(inst: Instance, table: Table, actions: NDArray[np.int64]) -> tuple[int,
         actions[count] = action
         count += 1
         if action >= 0:
-            row = row_without(row, action, table.s)
+            row -= table.stride[action]
             to_object, to_bin, at = inst.between[action], inst.to_bin[action], action
             if first >= 0:
                 second = inst.home[action]

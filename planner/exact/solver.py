@@ -14,9 +14,10 @@ from planner.exact.annealing import anneal, anneal_from, tour_actions
 from planner.exact.beam import beam_pass
 from planner.exact.deadline import Deadline
 from planner.exact.general import best_first
+from planner.exact.groups import alone
 from planner.exact.instance import Instance, make_instance, to_visits
-from planner.exact.multipliers import Bound, first_bound, grown
-from planner.exact.relaxation import fill, new_table, walk
+from planner.exact.multipliers import Bound, first_bound, grown, told_apart
+from planner.exact.relaxation import fill, new_table, table_bytes, walk
 from planner.exact.warm import Warm, warm_bound, warm_order
 from planner.greedy_solver import GreedySolver
 from planner.plan import Plan
@@ -28,9 +29,10 @@ TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
 SMALL_TABLE = 1 << 22  # bytes; filled in some 20 ms, so there is no need of a plan before it
 ANNEALING_MOVES = 20_000
 # A first plan with something known: some 20 ms.
-WARM_MOVES, WARM_EXACT, WARM_WIDTH = 3_000, 8, 800
+WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
 WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
-DEFAULT_WORK = 8_000_000  # states: some 5 s
+DEFAULT_WORK = 30_000_000  # states: some 30 s with the tables
+BIN_ROWS = 50_000  # of a table that counts by bin: 30 objects and 6 bins
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
 LONGEST = 1 << 27  # units; tours beyond this would overflow 32 bits
 
@@ -44,17 +46,19 @@ class ExactSolver:
     Attributes:
         name: Name in run records.
         table_bytes: Largest full table; 0 always searches.
-        passes: Objects kept exactly by the bound and states kept of each layer, from pass to pass.
+        passes: Rows of the bound's table and states kept of each layer, at most, from pass to pass.
     """
 
     name: str = "exact"
     table_bytes: int = 1 << 26  # 18 objects and 6 bins: 0.2 s
     passes: tuple[tuple[int, int], ...] = (
-        (2, 3_000),
-        (6, 6_000),
-        (8, 30_000),
-        (11, 150_000),
-        (13, 500_000),
+        (1, 3_000),
+        (1_000, 20_000),
+        (16_000, 60_000),
+        (BIN_ROWS, 60_000),
+        (1 << 17, 200_000),
+        (1 << 18, 1_000_000),
+        (1 << 19, 2_000_000),
     )
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
@@ -147,12 +151,17 @@ class ExactSolver:
     ) -> Plan:
         """Any capacity and any distances: proven for a few objects, else OR-Tools with the bound reached."""
         legs = metric if is_metric(problem.distances, metric) else integer_distances(problem.distances)
-        found = best_first(problem, legs, metric, GENERAL_STATES)
+        # Half of the time for a proof, the other half for a tour.
+        at = None if limit.seconds is None else started + limit.seconds / 2
+        found = best_first(problem, legs, metric, GENERAL_STATES, Deadline(at, limit.stop))
         visits = found.visits
         if visits is None:
             from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
 
-            plan = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=limit.seconds))
+            left = (
+                None if limit.seconds is None else max(0.001, started + limit.seconds - time.perf_counter())
+            )
+            plan = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=left))
             visits = list(plan.visits)
         certificate = Certificate(Proof.EXHAUSTIVE, found.bound)
         return make_plan(problem, legs, visits, found.bound, started, certificate)
@@ -176,7 +185,7 @@ class ExactSolver:
         else:
             first = warm_order(instance, warm)
             upper, order = anneal_from(instance, seed, WARM_MOVES, first, *WARM_TEMPERATURES)
-            bound = warm_bound(instance, warm.certificate, WARM_EXACT)
+            bound = warm_bound(instance, warm.certificate, WARM_ROWS)
         upper, lower = int(upper), bound.root
         actions: list[int] = tour_actions(instance, order).tolist()
         if warm is not None:
@@ -190,12 +199,14 @@ class ExactSolver:
                 yield _by_table(instance)
             return
         done, rate = 0, max(1, len(instance.home) // 2)
-        for size, wanted in self.passes:
+        for rows, wanted in self.passes:
             # A pass given up proves nothing, and one hardly wider than the last one little.
             width = min(wanted, work // rate)
             if lower >= upper or width < min(wanted, done + 1) or deadline.over():
                 break
-            bound = grown(bound, upper, size, deadline)
+            if rows >= BIN_ROWS:
+                bound = told_apart(bound, upper, BIN_ROWS, deadline)
+            bound = grown(bound, upper, rows, deadline)
             result = beam_pass(bound, upper, width, work, deadline)
             work -= result.expanded
             done, rate = width, max(1, -(-result.expanded // width))  # a wider pass expands fewer per width
@@ -210,19 +221,17 @@ _Found = tuple[list[int], int, Certificate]
 
 
 def _certificate(bound: Bound) -> Certificate:
-    prices = [0] * len(bound.order)
-    for k, price in zip(bound.order, bound.table.multipliers.tolist(), strict=True):
-        prices[k] = price
-    return Certificate(Proof.RELAXATION, bound.root, bound.order[: bound.table.s], tuple(prices))
+    table = bound.table
+    groups = tuple(tuple(np.flatnonzero(table.group == g).tolist()) for g in range(len(table.size)))
+    return Certificate(Proof.RELAXATION, bound.root, groups, tuple(table.multipliers.tolist()))
 
 
 def _table_bytes(instance: Instance) -> int:
-    n, m = len(instance.home), len(instance.bins)
-    return 4 * (m * m + n) << n
+    return table_bytes(instance, 1 << len(instance.home))
 
 
 def _by_table(instance: Instance) -> _Found:
-    table = new_table(instance, len(instance.home))
+    table = new_table(instance, alone(len(instance.home)))
     fill(instance, table)
     actions: NDArray[np.int64] = np.empty(2 * len(instance.home) + 2, np.int64)
     length, count = walk(instance, table, actions)

@@ -4,10 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.deadline import Deadline
+from planner.exact.groups import alone
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
+from planner.exact.nodes import Nodes, new_nodes, slot_of
 from planner.exact.relaxation import INFINITE, Table, after_pick, fill, new_table, row_without
-from planner.exact.search import PLACE_BITS, Nodes, expand, new_nodes, offer_roots, slot_of
+from planner.exact.search import PLACE_BITS, expand, offer_roots
 from planner.kernels import kernel
 
 FIRST_ROOM = 1 << 12
@@ -19,7 +21,7 @@ Costs = dict[int, int]
 
 def costs_by_table(instance: Instance) -> Costs:
     """Exact costs of all next actions, by filling the full table."""
-    table = new_table(instance, len(instance.home))
+    table = new_table(instance, alone(len(instance.home)))
     fill(instance, table)
     return costs_in(instance, table)
 
@@ -34,7 +36,7 @@ def costs_in(instance: Instance, table: Table) -> Costs:
         costs[-1 - k] = int(instance.root_bin[b]) + int(table.bin[row, b, other])
     if len(carried) < 2:
         for j in range(len(instance.home)):
-            left = row_without(row, j, table.s)
+            left = row_without(table, row, j)
             if carried:
                 rest = after_pick(instance, table, left, j, carried[0])
             else:
@@ -55,20 +57,23 @@ def costs_by_pass(bound: Bound, longest: int, most_states: int, deadline: Deadli
         deadline: Give up when it is over.
 
     Returns:
-        Costs by object number of the problem, or None if the pass was given up.
+        Costs, or None if the pass was given up.
     """
     instance, table = bound.instance, bound.table
-    n = len(bound.order)
-    limit = longest + 1 + int(table.multipliers.sum())
+    n = len(instance.home)
+    limit = longest + 1 + bound.prices
     layers: list[Nodes] = []
     here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
     offer_roots(instance, table, here, after, limit)
     states = 0
     for _ in range(n + 1):
-        here, after, *_rest = expand(instance, table, here, after, limit, UNLIMITED)
+        expanded = expand(instance, table, here, after, limit, UNLIMITED, deadline)
+        if expanded is None:
+            return None
+        here, after = expanded.here, expanded.after
         layers.append(here)
         states += int(here.size[0])
-        if states > most_states or deadline.over():
+        if states > most_states:
             return None
         here, after = after, new_nodes(FIRST_ROOM)
     rest = [np.zeros(0, np.int32)] * (n + 1)
@@ -79,7 +84,7 @@ def costs_by_pass(bound: Bound, longest: int, most_states: int, deadline: Deadli
     carried = [int(b) for b in instance.carried]
     first = (layers[1], rest[1]) if n else (beyond, nothing)
     found = root_costs(instance, layers[0], rest[0], *first)
-    names = [-1 - k for k in range(len(carried))] + list(bound.order if len(carried) < 2 else ())
+    names = [-1 - k for k in range(len(carried))] + list(range(n) if len(carried) < 2 else ())
     return {name: int(cost) for name, cost in zip(names, found, strict=True)}
 
 

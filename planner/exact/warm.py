@@ -4,7 +4,9 @@ Any prices give a lower bound, for any objects left, wherever they lie. So what 
 later replan; only the table has to be filled anew, with the objects that are left.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +14,12 @@ from numpy.typing import NDArray
 from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
 from planner.exact.annealing import decode
+from planner.exact.groups import together
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
-from planner.exact.relaxation import fill, new_table, walk
+from planner.exact.relaxation import fill, new_table, rows_of, walk
 
-STEP = 0.2  # where fitting goes on from, if it does
+T = TypeVar("T", str, int)
 
 
 @dataclass(frozen=True)
@@ -57,21 +60,35 @@ def warm_order(instance: Instance, warm: Warm) -> NDArray[np.int64]:
     return np.array(order, dtype=np.int64)
 
 
-def warm_bound(instance: Instance, certificate: Certificate, most_exact: int) -> Bound:
-    """The bound that a certificate's subset and prices give, by one filling of a table.
+def same_groups(groups: Sequence[Sequence[T]], names: Sequence[T]) -> tuple[tuple[int, ...], ...]:
+    """Groups of a certificate for what is left of its shipments.
+
+    Args:
+        groups: Names of shipments that are counted together.
+        names: Names of the shipments that are left, in their new order; new ones are put into the first group.
+    """
+    number = {name: k for k, name in enumerate(names)}
+    kept = [[number.pop(name) for name in members if name in number] for members in groups] or [[]]
+    kept[0] += number.values()
+    return tuple(tuple(members) for members in kept if members)
+
+
+def warm_bound(instance: Instance, certificate: Certificate, most_rows: int) -> Bound:
+    """The bound that a certificate's groups and prices give, by one filling of a table.
 
     Args:
         instance: What is left to do; its objects are numbered as the certificate's shipments.
-        certificate: A relaxation.
-        most_exact: How many objects of its subset to keep exactly; the first ones matter most.
+        certificate: A relaxation; its last groups are merged with the first if they are too many.
+        most_rows: Of the table.
     """
     n = len(instance.home)
-    exact = certificate.exact[: min(most_exact, n)]
-    order = (*exact, *(k for k in range(n) if k not in exact))
-    permuted = instance.permuted(order)
-    table = new_table(permuted, len(exact))
-    table.multipliers[:] = np.array(certificate.multipliers, dtype=np.int32)[list(order)]
-    fill(permuted, table)
-    total, _ = walk(permuted, table, np.empty(2 * n + 2, np.int64))
-    root = int(total) - int(table.multipliers.sum())
-    return Bound(order, permuted, table, root, np.zeros(n), STEP)
+    group = together(n)
+    for g, members in enumerate(certificate.groups):
+        group[list(members)] = g
+    while rows_of(group) > most_rows and group.max(initial=0) > 0:
+        group[group == group.max()] = 0
+    table = new_table(instance, group)
+    table.multipliers[:] = certificate.multipliers
+    fill(instance, table)
+    total, _ = walk(instance, table, np.empty(2 * n + 2, np.int64))
+    return Bound(instance, table, int(total) - int(table.multipliers.sum()), np.zeros(n))

@@ -1,0 +1,42 @@
+"""Which objects a relaxation counts together."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.exact.relaxation import rows_of
+
+
+def together(n: int) -> NDArray[np.int64]:
+    """All objects in one group."""
+    return np.zeros(n, np.int64)
+
+
+def alone(n: int) -> NDArray[np.int64]:
+    """Each object in a group of its own."""
+    return np.arange(n, dtype=np.int64)
+
+
+def numbered(labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The same groups, numbered from 0."""
+    return np.unique(labels, return_inverse=True)[1].astype(np.int64)
+
+
+def with_one_alone(
+    group: NDArray[np.int64], trouble: NDArray[np.float64], most_rows: int
+) -> NDArray[np.int64] | None:
+    """Give one object a group of its own.
+
+    Args:
+        group: Group of each object, numbered from 0, (n,).
+        trouble: Which object matters most, (n,).
+        most_rows: Of the table afterwards.
+
+    Returns:
+        The new groups; None if all objects are alone or the table would be too large.
+    """
+    size = np.bincount(group)[group] if len(group) else group
+    if size.max(initial=1) == 1:
+        return None
+    new = group.copy()
+    new[np.argmax(np.where(size > 1, trouble, -1.0))] = group.max() + 1
+    return new if rows_of(new) <= most_rows else None

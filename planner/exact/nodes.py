@@ -1,0 +1,150 @@
+"""States of one layer of the search: offered one by one, the most promising kept."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.exact.relaxation import INFINITE
+from planner.kernels import kernel
+
+NO_PARENT = -1
+
+
+class Nodes(NamedTuple):
+    """States of one layer with a hash index; the arrays have room to grow.
+
+    Attributes:
+        size: Number of states, (1,) int64.
+        key: Code of each state, int64.
+        cost: Length of the shortest known way, int32.
+        total: Cost plus bound of the cost-to-go, int32.
+        parent: 2 x index of the state before + (1 if that is in the same layer), or `NO_PARENT`, int64.
+        slots: Hash table of indices, -1 where empty, a power of two long, int32.
+    """
+
+    size: NDArray[np.int64]
+    key: NDArray[np.int64]
+    cost: NDArray[np.int32]
+    total: NDArray[np.int32]
+    parent: NDArray[np.int64]
+    slots: NDArray[np.int32]
+
+
+@kernel
+def new_nodes(room: int) -> Nodes:
+    """An empty layer with room for a number of states, a power of two."""
+    return Nodes(
+        np.zeros(1, np.int64),
+        np.empty(room, np.int64),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int64),
+        np.full(2 * room, -1, np.int32),
+    )
+
+
+@kernel
+def slot_of(nodes: Nodes, key: int) -> int:
+    """Slot that holds a key, or the empty one where it belongs."""
+    mask = nodes.slots.size - 1
+    mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
+    slot = int(mixed >> np.uint64(29)) & mask
+    while nodes.slots[slot] >= 0 and nodes.key[nodes.slots[slot]] != key:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@kernel
+def with_room(nodes: Nodes, more: int) -> Nodes:
+    """The same layer with room for so many more states."""
+    size = nodes.size[0]
+    room = nodes.key.size
+    if size + more <= room:
+        return nodes
+    while size + more > room:
+        room *= 2
+    wider = new_nodes(room)
+    wider.size[0] = size
+    for k in range(size):
+        wider.key[k] = nodes.key[k]
+        wider.cost[k] = nodes.cost[k]
+        wider.total[k] = nodes.total[k]
+        wider.parent[k] = nodes.parent[k]
+        wider.slots[slot_of(wider, wider.key[k])] = k
+    return wider
+
+
+@kernel
+def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
+    """Add a state, or shorten the way to it; there must be room."""
+    slot = slot_of(nodes, key)
+    k = nodes.slots[slot]
+    if k < 0:
+        k = nodes.size[0]
+        nodes.size[0] = k + 1
+        nodes.slots[slot] = k
+        nodes.key[k] = key
+    elif cost >= nodes.cost[k]:
+        return
+    nodes.cost[k] = cost
+    nodes.total[k] = total
+    nodes.parent[k] = parent
+
+
+@kernel
+def smallest_but(values: NDArray[np.int32], size: int, count: int) -> int:
+    """Least number that at least `count` of the first `size` values do not exceed.
+
+    By bisection: reading an array 20 times takes no longer than partitioning a copy, and compiles in no time.
+    """
+    low, high = np.int32(INFINITE), np.int32(-INFINITE)
+    for k in range(size):
+        low, high = min(low, values[k]), max(high, values[k])
+    while low < high:
+        middle = np.int32((low + high) >> 1)
+        below = 0
+        for k in range(size):
+            below += values[k] <= middle
+        if below >= count:
+            high = middle
+        else:
+            low = np.int32(middle + 1)
+    return int(low)
+
+
+@kernel
+def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
+    """Only the most promising states, and the smallest total dropped (`INFINITE` if none was)."""
+    size = nodes.size[0]
+    if size <= width:
+        return nodes, INFINITE
+    bar = smallest_but(nodes.total, size, width)
+    ties = width
+    for k in range(size):
+        if nodes.total[k] < bar:
+            ties -= 1
+    room = 1
+    while room < 2 * width:
+        room *= 2
+    kept, smallest = new_nodes(room), INFINITE
+    for k in range(size):
+        if nodes.total[k] == bar and ties > 0:
+            ties -= 1
+        elif nodes.total[k] >= bar:
+            smallest = min(smallest, nodes.total[k])
+            continue
+        offer(kept, nodes.key[k], nodes.cost[k], nodes.total[k], nodes.parent[k])
+    return kept, smallest
+
+
+@kernel
+def with_room_among(nodes: Nodes, more: int, width: int) -> tuple[Nodes, int]:
+    """Make room by dropping states that are not among the best 2 `width` when there are twice as many.
+
+    They would not be among the best `width` later either.
+    """
+    smallest = INFINITE
+    if nodes.size[0] + more > nodes.key.size and nodes.size[0] > 4 * width:
+        nodes, smallest = keep_best(nodes, 2 * width)
+    return with_room(nodes, more), smallest
