@@ -1,0 +1,44 @@
+"""Whether a shorter tour exists, for any capacity and any distances: every state that may lead to one is visited."""
+
+from planner.problem import RoutingProblem
+from planner.relaxation_checker import closed
+
+# Where one is, objects left (bits), and the bins of what is carried.
+State = tuple[int, int, tuple[int, ...]]
+
+
+def sweep_orders(problem: RoutingProblem, limit: float, most_states: int) -> tuple[bool, int] | None:
+    """Look for a tour shorter than a limit, m, by visits made; no state farther than that from its end is followed.
+
+    Returns:
+        Whether there is one, and how many states were looked at; None if they were too many.
+    """
+    d, direct = problem.distances.tolist(), closed(problem.distances).tolist()
+    trips = [(s.pickup, s.delivery) for s in problem.shipments]
+
+    def still(here: int, left: int, carried: tuple[int, ...]) -> float:
+        """The farthest single errand left."""
+        errands = [direct[here][a] + direct[a][b] for k, (a, b) in enumerate(trips) if left >> k & 1]
+        return max([*errands, *(direct[here][j] for j in carried)], default=0.0)
+
+    layer: dict[State, float] = {(problem.start, (1 << len(trips)) - 1, tuple(sorted(problem.onboard))): 0.0}
+    states = 0
+    for _ in range(2 * len(trips) + len(problem.onboard)):
+        after: dict[State, float] = {}
+        for (here, left, carried), cost in layer.items():
+            ways = [(j, left, carried[:k] + carried[k + 1 :]) for k, j in enumerate(carried)]
+            if len(carried) < problem.capacity:
+                ways += [
+                    (a, left ^ 1 << k, tuple(sorted((*carried, b))))
+                    for k, (a, b) in enumerate(trips)
+                    if left >> k & 1
+                ]
+            for way in ways:
+                total = cost + d[here][way[0]]
+                if total < after.get(way, limit) and total + still(*way) < limit:
+                    after[way] = total
+        layer = after
+        states += len(layer)
+        if states > most_states:
+            return None
+    return bool(layer), states
