@@ -12,18 +12,20 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjsim import avatar, kinematics
+from mjsim import avatar, kinematics, trunk
 from mjsim.actions import IDLE, Action, EventKind, Move, Pick, Place, WorldEvent
+from mjsim.body import X, Y, standing
 from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import ActionError, StateError
 from mjsim.footprint import Footprint
-from mjsim.kinematics import Floor, Gait, X, Y
+from mjsim.kinematics import Gait
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import FIDELITIES, WorldOptions
 from mjsim.recording import WorldState
 from mjsim.scene import Scene, compose
 from mjsim.stretch import Stretch
+from mjsim.trunk import Floor
 from mjsim.visibility import visible_objects
 from mjsim.world import World
 
@@ -254,7 +256,7 @@ def test_nobody_walks_into_or_through_a_wall(
     free = [
         p for p in rng.uniform((x0, y0), (x1, y1), (400, 2)) if obstacles.distance(shapely.Point(p)) > 0.21
     ]
-    body = kinematics.standing(*free[0], heading=1.0)
+    body = standing(*free[0], heading=1.0)
     trail = [free[0]]
     for forward, left, turn, look in wander(150, seed) * (speed, speed, 1.0, 1.0):
         kinematics.walk(body, forward, left, turn, look, gait, floor)
@@ -283,7 +285,7 @@ def test_the_gap_to_an_outline_is_that_of_geometry(points: list[tuple[float, flo
     polygon = shapely.Polygon(corners)
     floor = Floor.of_polygons((corners,), 0.2)
     for x, y in points:
-        gap, nx, ny = kinematics._gap(x, y, floor.edges, 0, 4)
+        gap, nx, ny = trunk.gap_to(x, y, floor.edges, 0, 4)
         point = shapely.Point(x, y)
         depth = polygon.exterior.distance(point)
         assert gap == pytest.approx(-depth if polygon.contains(point) else depth, abs=1e-9)

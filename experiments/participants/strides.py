@@ -11,8 +11,10 @@ from experiments.participants.walking import (
     rest_of,
     turn_towards,
 )
-from mjsim.kinematics import HEADING, Floor, Gait, X, Y
+from mjsim.body import HEADING, X, Y
+from mjsim.kinematics import Gait
 from mjsim.kinematics import walk as walk_body
+from mjsim.trunk import Floor
 from planner.kernels import kernel
 
 ARRIVED = 0.06  # m from the end of the way

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from mjsim import avatar
 from mjsim.actions import ActionResult, EventKind, Pick
+from mjsim.body import HEADING, LOOK, X, Y
 from mjsim.fidelity import gestures
 from mjsim.fidelity.fall import drop
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.gestures import ACROSS_FIRST, STRAIGHT, UP_FIRST, Script
 from mjsim.fidelity.strides import BODY, HANDS
 from mjsim.fidelity.walker import Walker
-from mjsim.kinematics import HEADING, LOOK, X, Y
 from mjsim.person import FACE_TIMEOUT
 from mjsim.picking import ALIGN_TIME, LIFT_TIME, REACH_TIME, SEAT_TIME
 from mjsim.placing import (

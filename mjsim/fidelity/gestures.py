@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from mjsim import kinematics
 from mjsim.avatar import EYE_FORWARD, EYE_HEIGHT
+from mjsim.body import FORWARD, HEADING, LEFT, LOOK, PITCH, TURN, TURN_RATE, VX, VY, X, Y
 from mjsim.fidelity.strides import BODY, HAND_SPEEDS, HANDS, LIVE, Household, Rows, tick, write_row
 from mjsim.kernels import kernel
-from mjsim.kinematics import FORWARD, HEADING, LEFT, LOOK, PITCH, TURN, TURN_RATE, VX, VY, Gait, X, Y
+from mjsim.kinematics import Gait
 from mjsim.person import TURN_GAIN
 
 Floats = NDArray[np.float64]

@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.body import HEADING, SERVO, TURN_RATE, VX, VY, X, Y
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.strides import BODY, HAND_SPEEDS, HANDS, HOLDS
 from mjsim.fidelity.walker import Walker
-from mjsim.kinematics import HEADING, SERVO, TURN_RATE, VX, VY, X, Y
 
 
 def enter(full: Full, walker: Walker) -> None:

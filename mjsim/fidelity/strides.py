@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim import kinematics
+from mjsim.body import BODY_SIZE, FORWARD, HEADING, PITCH, X, Y
 from mjsim.kernels import kernel
-from mjsim.kinematics import BODY_SIZE, HEADING, PITCH, Floor, Gait, X, Y
+from mjsim.kinematics import Gait
 from mjsim.postures import update_hands
+from mjsim.trunk import Floor
 
 Floats = NDArray[np.float64]
 
@@ -96,7 +98,7 @@ def tick(live: Floats, poses: Floats, posture: Floats, moving: int, house: House
     body = live[BODY:HANDS]
     hands, speeds = live[HANDS:HAND_SPEEDS].reshape(2, 3), live[HAND_SPEEDS:HOLDS].reshape(2, 3)
     update_hands(
-        body, body[kinematics.FORWARD :], hands, speeds, house.yields, house.goals,
+        body, body[FORWARD :], hands, speeds, house.yields, house.goals,
         held_in(live, 0), held_in(live, 1), moving, posture, house.rest, house.loads,
         house.distance, house.gradient, house.frame, _NO_GEOMS, _NO_FRAMES, _NO_BEARERS, house.gait.dt,
     )  # fmt: skip

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mjsim import avatar
 from mjsim.actions import Move, WorldEvent
+from mjsim.body import FORWARD, HEADING, LOOK, PITCH, VX, VY, X, Y
 from mjsim.carrying import Carrying
 from mjsim.errors import StateError
 from mjsim.fidelity.gestures import Script, play_rows
@@ -26,13 +27,14 @@ from mjsim.fidelity.strides import (
     walk_rows,
 )
 from mjsim.health import HealthSample
-from mjsim.kinematics import FORWARD, HEADING, LOOK, PITCH, VX, VY, Floor, Gait, Legs, X, Y
+from mjsim.kinematics import Gait, Legs
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
 from mjsim.postures import LOWEST, drawn_in
 from mjsim.rig import Rig
 from mjsim.scene import Scene
 from mjsim.stretch import Stretch
+from mjsim.trunk import Floor
 
 # An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.
 _RESTLESS = 3.0
