@@ -14,6 +14,9 @@ COUNT, QUICK = 200, 20
 STRAIGHT, CORNER = (1.35, 0.2), (1.2, 1.0)  # m/s at least; rad/s at most, at least
 TARGETS = (
     ("things that arrive, %", "kept_percent", ">=", 99.0),
+    ("weld error, 99th percentile at 1.4 m/s, straight on, mm", "straight_p99_mm", "<", 2.0),
+    ("weld error, 99th percentile at 1.4 m/s, round corners, mm", "corner_p99_mm", "<", 2.0),
+    ("weld error, 99th percentile at 1.4 m/s, round corners, degrees", "corner_p99_deg", "<", 5.0),
     ("weld error, maximum at 1.4 m/s, straight on, mm", "straight_max_mm", "<", 2.0),
     ("weld error, maximum at 1.4 m/s, round corners, mm", "corner_max_mm", "<", 2.0),
     ("weld error, maximum at 1.4 m/s, straight on, degrees", "straight_max_deg", "<", 5.0),
