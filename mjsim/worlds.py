@@ -5,8 +5,10 @@ each is stepped by one thread at a time. So the number of threads changes the sp
 go of Python's interpreter lock while it steps, which is most of a step (docs/physics.md, "Many worlds").
 """
 
+from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+from threading import Lock, Thread
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
@@ -47,8 +49,7 @@ class Worlds(Sequence[World]):
         if not worlds or len({id(world) for world in worlds}) < len(worlds):
             raise ActionError(f"{len(worlds)} worlds to step, which must be at least one, and all different")
         self._worlds = tuple(worlds)
-        self._helpers = min(threads, len(worlds)) - 1
-        self._pool = ThreadPoolExecutor(self._helpers, "worlds") if self._helpers else None
+        self._helpers = [_Helper() for _ in range(min(threads, len(worlds)) - 1)]
 
     def __len__(self) -> int:
         return len(self._worlds)
@@ -66,9 +67,9 @@ class Worlds(Sequence[World]):
 
     def close(self) -> None:
         """End the threads; the worlds live on."""
-        if self._pool is not None:
-            self._pool.shutdown()
-            self._pool, self._helpers = None, 0
+        for helper in self._helpers:
+            helper.end()
+        self._helpers = []
 
     def reset(self) -> list[Observation]:
         """Return every world to its episode's beginning."""
@@ -86,7 +87,7 @@ class Worlds(Sequence[World]):
         """
         self._check_count(len(actions), "actions")
         pairs = zip(self._worlds, actions, strict=True)
-        return self._each([_call(world.step, action) for world, action in pairs])
+        return self._each([partial(world.step, action) for world, action in pairs])
 
     def walk(self, moves: Sequence[ArrayLike]) -> list[Stretch]:
         """Advance every world by its own moves, as `World.walk` does; one array per world, of any length.
@@ -97,7 +98,7 @@ class Worlds(Sequence[World]):
         """
         self._check_count(len(moves), "arrays of moves")
         pairs = zip(self._worlds, moves, strict=True)
-        return self._each([_call(world.walk, rows) for world, rows in pairs])
+        return self._each([partial(world.walk, rows) for world, rows in pairs])
 
     def finish(self) -> list[Stretch]:
         """Let every world finish its pick or place, as `World.finish` does.
@@ -109,35 +110,69 @@ class Worlds(Sequence[World]):
 
     def each(self, function: Callable[[World], T]) -> list[T]:
         """Call a function with every world, on all threads; it may touch its own world alone."""
-        return self._each([_call(function, world) for world in self._worlds])
+        return self._each([partial(function, world) for world in self._worlds])
 
     def _check_count(self, count: int, what: str) -> None:
         if count != len(self._worlds):
             raise ActionError(f"{count} {what} for {len(self._worlds)} worlds; give one per world")
 
     def _each(self, calls: Sequence[Callable[[], T]]) -> list[T]:
-        """Results of all calls, made by whichever thread is free."""
+        """Results of all calls; every thread makes its own, whose worlds are in its cache, then helps the others."""
+        threads = 1 + len(self._helpers)
         results: list[Any] = [None] * len(calls)
         errors: dict[int, BaseException] = {}
-        waiting = iter(range(len(calls)))
+        shares = [deque(range(thread, len(calls), threads)) for thread in range(threads)]
 
-        def work() -> None:
-            for number in waiting:  # taking the next number is one step of the interpreter
-                try:
-                    results[number] = calls[number]()
-                except Exception as error:
-                    errors[number] = error
+        def work(thread: int) -> None:
+            for share in (*shares[thread:], *shares[:thread]):
+                while share:
+                    try:
+                        number = share.popleft()
+                    except IndexError:  # another thread was quicker
+                        break
+                    try:
+                        results[number] = calls[number]()
+                    except Exception as error:
+                        errors[number] = error
 
-        helpers: list[Future[None]] = []
-        if self._pool is not None:
-            helpers = [self._pool.submit(work) for _ in range(self._helpers)]
-        work()
-        for helper in helpers:
-            helper.result()
+        for thread, helper in enumerate(self._helpers, start=1):
+            helper.begin(partial(work, thread))
+        work(0)
+        for helper in self._helpers:
+            helper.wait()
         if errors:
             raise errors[min(errors)]
         return results
 
 
-def _call(function: Callable[[Any], T], argument: Any) -> Callable[[], T]:
-    return lambda: function(argument)
+class _Helper:
+    """A thread that works when told to; a pool of futures takes as long to talk to as half a step of the engine."""
+
+    def __init__(self) -> None:
+        self._work: Callable[[], None] | None = None
+        self._told, self._done = Lock(), Lock()
+        self._told.acquire()
+        self._done.acquire()
+        Thread(target=self._serve, name="worlds", daemon=True).start()
+
+    def begin(self, work: Callable[[], None]) -> None:
+        """Let the thread do some work, which must not raise."""
+        self._work = work
+        self._told.release()
+
+    def wait(self) -> None:
+        """Until the work is done."""
+        self._done.acquire()
+
+    def end(self) -> None:
+        """Let the thread end."""
+        self._work = None
+        self._told.release()
+
+    def _serve(self) -> None:
+        while True:
+            self._told.acquire()
+            if self._work is None:
+                return
+            self._work()
+            self._done.release()
