@@ -62,7 +62,7 @@ class Walker:
         distance, gradient, frame = carrying.field
         self.house = Household(
             gait=Gait.of(scene.model, options),
-            floor=Floor.of(scene.model),
+            floor=scene.catalogue.library.once(("floor",), lambda: Floor.of(scene.model)),
             grips=_grip_poses(scene),
             loads=carrying.loads,
             rest=np.array(avatar.REST),
