@@ -121,7 +121,10 @@ def test_an_object_that_cannot_stay_is_loose_again(small_catalogue: Catalogue) -
         if not moved and not world.data.eq_active.any():
             world.data.qpos[address : address + 3] = (1.4, 2.4, 0.3)
             moved = True
-    assert [e.kind for e in events[:-1]] == [EventKind.TUNNELLED, EventKind.EJECTED]  # through the crate, and far
+    assert [e.kind for e in events[:-1]] == [
+        EventKind.TUNNELLED,
+        EventKind.EJECTED,
+    ]  # through the crate, and far
     assert (events[-1].kind, events[-1].receptacle) == (EventKind.PLACE_FAILED, "crate")
     assert world.observation().object_status == (ObjectStatus.LOOSE,)
     assert world.observation().hands == (None, None)
