@@ -9,11 +9,11 @@ from typing import Any, TypeVar
 
 from experiments.errors import ConfigError
 from mjsim.files import replacing
-from planner.checker import check
 from planner.claim_json import claim_from_json, claim_to_json
 from planner.errors import ProblemError
 from planner.problem_json import plan_to_json, problem_from_json
 from planner.solver import DEFAULT_SOLVER, SOLVERS, SolveLimit, solver
+from planner.verifier import verify_optimal
 
 T = TypeVar("T")
 
@@ -28,11 +28,12 @@ Output, on standard output:
 Malformed input exits with 2 and one line that names the fault.
 
 With --certificate OUT.json the visits by object and what proves the lower bound are written as well. Anybody can check
-that: --check OUT.json replays the tour against the constraints and derives the bound anew, by code that shares nothing
-with the planners, and answers
-  {"holds": true, "cost": 7.0, "lower_bound": 7.0, "derived_bound": 7.0, "status": "optimal"}
-derived_bound is what the check could see for itself. Where it is below lower_bound, the rest is the planner's word that
-its search was complete. A claim that does not hold exits with 1."""
+that: --check OUT.json replays the tour against the constraints, derives the bound anew and looks at every state through
+which a shorter tour could run, by code that shares nothing with the planners (about a second at 24 objects). It answers
+  {"holds": true, "cost": 7.0, "lower_bound": 7.0, "status": "optimal", "verified_bound": 7.0, "verified_optimal": true,
+   "unverified": ""}
+verified_bound is what the check saw for itself; where it is below lower_bound, unverified says why. A claim that
+does not hold exits with 1."""
 
 
 def add_parser(commands: Any) -> None:
@@ -86,12 +87,13 @@ def _check(problem_name: str, claim_name: str) -> int:
     problem = _read(problem_name, problem_from_json)
     plan = _read(claim_name, lambda text: claim_from_json(text, problem))
     try:
-        derived = check(problem, plan)
+        seen = verify_optimal(problem, plan)
     except ProblemError as error:
         print(json.dumps({"holds": False, "fault": str(error)}))
         return 1
-    numbers = {"cost": plan.cost, "lower_bound": plan.lower_bound, "derived_bound": derived}
-    print(json.dumps({"holds": True, **numbers, "status": plan.status.value}))
+    claimed = {"cost": plan.cost, "lower_bound": plan.lower_bound, "status": plan.status.value}
+    verified = {"verified_bound": seen.lower_bound, "verified_optimal": seen.optimal, "unverified": seen.why}
+    print(json.dumps({"holds": True, **claimed, **verified}))
     return 0
 
 
