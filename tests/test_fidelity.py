@@ -385,11 +385,12 @@ def test_a_refusal_changes_nothing(house: Scene, fidelity: str) -> None:
 
 
 def test_a_full_receptacle_takes_no_more(small_catalogue: Catalogue) -> None:
-    """Three layers of four cubes fit; what lies on top of them is not in the crate."""
-    places = [("cube", 0.9 + 0.3 * (i % 4), 2.3 + 0.3 * (i // 4)) for i in range(13)]
+    """Layers of four cubes fit and may be heaped; what lies on top of the heap is not in the crate."""
+    cubes = 20
+    places = [("cube", 0.9 + 0.3 * (i % 4), 2.3 + 0.3 * (i // 4)) for i in range(cubes)]
     world = world_of(furnish(small_catalogue, (1.4, 1.9, 1.5), places), "event")
     outcomes = []
-    for number in range(13):
+    for number in range(cubes):
         x, y = world.observation().object_positions[number, :2]
         walk_to(world, x, y - 0.6, within=0.1)
         face(world, x, y)
@@ -400,7 +401,7 @@ def test_a_full_receptacle_takes_no_more(small_catalogue: Catalogue) -> None:
     assert outcomes[:8] == [EventKind.PLACED] * 8
     assert EventKind.PLACE_FAILED in outcomes
     status = world.observation().object_status
-    assert [s is ObjectStatus.DELIVERED for s in status].count(True) < 13
+    assert [s is ObjectStatus.DELIVERED for s in status].count(True) < cubes
 
 
 # --- states --------------------------------------------------------------------------------------------------
