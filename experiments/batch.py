@@ -17,7 +17,7 @@ from typing import Any
 from experiments import records
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.lockstep import Play, drive_many, stepping
+from experiments.lockstep import Play, drive_many, performer
 from experiments.records import read_json
 from experiments.table import write_tables
 from experiments.trial import TrialConfig, play_trial
@@ -201,10 +201,10 @@ def _house(name: str) -> House:
 def _run_group(group: _Group, worlds: int, threads: int) -> list[str | None]:
     """Run trials, `worlds` of them side by side; None for each that succeeds, else what went wrong."""
     plays = ((name, _play(config, out)) for name, config, out in group)
-    with stepping(threads) as step_together:
+    with performer(threads) as perform:
         return [
             _failure(name, result) if isinstance(result, Exception) else None
-            for name, result in drive_many(plays, worlds, step_together)
+            for name, result in drive_many(plays, worlds, perform)
         ]
 
 

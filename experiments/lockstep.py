@@ -1,16 +1,17 @@
 """What a session asks of its world, and driving one session or many side by side."""
 
 import itertools
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import Action
+from mjsim.crew import Crew
 from mjsim.errors import PhysicsError
 from mjsim.stretch import Stretch
 from mjsim.world import StepResult, World
@@ -57,8 +58,8 @@ Request = Step | Walk | Finish
 Outcome = StepResult | Stretch
 # Yields what a world is to do, takes what came of it, or is thrown the PhysicsError or KeyboardInterrupt that came.
 Play = Generator[Request, Outcome, T]
-# Takes a control step in each of several worlds.
-StepTogether = Callable[[Sequence[Step]], Sequence[StepResult | PhysicsError]]
+# Does what several sessions ask, each of a world of its own.
+Performer = Callable[[Sequence[Request]], Sequence[Outcome | PhysicsError]]
 
 
 def drive(play: Play[T]) -> T:
@@ -79,14 +80,14 @@ def drive(play: Play[T]) -> T:
 def drive_many(
     plays: Iterable[tuple[str, Play[T]]],
     at_once: int,
-    step_together: StepTogether,
+    perform: Performer,
 ) -> Iterator[tuple[str, T | Exception]]:
-    """Run sessions side by side: all take a control step, then all decide, and so on.
+    """Run sessions side by side: all worlds do what their sessions ask, then all sessions decide, and so on.
 
     Args:
         plays: Sessions with their names; one is taken when there is room for it.
         at_once: How many run at a time.
-        step_together: Steps the worlds of several sessions.
+        perform: Does what the sessions ask for; see `performer`.
 
     Yields:
         Name and result of each session that is over, or what it raised.
@@ -94,7 +95,8 @@ def drive_many(
     waiting = iter(plays)
     running: dict[str, tuple[Play[T], Request]] = {}
     while True:
-        outcomes: dict[str, Outcome | PhysicsError | None] = _perform(running, step_together)
+        done = perform([request for _, request in running.values()])
+        outcomes: dict[str, Outcome | PhysicsError | None] = dict(zip(running, done, strict=True))
         begun = dict(itertools.islice(waiting, at_once - len(running)))
         outcomes |= dict.fromkeys(begun)
         if not outcomes:
@@ -116,30 +118,14 @@ def _go_on(play: Play[T], outcome: Outcome | PhysicsError | None) -> Request:
     return play.throw(outcome) if isinstance(outcome, PhysicsError) else play.send(outcome)
 
 
-def _perform(
-    running: Mapping[str, tuple[Play[T], Request]],
-    step_together: StepTogether,
-) -> dict[str, Outcome | PhysicsError | None]:
-    """Do what all sessions ask; what came of it, in the sessions' order."""
-    steps = {name: request for name, (_, request) in running.items() if isinstance(request, Step)}
-    results = dict(zip(steps, step_together(list(steps.values())) if steps else (), strict=True))
-    outcomes: dict[str, Outcome | PhysicsError | None] = {}
-    for name, (_, request) in running.items():
-        outcomes[name] = results[name] if name in results else _attempt(request)
-    return outcomes
-
-
 @contextmanager
-def stepping(threads: int = 1) -> Iterator[StepTogether]:
-    """How to step many worlds at once, on so many threads; what comes of it does not depend on their number."""
-    if threads == 1:
-        yield lambda steps: [_attempt(step) for step in steps]
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        yield lambda steps: list(pool.map(_attempt, steps))
+def performer(threads: int = 1) -> Iterator[Performer]:
+    """Does what many sessions ask at once, on so many threads; what comes of it does not depend on their number."""
+    with Crew(threads) as crew:
+        yield lambda requests: crew.all([partial(_attempt, request) for request in requests])
 
 
-def _attempt(request: Step | Walk | Finish) -> Any:
+def _attempt(request: Request) -> Any:
     """Do what a session asks; a failure of the physics is an answer like any other."""
     try:
         return request.perform()

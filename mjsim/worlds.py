@@ -5,16 +5,15 @@ each is stepped by one thread at a time. So the number of threads changes the sp
 go of Python's interpreter lock while it steps, which is most of a step (docs/physics.md, "Many worlds").
 """
 
-from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
-from threading import Lock, Thread
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from numpy.typing import ArrayLike
 
 from mjsim.actions import Action
+from mjsim.crew import Crew
 from mjsim.errors import ActionError
 from mjsim.observation import Observation
 from mjsim.stretch import Stretch
@@ -44,12 +43,10 @@ class Worlds(Sequence[World]):
         Raises:
             ActionError: `threads` is below 1, there is no world, or a world is there twice.
         """
-        if threads < 1:
-            raise ActionError(f"threads is {threads}; at least 1 is needed")
         if not worlds or len({id(world) for world in worlds}) < len(worlds):
             raise ActionError(f"{len(worlds)} worlds to step, which must be at least one, and all different")
         self._worlds = tuple(worlds)
-        self._helpers = [_Helper() for _ in range(min(threads, len(worlds)) - 1)]
+        self._crew = Crew(min(threads, len(worlds)))
 
     def __len__(self) -> int:
         return len(self._worlds)
@@ -67,13 +64,11 @@ class Worlds(Sequence[World]):
 
     def close(self) -> None:
         """End the threads; the worlds live on."""
-        for helper in self._helpers:
-            helper.end()
-        self._helpers = []
+        self._crew.close()
 
     def reset(self) -> list[Observation]:
         """Return every world to its episode's beginning."""
-        return self._each([world.reset for world in self._worlds])
+        return self._crew.all([world.reset for world in self._worlds])
 
     def step(self, actions: Sequence[Action]) -> list[StepResult]:
         """Advance every world by one control step.
@@ -87,7 +82,7 @@ class Worlds(Sequence[World]):
         """
         self._check_count(len(actions), "actions")
         pairs = zip(self._worlds, actions, strict=True)
-        return self._each([partial(world.step, action) for world, action in pairs])
+        return self._crew.all([partial(world.step, action) for world, action in pairs])
 
     def walk(self, moves: Sequence[ArrayLike]) -> list[Stretch]:
         """Advance every world by its own moves, as `World.walk` does; one array per world, of any length.
@@ -98,7 +93,7 @@ class Worlds(Sequence[World]):
         """
         self._check_count(len(moves), "arrays of moves")
         pairs = zip(self._worlds, moves, strict=True)
-        return self._each([partial(world.walk, rows) for world, rows in pairs])
+        return self._crew.all([partial(world.walk, rows) for world, rows in pairs])
 
     def finish(self) -> list[Stretch]:
         """Let every world finish its pick or place, as `World.finish` does.
@@ -106,73 +101,12 @@ class Worlds(Sequence[World]):
         Raises:
             PhysicsError: As in `World.step`.
         """
-        return self._each([world.finish for world in self._worlds])
+        return self._crew.all([world.finish for world in self._worlds])
 
     def each(self, function: Callable[[World], T]) -> list[T]:
         """Call a function with every world, on all threads; it may touch its own world alone."""
-        return self._each([partial(function, world) for world in self._worlds])
+        return self._crew.all([partial(function, world) for world in self._worlds])
 
     def _check_count(self, count: int, what: str) -> None:
         if count != len(self._worlds):
             raise ActionError(f"{count} {what} for {len(self._worlds)} worlds; give one per world")
-
-    def _each(self, calls: Sequence[Callable[[], T]]) -> list[T]:
-        """Results of all calls; every thread makes its own, whose worlds are in its cache, then helps the others."""
-        threads = 1 + len(self._helpers)
-        results: list[Any] = [None] * len(calls)
-        errors: dict[int, BaseException] = {}
-        shares = [deque(range(thread, len(calls), threads)) for thread in range(threads)]
-
-        def work(thread: int) -> None:
-            for share in (*shares[thread:], *shares[:thread]):
-                while share:
-                    try:
-                        number = share.popleft()
-                    except IndexError:  # another thread was quicker
-                        break
-                    try:
-                        results[number] = calls[number]()
-                    except Exception as error:
-                        errors[number] = error
-
-        for thread, helper in enumerate(self._helpers, start=1):
-            helper.begin(partial(work, thread))
-        work(0)
-        for helper in self._helpers:
-            helper.wait()
-        if errors:
-            raise errors[min(errors)]
-        return results
-
-
-class _Helper:
-    """A thread that works when told to; a pool of futures takes as long to talk to as half a step of the engine."""
-
-    def __init__(self) -> None:
-        self._work: Callable[[], None] | None = None
-        self._told, self._done = Lock(), Lock()
-        self._told.acquire()
-        self._done.acquire()
-        Thread(target=self._serve, name="worlds", daemon=True).start()
-
-    def begin(self, work: Callable[[], None]) -> None:
-        """Let the thread do some work, which must not raise."""
-        self._work = work
-        self._told.release()
-
-    def wait(self) -> None:
-        """Until the work is done."""
-        self._done.acquire()
-
-    def end(self) -> None:
-        """Let the thread end."""
-        self._work = None
-        self._told.release()
-
-    def _serve(self) -> None:
-        while True:
-            self._told.acquire()
-            if self._work is None:
-                return
-            self._work()
-            self._done.release()

@@ -9,7 +9,7 @@ from experiments import records
 from experiments.agreement import run_in
 from experiments.errors import ReplayError
 from experiments.house import House
-from experiments.lockstep import Step, drive_many, stepping
+from experiments.lockstep import Step, drive_many, performer
 from experiments.participants.base import Foreseeing
 from experiments.participants.follower import Follower
 from experiments.records import EventLog, read_arrays, read_events, read_json
@@ -124,8 +124,8 @@ def test_side_by_side_is_as_one_by_one(house, tmp_path):
             (name, play_trial(config, folder / name, topdown=False, house=house))
             for name, config in zip(names, configs, strict=True)
         ]
-        with stepping(threads or 1) as step_together:
-            results = dict(drive_many(plays, 1 if not threads else 4, step_together))
+        with performer(threads or 1) as perform:
+            results = dict(drive_many(plays, 1 if not threads else 4, perform))
         assert {n for n, r in results.items() if isinstance(r, Exception)} == {
             n for n in names if n.endswith("41")
         }
