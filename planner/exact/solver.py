@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
 DEFAULT_WORK = 30_000_000  # states: some 30 s with the tables
 BIN_ROWS = 50_000  # of a table that counts by bin: 30 objects and 6 bins
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
+PROVABLE = 14  # objects; with more of them that search has no hope
 LONGEST = 1 << 27  # units; tours beyond this would overflow 32 bits
 
 
@@ -67,7 +68,7 @@ class ExactSolver:
         Args:
             problem: What is left to do.
             seed: Of the annealing.
-            limit: States or seconds; by default 8 million states. OR-Tools counts other things, so only the
+            limit: States or seconds; by default 30 million states. OR-Tools counts other things, so only the
                 seconds are handed on to it.
 
         Returns:
@@ -151,20 +152,24 @@ class ExactSolver:
     ) -> Plan:
         """Any capacity and any distances: proven for a few objects, else OR-Tools with the bound reached."""
         legs = metric if is_metric(problem.distances, metric) else integer_distances(problem.distances)
-        # Half of the time for a proof, the other half for a tour.
-        at = None if limit.seconds is None else started + limit.seconds / 2
+        # Time for a proof where there is hope of one; the rest for a tour.
+        share = 0.5 if len(problem.shipments) <= PROVABLE else 0.05
+        at = None if limit.seconds is None else started + limit.seconds * share
         found = best_first(problem, legs, metric, GENERAL_STATES, Deadline(at, limit.stop))
-        visits = found.visits
+        certificate = Certificate(Proof.EXHAUSTIVE, found.bound)
+        visits, other = found.visits, None
         if visits is None:
             from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
 
             left = (
                 None if limit.seconds is None else max(0.001, started + limit.seconds - time.perf_counter())
             )
-            plan = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=left))
-            visits = list(plan.visits)
-        certificate = Certificate(Proof.EXHAUSTIVE, found.bound)
-        return make_plan(problem, legs, visits, found.bound, started, certificate)
+            other = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=left))
+            visits = list(other.visits)
+        plan = make_plan(problem, legs, visits, found.bound, started, certificate)
+        if other is not None and other.lower_bound > plan.lower_bound:
+            return replace(other, seconds=plan.seconds)
+        return plan
 
     def _search(
         self,
