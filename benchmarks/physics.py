@@ -33,7 +33,9 @@ OBJECTS = (6, 12, 18, 24, 48)
 LEVEL = 24
 TURN = 100  # calls that are timed at once
 REPEATS = 3
-WALK = 60.0  # simulated s of which the number of threads and the profile are measured
+WALK = 60.0  # simulated s of which the profile is measured
+TOGETHER = 3.0  # simulated s of which the number of threads is measured
+WORLDS = 16  # per core: with few of them, threads wait for each other at the end of every step
 TARGETS = (("full", 120.0), ("windows", 500.0), ("event", 3000.0))  # simulated s per core-second
 MOST_OVERHEAD = 1.3  # times the raw engine
 MANY_THREADS = 1.8  # times one thread, on two
@@ -209,8 +211,8 @@ def measure_threads(errand: Errand, repeats: int) -> list[dict[str, Any]]:
     """
     cores = len(os.sched_getaffinity(0))
     counts = [n for n in (1, 2, 4, 8, 16, 32, 64) if n < cores] + [cores]
-    actions = errand.actions(WALK / 10)
-    worlds = [errand.world() for _ in range(4 * cores)]
+    actions = errand.actions(TOGETHER)
+    worlds = [errand.world() for _ in range(WORLDS * cores)]
     best = {kind: dict.fromkeys(counts, np.inf) for kind in ("worlds", "stretches", "raw", "batch")}
     for _ in range(2 * repeats):
         for count in counts:
