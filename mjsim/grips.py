@@ -12,12 +12,15 @@ from mjsim.kernels import kernel
 from mjsim.rig import Rig
 from mjsim.scene import Scene
 
+AWAKE = -11  # in `MjData.tree_asleep`: for ten steps of the physics at least
+
 
 class Grips:
     """Closes, opens and watches the welds of the pool that `avatar.attach_avatar` declared."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, rig: Rig) -> None:
         self._data = data
+        self._trees = scene.index.trees
         self._hand_sites = rig.grip_sites
         names = scene.index.names
         self._sites = np.array(
@@ -70,11 +73,13 @@ class Grips:
         self._closed[hand] = (item, grip)
         self._note()
 
-    def open(self, hand: int) -> None:
-        """Let go of what a hand holds, if anything."""
+    def open(self, hand: int, *, wake: bool = True) -> None:
+        """Let go of what a hand holds, if anything; `wake` for what must fall, even if it was held still."""
         closed = self._closed[hand]
         if closed is not None:
             self._data.eq_active[self._welds[hand, closed[0], closed[1]]] = 0
+            if wake:  # falls begin slowly: what was held still would fall asleep in the air
+                self._data.tree_asleep[self._trees[closed[0]]] = AWAKE
             self._closed[hand] = None
             self._note()
 

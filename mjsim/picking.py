@@ -1,4 +1,4 @@
-"""Picking as a motion: stand, turn, reach, weld, lift into the carrying posture."""
+"""Picking as a motion: stand, turn, reach, weld gently, lift into the carrying posture, close firmly."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ REACH_TIME = 0.44
 APPROACH_TIME = 0.4  # longest wait for the hand to arrive after the reach
 ALIGN_TIME = 0.12
 LIFT_TIME = 0.64
-SEAT_TIME = 0.2  # longest wait for a load to sit in the hand; held gently, it does not before
+SEAT_TIME = 0.2  # longest wait for a load to sit in the hand
 _SHIFT = 0.2  # share of a movement by which one of its two parts leads the other
 _CLOSE_ENOUGH = 0.012
 
@@ -64,7 +64,9 @@ def take(
         return False
     grips.close(hand, item, grip, gently=True)
     yield from _lift(person, hand, place_for(hand, item), pitch)
+    # Held gently, a load hangs 2 cm off the hand: only now, clear of its neighbours, is it drawn in.
     grips.close(hand, item, grip)
+    yield from _seat(person, hand)
     if grips.error(hand) > person.options.grip_error:
         grips.open(hand)
         return False
@@ -94,6 +96,10 @@ def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) ->
         rig.hand_targets[hand] = lead_blend(start, goal, k / count, leading="up")
         person.look_towards(pitch)
         yield
+
+
+def _seat(person: Person, hand: int) -> Steps:
+    """Until the load sits in the hand."""
     for _ in range(person.steps(SEAT_TIME)):
         if person.grips.error(hand) < 0.5 * person.options.grip_error:
             break

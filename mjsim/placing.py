@@ -60,7 +60,7 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
     yield from _travel(person, hand, receptacle, np.array([*slot.hand, clear - footprint.low[2]]))
     footprint = _footprint(person, hand, item, receptacle, corners)
     yield from _descend(person, hand, item, receptacle, slot, footprint)
-    person.grips.open(hand)
+    person.grips.open(hand, wake=False)  # it was set down
     success = yield from _settle(person, hand, item, receptacle, pitch)
     return success
 

@@ -20,7 +20,7 @@ from mjsim.fidelity.gestures import ACROSS_FIRST, STRAIGHT, UP_FIRST, Script
 from mjsim.fidelity.strides import BODY, HANDS
 from mjsim.fidelity.walker import Walker
 from mjsim.person import FACE_TIMEOUT
-from mjsim.picking import ALIGN_TIME, LIFT_TIME, REACH_TIME, SEAT_TIME
+from mjsim.picking import ALIGN_TIME, LIFT_TIME, REACH_TIME
 from mjsim.placing import (
     DESCENT_SPEED,
     HAND_SPEED,
@@ -37,6 +37,7 @@ Vector = NDArray[np.float64]
 
 _MOST = 400  # control steps of a motion
 _APPROACH = 2  # control steps that a hand lags behind at the end of a reach
+_SEATING = 1  # control step in which a load is drawn into a hand that closes firmly
 _FACING, _SQUARE = 0.35, 0.04  # rad
 _LIFTS, _LIFT = 4, 0.035  # control steps and m of each, of a hand that withdraws
 _ANYWHERE = math.nan
@@ -94,7 +95,7 @@ class Choreographer:
         goal = walker.place_for(hand, item)
         ahead = np.array([math.nan, math.nan, pitch])
         row = self._swing(script, row, hand, goal, person.steps(LIFT_TIME), UP_FIRST, ahead, False)
-        row = self._wait(script, row, hand, person.steps(SEAT_TIME))
+        row = self._wait(script, row, hand, _SEATING)
         row = gestures.end(walker.live, walker.poses, script, row, walker.carry_posture, house)
         walker.live[:], walker.poses[:] = before
         return Plan(script, row, True)

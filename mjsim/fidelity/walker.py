@@ -26,6 +26,7 @@ from mjsim.fidelity.strides import (
     state_hash,
     walk_rows,
 )
+from mjsim.grips import AWAKE
 from mjsim.health import HealthSample
 from mjsim.kinematics import Gait, Legs
 from mjsim.observation import Observation
@@ -38,7 +39,6 @@ from mjsim.trunk import Floor
 
 # An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.
 _RESTLESS = 3.0
-AWAKE = -11  # in `MjData.tree_asleep`: for ten steps of the physics at least
 
 
 class Walker:
