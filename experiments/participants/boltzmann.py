@@ -10,13 +10,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
 from experiments.known_house import KnownHouse
-from experiments.participants.base import Choice, Outlook, Participant, ParticipantFactory, Percept
-from experiments.participants.errands import NO_MOVES, Errand, ErrandRunner, Visit
-from mjsim.actions import IDLE, Action
+from experiments.participants.base import Choice, Participant, ParticipantFactory, Percept
+from experiments.participants.deciding import Decider
+from experiments.participants.errands import Errand, Visit
 
 TEMPERATURE = 0.5  # m
 
@@ -48,7 +47,7 @@ def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator
         regrets[k], exact[k] = regrets[k] + excess, True
 
 
-class Boltzmann:
+class Boltzmann(Decider):
     """Draws what to do next, and keeps to it once drawn.
 
     Args:
@@ -57,29 +56,14 @@ class Boltzmann:
         temperature: How little the cost matters, m.
     """
 
-    needs: frozenset[str] = frozenset()
-
     def __init__(self, house: KnownHouse, rng: np.random.Generator, temperature: float) -> None:
+        super().__init__(house)
         self._rng = rng
         self._temperature = temperature
-        self._runner = ErrandRunner(house)
         self._choice: Visit | None = None
 
-    def act(self, percept: Percept) -> Action:
-        """Walk to the chosen object or bin; pick or place there."""
-        errand = None if percept.busy else self._errand(percept)
-        return IDLE if errand is None else self._runner.act(percept, errand)
-
-    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
-        """Moves up to the chosen object or bin."""
-        errand = self._errand(percept)
-        return NO_MOVES if errand is None else self._runner.foresee(percept, outlook, errand)
-
-    def went(self, steps: int) -> None:
-        """So many of the moves foreseen were made."""
-        self._runner.went(steps)
-
-    def _errand(self, percept: Percept) -> Errand | None:
+    def errand(self, percept: Percept) -> Errand | None:
+        """What was drawn, until it is done with."""
         choices = {(choice.kind, choice.object): choice for choice in percept.choices}
         if not choices:
             return None
