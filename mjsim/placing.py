@@ -17,6 +17,7 @@ Vector = NDArray[np.float64]
 _WALL_GAP = 0.012
 HOVER_GAP = 0.03
 RELEASE_GAP = 0.002
+STILL_TIME = 0.08  # s over the slot before the way down
 _PROBE_ABOVE = 0.2
 _PROBES = np.linspace(-1.0, 1.0, 5)
 _GRID = np.stack(np.meshgrid(_PROBES, _PROBES, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -164,7 +165,7 @@ def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Ve
             rig.hand_targets[hand] = start + minimum_jerk(k / count) * (goal - start)
             person.glance(receptacle.center)
             yield
-    for _ in range(person.steps(0.08)):
+    for _ in range(person.steps(STILL_TIME)):
         yield
 
 

@@ -26,7 +26,9 @@ from mjsim.placing import (
     HAND_SPEED,
     HOVER_GAP,
     RELEASE_GAP,
+    STILL_TIME,
     Footprint,
+    Slot,
     fill_slots,
     object_corners,
     square_heading,
@@ -69,7 +71,7 @@ class Choreographer:
         self._corners: dict[tuple[int, int], Vector] = {}
 
     def approach(self, result: ActionResult, hand: int, item: int) -> tuple[Script, int]:
-        """Turn to what is picked and reach for it, or turn to where it is placed; the script and its length.
+        """Turn to what is picked and reach for it, or turn to its receptacle and bring it over; script and length.
 
         Data must be in step with the walk, which is left as it was.
         """
@@ -79,7 +81,8 @@ class Choreographer:
         if isinstance(result.action, Pick):
             row, _ = self._reach(script, hand, item)
         else:
-            row = self._turn_to_receptacle(script, self._full.scene.receptacles[str(result.receptacle)])
+            receptacle = self._full.scene.receptacles[str(result.receptacle)]
+            row, _, _ = self._bring_over(script, hand, item, receptacle)
         walker.live[:], walker.poses[:] = before
         return script, row
 
@@ -106,17 +109,14 @@ class Choreographer:
         before = walker.live.copy(), walker.poses.copy()
         script = Script.empty(_MOST, len(walker.poses))
         pitch = walker.pitch_target
-        row = self._turn_to_receptacle(script, receptacle)
-        footprint = self._footprint(hand, receptacle)
-        slots = fill_slots(person, item, receptacle, footprint)
-        clear = max(float(receptacle.half_size[2]), *(s.fill for s in slots)) + HOVER_GAP
-        row = self._travel(script, row, hand, receptacle, _over(slots[0].hand, clear - footprint.low[2]))
+        row, slot, low = self._bring_over(script, hand, item, receptacle)
+        row = self._wait(script, row, hand, person.steps(STILL_TIME))
         row = self._descend(
             script,
             row,
             hand,
             receptacle,
-            _over(slots[0].hand, slots[0].fill + RELEASE_GAP - footprint.low[2]),
+            _over(slot.hand, slot.fill + RELEASE_GAP - low),
         )
         fall = drop(self._full, walker, hand, item, receptacle)
         row = gestures.let_go(
@@ -140,9 +140,17 @@ class Choreographer:
         row = self._swing(script, row, hand, point, person.steps(REACH_TIME), ACROSS_FIRST, center, True)
         return self._wait(script, row, hand, _APPROACH), grip
 
-    def _turn_to_receptacle(self, script: Script, receptacle: ReceptacleGeometry) -> int:
-        heading = square_heading(self._full.person, receptacle)
-        return self._face(script, receptacle.center, heading, _SQUARE)
+    def _bring_over(
+        self, script: Script, hand: int, item: int, receptacle: ReceptacleGeometry
+    ) -> tuple[int, Slot, float]:
+        """Turn to a receptacle and bring what is held over it; the next row, the slot, and how far it hangs down, m."""
+        person = self._full.person
+        row = self._face(script, receptacle.center, square_heading(person, receptacle), _SQUARE)
+        footprint = self._footprint(hand, receptacle)
+        low = float(footprint.low[2])
+        slots = fill_slots(person, item, receptacle, footprint)
+        clear = max(float(receptacle.half_size[2]), *(s.fill for s in slots)) + HOVER_GAP
+        return self._travel(script, row, hand, receptacle, _over(slots[0].hand, clear - low)), slots[0], low
 
     def _face(self, script: Script, point: Vector, heading: float, tolerance: float) -> int:
         walker, most = self._walker, self._full.person.steps(FACE_TIMEOUT)
@@ -189,7 +197,7 @@ class Choreographer:
             count = 0 if distance < 0.005 else person.steps(0.12 + distance / HAND_SPEED)
             towards, in_house = (there, False) if up_first else (goal, True)
             row = self._swing(script, row, hand, towards, count, STRAIGHT, receptacle.center, in_house)
-        return self._wait(script, row, hand, person.steps(0.08))
+        return row
 
     def _descend(
         self, script: Script, row: int, hand: int, receptacle: ReceptacleGeometry, at: Vector

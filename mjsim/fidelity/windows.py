@@ -26,7 +26,7 @@ from mjsim.stretch import Stretch
 
 @dataclass(eq=False)
 class _Approach:
-    """What of a pick or place comes before physics: braking, turning, and the reach of a pick.
+    """What of a pick or place comes before physics: braking, turning, the reach of a pick, and bringing over the slot.
 
     Attributes:
         script: The state after each control step.
@@ -50,8 +50,8 @@ class _Approach:
 class Windows:
     """The tier `windows`.
 
-    With a pick or place that is feasible the person first brakes and turns, and reaches for what is picked, still
-    without physics: hands touch nothing until they grip. Then a window opens. Its physics starts from exactly the
+    With a pick or place that is feasible the person first brakes and turns, and reaches for what is picked or brings
+    what is placed over its slot, still without physics: nothing is touched until then. Then a window opens. Its physics starts from exactly the
     state of the walk, and always from a reset, so that what happens in a window depends on that state alone. It
     closes after the first control step at which the motion has ended and everything that nobody holds sleeps or is
     slow.
