@@ -54,10 +54,10 @@ HAND_KP = 2000.0
 HAND_KV = 130.0
 HAND_FORCE = 80.0
 
-# Kind of weld -> time constant, s, and torque scale. A gentle one turns a fallen thing upright within the lift, slowly
-# enough that it kicks nothing beside it. A firm one stretches by less than 2 mm and twists by less than 2 degrees even
-# where a load brushes a door frame at walking speed.
-WELDS = {GENTLE: (0.08, 1.0), FIRM: (0.008, 2.0)}
+# Kind of weld -> time constant, s, torque scale, and least and most impedance. A gentle one turns a fallen thing upright
+# within the lift, slowly enough that it kicks nothing beside it. A firm one stretches by less than 2 mm and twists by less
+# than 2 degrees even where a load brushes a door frame at walking speed.
+WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
 
 _TORQUESCALE = 10  # index in a weld's data
 _VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
@@ -281,7 +281,7 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
         site = f"{name}/grip_{grip}"
         if spec.site(site) is None:
             raise AssetError(f"object '{name}' has no site '{site}'; see docs/models.md, 'An object'")
-        for hand, (kind, (time, torque)) in itertools.product(HANDS, WELDS.items()):
+        for hand, (kind, (time, torque, least, most)) in itertools.product(HANDS, WELDS.items()):
             weld = spec.add_equality(
                 name=grip_name(hand, name, grip, kind),
                 type=mujoco.mjtEq.mjEQ_WELD,
@@ -290,6 +290,6 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
                 name2=site,
                 active=False,
                 solref=[time, 1.0],
-                solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
+                solimp=[least, most, 0.001, 0.5, 2.0],
             )
             weld.data[_TORQUESCALE] = torque

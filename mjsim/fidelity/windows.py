@@ -51,10 +51,10 @@ class Windows:
     """The tier `windows`.
 
     With a pick or place that is feasible the person first brakes and turns, and reaches for what is picked or brings
-    what is placed over its slot, still without physics: nothing is touched until then. Then a window opens. Its physics starts from exactly the
-    state of the walk, and always from a reset, so that what happens in a window depends on that state alone. It
-    closes after the first control step at which the motion has ended and everything that nobody holds sleeps or is
-    slow.
+    what is placed over its slot, still without physics: nothing is touched until then. Then a window opens. Its
+    physics starts from exactly the state of the walk, and always from a reset, so that what happens in a window
+    depends on that state alone. It closes after the first control step at which the motion has ended and everything
+    that nobody holds sleeps or is slow.
 
     Attributes:
         ledger: Who holds what, what is put away, what happened in the latest control step.
