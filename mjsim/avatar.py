@@ -54,9 +54,9 @@ HAND_KP = 2000.0
 HAND_KV = 130.0
 HAND_FORCE = 80.0
 
-# Kind of weld -> time constant, s, torque scale, and least and most impedance. A gentle one turns a fallen thing upright
-# within the lift, slowly enough that it kicks nothing beside it. A firm one stretches by less than 2 mm and twists by less
-# than 2 degrees even where a load brushes a door frame at walking speed.
+# Kind of weld -> time constant, s, torque scale, and least and most impedance. A gentle one turns a fallen thing
+# upright within the lift, slowly enough that it kicks nothing beside it. A firm one stretches by less than 2 mm and
+# twists by less than 2 degrees even where a load brushes a door frame at walking speed.
 WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
 
 _TORQUESCALE = 10  # index in a weld's data
