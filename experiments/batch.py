@@ -16,9 +16,9 @@ from typing import Any
 
 from experiments import records
 from experiments.errors import ConfigError
+from experiments.files import read_json
 from experiments.house import House
 from experiments.lockstep import Play, drive_many, performer
-from experiments.records import read_json
 from experiments.table import write_tables
 from experiments.trial import TrialConfig, play_trial
 

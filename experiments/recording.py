@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from experiments.records import EventLog, read_arrays
+from experiments.files import read_arrays
+from experiments.records import EventLog
 from mjsim.files import replacing
 from mjsim.observation import Observation
 from mjsim.recording import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint

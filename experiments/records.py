@@ -1,13 +1,8 @@
-"""The record of one trial: an append-only event log, a trajectory, and the folder that holds them."""
+"""The record of one trial: an append-only event log and a trajectory."""
 
 import hashlib
 import json
-import shutil
-import tempfile
-import zipfile
-import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
@@ -16,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
+from experiments.files import save_arrays
 from mjsim.actions import Action, Move, Pick, Place
 from mjsim.errors import ActionError
-from mjsim.files import replacing, write_text_atomically
 from mjsim.health import HealthSample
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.stretch import Stretch
@@ -249,94 +244,6 @@ def decode_action(row: NDArray[np.float64], names: Sequence[str]) -> Action:
         raise RecordError(f"{row.tolist()} describes no action of an episode with {len(names)} object names")
     name = None if number < 0 else names[int(number)]
     return Pick(name) if kind == 1.0 else Place(name)
-
-
-def is_run(directory: Path) -> bool:
-    """Whether `directory` holds the record of a trial."""
-    return (directory / EPISODE).is_file() and (directory / EVENTS).is_file()
-
-
-@contextmanager
-def run_directory(path: Path) -> Iterator[Path]:
-    """Yield a working folder that becomes `path` on success, in one rename.
-
-    An earlier run at `path` is replaced; anything else there is left alone.
-
-    Raises:
-        RecordError: `path` exists and is not a run, so replacing it could destroy something.
-    """
-    if path.exists() and not is_run(path) and (not path.is_dir() or any(path.iterdir())):
-        raise RecordError(f"{path} exists and is not a run; choose another --out or move it away")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    working = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
-    try:
-        yield working
-        working.chmod(0o755)
-        if path.exists():
-            shutil.rmtree(path)
-        working.replace(path)
-    finally:
-        if working.exists():
-            shutil.rmtree(working)
-
-
-def keep_failed(folder: Path, out: Path) -> Path:
-    """Keep the working folder of a run that failed, beside where the run was to be, as `<out>.failed`.
-
-    An earlier one is replaced; anything else of that name is left alone, and the folder gets a number.
-
-    Returns:
-        Where it is now.
-    """
-    kept, number = out.with_name(f"{out.name}.failed"), 1
-    while kept.exists() and not is_run(kept):
-        number += 1
-        kept = out.with_name(f"{out.name}.failed-{number}")
-    if kept.exists():
-        shutil.rmtree(kept)
-    folder.chmod(0o755)
-    folder.replace(kept)
-    return kept
-
-
-def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Read every array of an NPZ.
-
-    Raises:
-        RecordError: The file is missing, cut short or damaged; the message names it.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except FileNotFoundError as error:
-        raise RecordError(f"cannot read {path}: {error.strerror}") from error
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-        raise RecordError(f"{path} is cut short or damaged: {error}") from error
-
-
-def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write a compressed NPZ, whole or not at all."""
-    with replacing(path) as temporary:
-        np.savez_compressed(temporary, allow_pickle=False, **arrays)
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write indented JSON, whole or not at all."""
-    write_text_atomically(path, json.dumps(value, indent=2) + "\n")
-
-
-def read_json(path: Path) -> Any:
-    """Read a JSON file.
-
-    Raises:
-        RecordError: The file is missing or not JSON; the message names it.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RecordError(f"cannot read {path}: {error.strerror}") from error
-    except json.JSONDecodeError as error:
-        raise RecordError(f"{path} is not JSON: {error}") from error
 
 
 def read_events(path: Path) -> list[Event]:

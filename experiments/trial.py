@@ -14,6 +14,7 @@ from experiments import records
 from experiments.analysis.topdown import draw_topdown
 from experiments.assistant import Assistant
 from experiments.errors import ConfigError
+from experiments.files import save_arrays, write_json
 from experiments.glasses import FilmConfig, Filming, Glasses
 from experiments.health import summarise_health
 from experiments.house import House
@@ -23,6 +24,7 @@ from experiments.participants import default_participant, participant
 from experiments.recording import provenance
 from experiments.records import EventLog
 from experiments.regrets import RegretsAtOnce, RegretsBeside
+from experiments.run_directory import keep_failed, run_directory
 from experiments.session import OnProgress, Session, Viewer
 from experiments.video import VideoWriter
 from mjsim.errors import PhysicsError
@@ -130,17 +132,17 @@ def play_trial(
     started = time.perf_counter()
     house = house or House.load(config.house)
     episode = house.sample_episode(objects=config.objects, seed=config.seed)
-    with records.run_directory(out) as folder:
+    with run_directory(out) as folder:
         scene = compose(episode, house.catalogue)
         ran = yield from _simulate(config, house, scene, folder, film, on_progress)
         arrays = ran.session.trajectory.arrays()
         episode.save(folder / records.EPISODE)
-        records.save_arrays(folder / records.TRAJECTORY, arrays)
+        save_arrays(folder / records.TRAJECTORY, arrays)
         ran.session.recording.save(folder / records.RECORDING, arrays["action"])
         plans = [e for e in ran.log.events if e["event"] == "plan"]
-        records.write_json(folder / records.PLAN, plans)
+        write_json(folder / records.PLAN, plans)
         if isinstance(ran.ended, PhysicsError):
-            kept = records.keep_failed(folder, out)
+            kept = keep_failed(folder, out)
             raise PhysicsError(f"{ran.ended} (kept for `mjsim replay {kept}`)") from ran.ended
         if topdown:
             draw_topdown(folder / records.TOPDOWN, house, scene, plans[0], arrays)
@@ -155,7 +157,7 @@ def play_trial(
             "renderer": gl_info().renderer if film or topdown else NOTHING_DRAWN,
             "wall_s": round(time.perf_counter() - started, 3),
         }
-        records.write_json(folder / records.METRICS, metrics)
+        write_json(folder / records.METRICS, metrics)
     return metrics
 
 

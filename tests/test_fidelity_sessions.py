@@ -8,11 +8,12 @@ import pytest
 from experiments import records
 from experiments.agreement import run_in
 from experiments.errors import ReplayError
+from experiments.files import read_arrays, read_json
 from experiments.house import House
 from experiments.lockstep import Step, drive_many, performer
 from experiments.participants.base import Foreseeing
 from experiments.participants.follower import Follower
-from experiments.records import EventLog, read_arrays, read_events, read_json
+from experiments.records import EventLog, read_events
 from experiments.replaying.replay import replay
 from experiments.trial import TrialConfig, play_trial, prepare_session, run_trial
 from mjsim.errors import PhysicsError

@@ -11,18 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.errors import RecordError
-from experiments.records import (
-    EPISODE,
-    EVENTS,
-    EventLog,
-    Trajectory,
-    decode_action,
-    keep_failed,
-    read_arrays,
-    read_events,
-    read_json,
-    run_directory,
-)
+from experiments.files import read_arrays, read_json
+from experiments.records import EPISODE, EVENTS, EventLog, Trajectory, decode_action, read_events
+from experiments.run_directory import keep_failed, run_directory
 from mjsim.actions import Move, Pick, Place
 from mjsim.health import HealthSample
 from mjsim.observation import ObjectStatus, Observation

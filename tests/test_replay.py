@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from experiments import records
 from experiments.cli import main
 from experiments.errors import RecordError, ReplayError
+from experiments.files import read_arrays, read_json
 from experiments.glasses import FilmConfig
 from experiments.house import House
-from experiments.records import read_arrays, read_events, read_json
+from experiments.records import read_events
 from experiments.replaying.replay import ReplayFilm, replay
 from experiments.replaying.run_record import load_run
 from experiments.trial import TrialConfig, run_trial

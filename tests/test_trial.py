@@ -10,9 +10,10 @@ import pytest
 
 from experiments import records
 from experiments.errors import ConfigError, SessionError
+from experiments.files import read_json
 from experiments.glasses import FilmConfig
 from experiments.house import House
-from experiments.records import read_events, read_json
+from experiments.records import read_events
 from experiments.trial import TrialConfig, run_trial
 from mjsim.episode import Episode
 

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from experiments import records
 from experiments.errors import RecordError
+from experiments.files import read_json
 from experiments.health import summarise_health
 from experiments.metrics import compute_metrics
-from experiments.records import Event, read_json
+from experiments.records import Event
 from experiments.replaying.replayer import Replayer
 from experiments.replaying.run_record import PER_STEP, WORLD_EVENTS, Fault, RunRecord
 from experiments.session import INTERRUPTED, PHYSICS_ERROR

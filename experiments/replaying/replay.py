@@ -7,9 +7,9 @@ from pathlib import Path
 
 from experiments import records
 from experiments.errors import ConfigError, RecordError
+from experiments.files import read_json
 from experiments.glasses import FilmConfig, Filming, Glasses
 from experiments.house import House
-from experiments.records import read_json
 from experiments.replaying.check import first_fault
 from experiments.replaying.overview import CAMERAS, FIRST_PERSON, Overview, camera_path
 from experiments.replaying.replayer import Replayer, fault_error

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from experiments import records
 from experiments.errors import RecordError, ReplayError
+from experiments.files import read_arrays
 from experiments.recording import Recorded, action_hashes
-from experiments.records import STATUS_CODE, Event, LogDigest, decode_action, read_arrays
+from experiments.records import STATUS_CODE, Event, LogDigest, decode_action
 from mjsim.actions import Action, EventKind
 from mjsim.avatar import EYE_HEIGHT
 from mjsim.episode import Episode
