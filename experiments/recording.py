@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from experiments.files import read_arrays
+from experiments.files import read_arrays, save_arrays
 from experiments.records import EventLog
-from mjsim.files import replacing
 from mjsim.observation import Observation
 from mjsim.recording import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint
 from mjsim.world import World
@@ -98,8 +97,7 @@ class Recording:
             "checkpoint_memory": np.array([state.memory for state in kept.values()], np.str_),
             "checkpoint_hash": np.array([state.hash for state in kept.values()], np.uint64),
         }
-        with replacing(path) as temporary:
-            np.savez_compressed(temporary, allow_pickle=False, **arrays)
+        save_arrays(path, arrays)
 
     def state_hashes(self) -> NDArray[np.uint64]:
         """Hashes of the states since `first`, in order."""
