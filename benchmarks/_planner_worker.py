@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from planner.problem import RoutingProblem
-from planner.solver import SolveLimit, solver
+from planner.solver import PATIENT_WORK, SolveLimit, solver
 from planner.tour import UNIT, integer_metric
 
 # What a planner makes of a problem: length of its tour in m (None: found none), its lower bound in m if it gives one,
@@ -59,7 +59,9 @@ def method(name: str, limit: float) -> Method:
     if name == "vroom":
         return by_vroom
     planner = solver(name)
-    chosen = SolveLimit(seconds=limit) if limit else None
+    chosen = (
+        SolveLimit(seconds=limit) if limit else SolveLimit(work=PATIENT_WORK) if name == "exact" else None
+    )
 
     def by_own(problem: RoutingProblem) -> Answer:
         plan = planner.solve(problem, limit=chosen)

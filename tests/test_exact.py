@@ -297,13 +297,12 @@ def test_many_objects_at_other_capacities_get_an_honest_bound(capacity):
     assert 0 < plan.lower_bound <= plan.cost
 
 
-def test_beyond_its_limits_it_takes_the_tour_of_or_tools_and_the_better_bound():
+def test_beyond_its_limits_it_keeps_the_better_bound():
     problem = random_problem(5, 41)
     limit = SolveLimit(seconds=0.4)
     plan, other = (solver(name).solve(problem, limit=limit) for name in ("exact", "ortools"))
     check(problem, plan)
-    assert plan.lower_bound >= other.lower_bound > 0
-    assert plan.cost < solver("greedy").solve(problem).cost
+    assert plan.cost >= plan.lower_bound >= other.lower_bound > 0
 
 
 def test_never_worse_than_or_tools():

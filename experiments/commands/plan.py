@@ -12,7 +12,7 @@ from mjsim.files import replacing
 from planner.claim_json import claim_from_json, claim_to_json
 from planner.errors import ProblemError
 from planner.problem_json import plan_to_json, problem_from_json
-from planner.solver import DEFAULT_SOLVER, SOLVERS, SolveLimit, solver
+from planner.solver import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, solver
 from planner.verifier import verify_optimal
 
 T = TypeVar("T")
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, solve, print; or check."""
     if arguments.check is not None:
         return _check(arguments.file, arguments.check)
-    limit = SolveLimit(seconds=arguments.time_limit) if arguments.time_limit is not None else None
+    limit = _limit(arguments.planner, arguments.time_limit)
     problem = _read(arguments.file, problem_from_json)
     plan = solver(arguments.planner).solve(problem, limit=limit)
     if arguments.certificate is not None:
@@ -78,6 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
             temporary.write_text(claim_to_json(plan) + "\n", encoding="utf-8")
     print(plan_to_json(plan))
     return 0
+
+
+def _limit(planner: str, seconds: float | None) -> SolveLimit | None:
+    """The time that was asked for, or a large budget of the exact planner's work."""
+    if seconds is not None:
+        return SolveLimit(seconds=seconds)
+    return SolveLimit(work=PATIENT_WORK) if planner == DEFAULT_SOLVER else None
 
 
 def _check(problem_name: str, claim_name: str) -> int:

@@ -31,7 +31,7 @@ ANNEALING_MOVES = 20_000
 # A first plan with something known: some 20 ms.
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
 WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
-DEFAULT_WORK = 30_000_000  # states: some 30 s with the tables
+DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables, for what is planned again and again
 BIN_ROWS = 50_000  # of a table that counts by bin: 30 objects and 6 bins
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
 PROVABLE = 14  # objects; with more of them that search has no hope
@@ -68,7 +68,7 @@ class ExactSolver:
         Args:
             problem: What is left to do.
             seed: Of the annealing.
-            limit: States or seconds; by default 30 million states. OR-Tools counts other things, so only the
+            limit: States or seconds; by default 4 million states. OR-Tools counts other things, so only the
                 seconds are handed on to it.
 
         Returns:
