@@ -5,11 +5,6 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from experiments.errors import ExperimentError
-from hud.errors import HudError
-from mjsim.errors import MjsimError, PhysicsError
-from planner.errors import PlannerError
-
 COMMANDS = ("run", "replay", "batch", "plan", "house", "gallery", "bench", "doctor")
 FAILED = 1
 USAGE_ERROR = 2
@@ -60,15 +55,28 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser(command).parse_args(words)
     try:
         return int(arguments.run(arguments))
-    except PhysicsError as error:
-        print(f"mjsim: {error}", file=sys.stderr)
-        return FAILED
-    except (ExperimentError, MjsimError, PlannerError, HudError) as error:
-        print(f"mjsim: {error}", file=sys.stderr)
-        return USAGE_ERROR
     except KeyboardInterrupt:
         print("mjsim: interrupted; what was finished is kept", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        code = exit_code(error)
+        if code is None:
+            raise
+        print(f"mjsim: {error}", file=sys.stderr)
+        return code
+
+
+def exit_code(error: Exception) -> int | None:
+    """The exit code of an error whose message says what to do; None for any other."""
+    # Loaded only now, as `mjsim plan` is to answer at once: importing mjsim loads Gymnasium.
+    from experiments.errors import ExperimentError
+    from hud.errors import HudError
+    from mjsim.errors import MjsimError, PhysicsError
+    from planner.errors import PlannerError
+
+    if isinstance(error, PhysicsError):
+        return FAILED
+    return USAGE_ERROR if isinstance(error, ExperimentError | MjsimError | PlannerError | HudError) else None
 
 
 if __name__ == "__main__":

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from planner.certificate import Certificate, Proof
 from planner.exact.groups import alone
 from planner.exact.instance import Instance, make_instance
-from planner.exact.relaxation import Table, after_pick, fill, new_table
+from planner.exact.relaxation import after_pick, fill
 from planner.exact.solver import ExactSolver
+from planner.exact.table import Table, new_table
 from planner.exact.warm import Warm, same_groups
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit, VisitKind

@@ -15,9 +15,10 @@ from planner.exact.deadline import NEVER
 from planner.exact.groups import alone, numbered
 from planner.exact.instance import make_instance, to_visits
 from planner.exact.multipliers import first_bound, grown, told_apart
-from planner.exact.relaxation import fill, new_table, walk
+from planner.exact.relaxation import fill, walk
 from planner.exact.search import row_of
 from planner.exact.solver import ExactSolver
+from planner.exact.table import new_table
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
 from planner.solver import SolveLimit, solver

@@ -2,6 +2,8 @@
 
 import itertools
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -258,3 +260,23 @@ def test_a_malformed_claim_exits_with_two_and_one_line(tmp_path, capsys, change,
 def test_only_one_of_problem_and_claim_comes_from_standard_input(capsys):
     assert main(["plan", "-", "--check", "-"]) == 2
     assert "standard input" in capsys.readouterr().err
+
+
+LOADS = """
+import json, sys
+from experiments.cli import main
+assert main(["plan", sys.argv[1]]) == 0
+heavy = {"gymnasium", "llvmlite", "matplotlib", "mujoco", "networkx", "numba", "ortools", "scipy", "shapely"}
+print(json.dumps(sorted(heavy & set(sys.modules))))
+"""
+
+
+@pytest.mark.parametrize(("objects", "allowed"), [(12, set()), (16, {"llvmlite", "numba", "scipy"})])
+def test_a_fresh_process_loads_no_more_than_it_takes_to_plan(tmp_path, objects, allowed):
+    """To load a library takes longer than to plan; numba, which brings scipy, pays from about 15 objects on."""
+    path = tmp_path / "problem.json"
+    path.write_text(json.dumps(scattered(objects)))
+    ran = subprocess.run([sys.executable, "-c", LOADS, str(path)], capture_output=True, text=True, check=True)
+    answer, loaded = map(json.loads, ran.stdout.splitlines())
+    assert answer["status"] == "optimal"
+    assert set(loaded) <= allowed

@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from experiments.errors import ConfigError
-from mjsim.files import replacing
 from planner.claim_json import claim_from_json, claim_to_json
 from planner.errors import ProblemError
 from planner.problem_json import plan_to_json, problem_from_json
 from planner.solver import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, solver
-from planner.verifier import verify_optimal
 
 T = TypeVar("T")
 
@@ -74,8 +72,9 @@ def run(arguments: argparse.Namespace) -> int:
     problem = _read(arguments.file, problem_from_json)
     plan = solver(arguments.planner).solve(problem, limit=limit)
     if arguments.certificate is not None:
-        with replacing(arguments.certificate) as temporary:
-            temporary.write_text(claim_to_json(plan) + "\n", encoding="utf-8")
+        from mjsim.files import write_text_atomically  # loaded only where it is needed
+
+        write_text_atomically(arguments.certificate, claim_to_json(plan) + "\n")
     print(plan_to_json(plan))
     return 0
 
@@ -91,6 +90,8 @@ def _check(problem_name: str, claim_name: str) -> int:
     """Check a claim about a problem; 1 where it does not hold."""
     if problem_name == claim_name == "-":
         raise ConfigError("problem and certificate cannot both come from standard input; give a file for one")
+    from planner.verifier import verify_optimal  # loaded only where it is needed
+
     problem = _read(problem_name, problem_from_json)
     plan = _read(claim_name, lambda text: claim_from_json(text, problem))
     try:

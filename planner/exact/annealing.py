@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.instance import Instance
-from planner.exact.relaxation import INFINITE
+from planner.exact.table import INFINITE
 from planner.kernels import kernel
 
 HOT, COLD = 0.5, 0.01  # temperature at both ends, in mean legs

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from planner.exact.deadline import Deadline
 from planner.exact.multipliers import Bound
 from planner.exact.nodes import NO_PARENT, keep_best, new_nodes
-from planner.exact.relaxation import INFINITE
 from planner.exact.search import PLACE_BITS, expand, offer_roots
+from planner.exact.table import INFINITE
 
 FIRST_ROOM = 1 << 12
 

@@ -3,7 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.relaxation import rows_of
+from planner.exact.table import rows_of
+
+BIN_ROWS = 50_000  # of a table that counts objects by bin: 30 objects and 6 bins
 
 
 def together(n: int) -> NDArray[np.int64]:

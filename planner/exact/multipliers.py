@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from planner.exact.deadline import NEVER, Deadline
 from planner.exact.groups import numbered, together, with_one_alone
 from planner.exact.instance import Instance
-from planner.exact.relaxation import Table, fill, new_table, rows_of, walk
+from planner.exact.relaxation import fill, walk
+from planner.exact.table import Table, new_table, rows_of
 from planner.kernels import kernel
 
 MEMORY = 0.97  # of a step in the record of what is picked too often or too rarely

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.exact.relaxation import INFINITE
+from planner.exact.table import INFINITE
 from planner.kernels import kernel
 
 NO_PARENT = -1

@@ -1,94 +1,22 @@
-"""Cost-to-go tables over subsets: exact ones, and relaxed ones that bound it from below.
+"""Compiled kernels that fill a table of `planner.exact.table`, and follow a best tour in it."""
 
-States, with U the objects not yet picked and c_j the bin of j: E(U, b) at bin b with empty hands; V(U, b, d) at
-bin b carrying one object for d, with V(U, d, d) = E(U, d); Y(U, i) at object i holding only it; W(U, j, d) at
-object j holding it and one for d. Leaving what belongs here is free and always right in a metric.
-
-    W(U, j, d) = min( D(j, d) + V(U, d, c_j),  D(j, c_j) + V(U, c_j, d) )
-    V(U, b, d) = min( D(b, d) + E(U, d),       min_{j in U} D(b, j) + W(U - j, j, d) )
-    Y(U, i)    = min( D(i, c_i) + E(U, c_i),   min_{j in U} D(i, j) + W(U - j, j, c_i) )
-    E(U, b)    = min_{i in U} D(b, i) + Y(U - i, i);    E({}, b) = 0
-
-The relaxation (Christofides, Mingozzi and Toth 1981) puts objects into groups and keeps of each group only how
-many are left; any of a group may then be picked, though none twice in a row. Each pick of j costs a multiplier
-more; subtracting the multipliers of U gives a lower bound of the cost-to-go from every U, for any multipliers and
-groups. With each object in a group of its own and no multipliers the table is exact.
-"""
-
-import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planner.exact.deadline import NEVER, Deadline
 from planner.exact.instance import Instance
+from planner.exact.table import INFINITE, Table
 from planner.kernels import kernel
 
-INFINITE = 1 << 29
 SLICE = 1 << 13  # rows that are filled between looks at the clock: some 5 ms
-
-
-class Table(NamedTuple):
-    """Cost-to-go of the relaxed problem, multipliers of picks included; a row for each way to be left of the groups.
-
-    Row r has r / (number of rows of all groups before) mod (size + 1) of a group left. Where every object is a group
-    of its own, the row is the subset of the objects left.
-
-    Attributes:
-        group: Group of each object, numbered from 0, (n,) int64.
-        size: How many objects each group has, (groups,) int64.
-        stride: By how many rows picking an object goes down, (n,) int64.
-        bin: E and V, (rows, m, m) int32, entry [b, d].
-        object: Y, (rows, n) int32; only where not all of the group of object i are left.
-        multipliers: Price of a pick, (n,) int32.
-    """
-
-    group: NDArray[np.int64]
-    size: NDArray[np.int64]
-    stride: NDArray[np.int64]
-    bin: NDArray[np.int32]
-    object: NDArray[np.int32]
-    multipliers: NDArray[np.int32]
 
 
 @kernel
 def add(a: Any, b: Any) -> Any:
     """Sum in 32 bits; numba would widen it to 64, which halves the speed of vectorised loops."""
     return np.int32(a + b)
-
-
-def rows_of(group: NDArray[np.int64]) -> int:
-    """How many rows the table of these groups has."""
-    return math.prod(int(k) + 1 for k in np.bincount(group))
-
-
-def new_table(inst: Instance, group: NDArray[np.int64]) -> Table:
-    """An unfilled table with no multipliers.
-
-    Args:
-        inst: The instance.
-        group: Group of each object, numbered from 0, (n,).
-    """
-    n, m = inst.to_bin.shape
-    size = np.bincount(group).astype(np.int64)
-    below = np.ones(len(size) + 1, np.int64)
-    below[1:] = np.cumprod(size + 1)
-    rows = int(below[-1])
-    return Table(
-        group,
-        size,
-        below[:-1][group] if n else group,
-        np.empty((rows, m, m), np.int32),
-        np.empty((rows, n), np.int32),
-        np.zeros(n, np.int32),
-    )
-
-
-def table_bytes(inst: Instance, rows: int) -> int:
-    """Memory of a table."""
-    n, m = inst.to_bin.shape
-    return int(4 * (m * m + n) * rows)
 
 
 @kernel

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from planner.exact.deadline import Deadline
 from planner.exact.instance import Instance
 from planner.exact.nodes import NO_PARENT, Nodes, offer, with_room, with_room_among
-from planner.exact.relaxation import INFINITE, Table
+from planner.exact.table import INFINITE, Table
 from planner.kernels import kernel
 
 PLACE_BITS = 12

@@ -4,35 +4,29 @@ import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
-from planner.exact.annealing import anneal, anneal_from, tour_actions
-from planner.exact.beam import beam_pass
 from planner.exact.deadline import Deadline
+from planner.exact.full_table import SMALL_TABLE, Found, by_table, full_table_bytes
 from planner.exact.general import best_first
-from planner.exact.groups import alone
+from planner.exact.groups import BIN_ROWS
 from planner.exact.instance import Instance, make_instance, to_visits
-from planner.exact.multipliers import Bound, first_bound, grown, told_apart
-from planner.exact.relaxation import fill, new_table, table_bytes, walk
-from planner.exact.warm import Warm, warm_bound, warm_order
 from planner.greedy_solver import GreedySolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
 from planner.tour import integer_distances, integer_metric, is_metric, make_plan
 
+if TYPE_CHECKING:
+    from planner.exact.warm import Warm  # brings the compiled kernels
+
 TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
-SMALL_TABLE = 1 << 22  # bytes; filled in some 20 ms, so there is no need of a plan before it
-ANNEALING_MOVES = 20_000
-# A first plan with something known: some 20 ms.
-WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
-WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
 DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables, for what is planned again and again
-BIN_ROWS = 50_000  # of a table that counts by bin: 30 objects and 6 bins
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
 PROVABLE = 14  # objects; with more of them that search has no hope
 LONGEST = 1 << 27  # units; tours beyond this would overflow 32 bits
@@ -84,7 +78,7 @@ class ExactSolver:
         *,
         seed: int = 0,
         limit: SolveLimit | None = None,
-        warm: Warm | None = None,
+        warm: "Warm | None" = None,
     ) -> Iterator[Plan]:
         """Yield the annealed tour with a first bound, then each shorter tour or better bound.
 
@@ -116,7 +110,7 @@ class ExactSolver:
 
     def table_fits(self, instance: Instance) -> bool:
         """Whether the full table is small enough."""
-        return _table_bytes(instance) <= self.table_bytes
+        return full_table_bytes(instance) <= self.table_bytes
 
     def _plans(
         self,
@@ -125,7 +119,7 @@ class ExactSolver:
         limit: SolveLimit,
         *,
         table_at_once: bool,
-        warm: Warm | None = None,
+        warm: "Warm | None" = None,
     ) -> Iterator[Plan]:
         """Ever better plans; only one where a table is filled at once."""
         started = time.perf_counter()
@@ -137,15 +131,15 @@ class ExactSolver:
             return
         instance = make_instance(problem, metric)
         seconds = math.inf if limit.seconds is None else limit.seconds
-        size = _table_bytes(instance)
-        by_table = size <= min(self.table_bytes, seconds * TABLE_RATE)
-        if by_table and (table_at_once or size <= SMALL_TABLE):
-            found: Iterable[_Found] = [_by_table(instance)]
+        size = full_table_bytes(instance)
+        tabled = size <= min(self.table_bytes, seconds * TABLE_RATE)
+        if tabled and (table_at_once or size <= SMALL_TABLE):
+            found: Iterable[Found] = [by_table(instance)]
         else:
-            found = self._search(instance, seed, limit, started, by_table=by_table, warm=warm)
-        for actions, bound, certificate in found:
-            visits = to_visits(problem, instance, actions)
-            yield make_plan(problem, metric, visits, bound, started, certificate)
+            found = self._search(instance, seed, limit, started, tabled=tabled, warm=warm)
+        for known in found:
+            visits = to_visits(problem, instance, known.actions)
+            yield make_plan(problem, metric, visits, known.bound, started, known.certificate)
 
     def _general(
         self, problem: RoutingProblem, metric: NDArray[np.int64], seed: int, limit: SolveLimit, started: float
@@ -178,66 +172,14 @@ class ExactSolver:
         limit: SolveLimit,
         started: float,
         *,
-        by_table: bool,
-        warm: Warm | None,
-    ) -> Iterator["_Found"]:
+        tabled: bool,
+        warm: "Warm | None",
+    ) -> Iterator[Found]:
         """Ever better tours and bounds: annealed, then by the full table or by passes of the search."""
+        from planner.exact.widening import widening  # brings the compiled kernels, which take 0.5 s to load
+
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
-        work = limit.work or DEFAULT_WORK
-        if warm is None:
-            upper, order = anneal(instance, seed, ANNEALING_MOVES)
-            bound = first_bound(instance, int(upper))
-        else:
-            first = warm_order(instance, warm)
-            upper, order = anneal_from(instance, seed, WARM_MOVES, first, *WARM_TEMPERATURES)
-            bound = warm_bound(instance, warm.certificate, WARM_ROWS)
-        upper, lower = int(upper), bound.root
-        actions: list[int] = tour_actions(instance, order).tolist()
-        if warm is not None:
-            narrow = beam_pass(bound, upper, WARM_WIDTH, work, Deadline(None))
-            lower = max(lower, narrow.lower)
-            if narrow.actions is not None:
-                upper, actions = narrow.upper, narrow.actions
-        yield actions, min(lower, upper), _certificate(bound)
-        if by_table:
-            if not deadline.over():
-                yield _by_table(instance)
-            return
-        done, rate = 0, max(1, len(instance.home) // 2)
-        for rows, wanted in self.passes:
-            # A pass given up proves nothing, and one hardly wider than the last one little.
-            width = min(wanted, work // rate)
-            if lower >= upper or width < min(wanted, done + 1) or deadline.over():
-                break
-            if rows >= BIN_ROWS:
-                bound = told_apart(bound, upper, BIN_ROWS, deadline)
-            bound = grown(bound, upper, rows, deadline)
-            result = beam_pass(bound, upper, width, work, deadline)
-            work -= result.expanded
-            done, rate = width, max(1, -(-result.expanded // width))  # a wider pass expands fewer per width
-            lower = max(lower, bound.root, result.lower)
-            if result.actions is not None:
-                upper, actions = result.upper, result.actions
-            yield actions, min(lower, upper), _certificate(bound)
-
-
-# Actions of a tour, a lower bound in units, and what proves it.
-_Found = tuple[list[int], int, Certificate]
-
-
-def _certificate(bound: Bound) -> Certificate:
-    table = bound.table
-    groups = tuple(tuple(np.flatnonzero(table.group == g).tolist()) for g in range(len(table.size)))
-    return Certificate(Proof.RELAXATION, bound.root, groups, tuple(table.multipliers.tolist()))
-
-
-def _table_bytes(instance: Instance) -> int:
-    return table_bytes(instance, 1 << len(instance.home))
-
-
-def _by_table(instance: Instance) -> _Found:
-    table = new_table(instance, alone(len(instance.home)))
-    fill(instance, table)
-    actions: NDArray[np.int64] = np.empty(2 * len(instance.home) + 2, np.int64)
-    length, count = walk(instance, table, actions)
-    return actions[:count].tolist(), int(length), Certificate(Proof.FULL_TABLE, int(length))
+        passes = () if tabled else self.passes
+        yield from widening(instance, seed, limit.work or DEFAULT_WORK, deadline, passes, warm)
+        if tabled and not deadline.over():
+            yield by_table(instance)

@@ -8,8 +8,9 @@ from planner.exact.groups import alone
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
 from planner.exact.nodes import Nodes, new_nodes, slot_of
-from planner.exact.relaxation import INFINITE, Table, after_pick, fill, new_table, row_without
+from planner.exact.relaxation import after_pick, fill, row_without
 from planner.exact.search import PLACE_BITS, expand, offer_roots
+from planner.exact.table import INFINITE, Table, new_table
 from planner.kernels import kernel
 
 FIRST_ROOM = 1 << 12

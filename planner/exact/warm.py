@@ -17,7 +17,8 @@ from planner.exact.annealing import decode
 from planner.exact.groups import together
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
-from planner.exact.relaxation import fill, new_table, rows_of, walk
+from planner.exact.relaxation import fill, walk
+from planner.exact.table import new_table, rows_of
 
 T = TypeVar("T", str, int)
 

@@ -1,0 +1,78 @@
+"""Annealing, then a search that widens from pass to pass until the tour is proven or the budget is spent."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from planner.certificate import Certificate, Proof
+from planner.exact.annealing import anneal, anneal_from, tour_actions
+from planner.exact.beam import beam_pass
+from planner.exact.deadline import NEVER, Deadline
+from planner.exact.full_table import Found
+from planner.exact.groups import BIN_ROWS
+from planner.exact.instance import Instance
+from planner.exact.multipliers import Bound, first_bound, grown, told_apart
+from planner.exact.warm import Warm, warm_bound, warm_order
+
+ANNEALING_MOVES = 20_000
+# A first plan with something known: some 20 ms.
+WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
+WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
+
+
+def widening(
+    instance: Instance,
+    seed: int,
+    work: int,
+    deadline: Deadline,
+    passes: tuple[tuple[int, int], ...],
+    warm: Warm | None,
+) -> Iterator[Found]:
+    """Yield a first tour and bound, then what each pass of the search makes of them.
+
+    Args:
+        instance: What is left to do.
+        seed: Of the annealing.
+        work: States that may be expanded.
+        deadline: No pass begins when it is over; there is a first tour nevertheless.
+        passes: Rows of the bound's table and states kept of each layer, at most, from pass to pass.
+        warm: What is known from a similar problem.
+    """
+    if warm is None:
+        length, order = anneal(instance, seed, ANNEALING_MOVES)
+        bound = first_bound(instance, int(length))
+    else:
+        length, order = anneal_from(
+            instance, seed, WARM_MOVES, warm_order(instance, warm), *WARM_TEMPERATURES
+        )
+        bound = warm_bound(instance, warm.certificate, WARM_ROWS)
+    upper, lower = int(length), bound.root
+    actions: list[int] = tour_actions(instance, order).tolist()
+    if warm is not None:
+        narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
+        lower = max(lower, narrow.lower)
+        if narrow.actions is not None:
+            upper, actions = narrow.upper, narrow.actions
+    yield Found(actions, min(lower, upper), _certificate(bound))
+    done, rate = 0, max(1, len(instance.home) // 2)
+    for rows, wanted in passes:
+        # A pass given up proves nothing, and one hardly wider than the last one little.
+        width = min(wanted, work // rate)
+        if lower >= upper or width < min(wanted, done + 1) or deadline.over():
+            break
+        if rows >= BIN_ROWS:
+            bound = told_apart(bound, upper, BIN_ROWS, deadline)
+        bound = grown(bound, upper, rows, deadline)
+        result = beam_pass(bound, upper, width, work, deadline)
+        work -= result.expanded
+        done, rate = width, max(1, -(-result.expanded // width))  # a wider pass expands fewer per width
+        lower = max(lower, bound.root, result.lower)
+        if result.actions is not None:
+            upper, actions = result.upper, result.actions
+        yield Found(actions, min(lower, upper), _certificate(bound))
+
+
+def _certificate(bound: Bound) -> Certificate:
+    table = bound.table
+    groups = tuple(tuple(np.flatnonzero(table.group == g).tolist()) for g in range(len(table.size)))
+    return Certificate(Proof.RELAXATION, bound.root, groups, tuple(table.multipliers.tolist()))
