@@ -31,6 +31,8 @@ def main() -> None:
     name, limit, path = sys.argv[1], float(sys.argv[2]), sys.argv[3]
     solve = method(name, limit)
     problems: list[RoutingProblem] = pickle.loads(Path(path).read_bytes())
+    if name == "exact":
+        import planner.exact.relaxation  # noqa: F401 - or it plans a few objects without its kernels
     solve(problems[0])  # loads the compiled kernels and the libraries
     for problem in problems:
         wall, cpu = time.perf_counter(), time.process_time()

@@ -6,7 +6,6 @@ any planner found: the optimum where one is proven.
 """
 
 import importlib.util
-import io
 import json
 import os
 import pickle
@@ -22,8 +21,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
+from experiments.commands.bench import load
 from experiments.house import House
 from planner.problem import RoutingProblem
 from planner.replanner import Replanner
@@ -32,7 +31,10 @@ from planner.solver import solver
 
 WORKER = Path(__file__).with_name("_planner_worker.py")
 LIVE_WORKER = Path(__file__).with_name("_live_worker.py")
+REPORT = load(Path(__file__).with_name("_planner_report.py"))
+summary, lines, picture = REPORT.summary, REPORT.lines, REPORT.picture
 LIVE_OBJECTS = 24
+FIRST_OBJECTS = (12, 24)  # of the first problem in a fresh process
 SIZES = (6, 12, 18, 24, 30)
 STATES = ("start", "mid-task")
 OTHERS_SHARE = 5  # every fifth house is also solved by the others, which take seconds by their nature
@@ -108,7 +110,11 @@ def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "houses": houses,
         "not_installed": [e.label for e in entrants if not e.installed],
-        "first_call": first_call(cases[0].problem),
+        "first_call": {
+            str(n): first_call(next(c.problem for c in cases if c.objects == n))
+            for n in FIRST_OBJECTS
+            if n in sizes
+        },
         "live": live(sizes[-1] if quick else LIVE_OBJECTS, min(houses, 1 if quick else 12)),
         "summary": summary(records),
         "runs": records,
@@ -202,153 +208,3 @@ def children_cpu() -> float:
     """CPU seconds of all processes that were started here and have ended."""
     times = os.times()
     return times.children_user + times.children_system
-
-
-def summary(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row per planner, size and state; gaps of the problems that it found a tour for."""
-    best: dict[tuple[int, int, str], float] = {}
-    groups: dict[tuple[int, str, str], list[dict[str, Any]]] = {}
-    for r in records:
-        if r["cost"] is not None:
-            key = r["objects"], r["seed"], r["state"]
-            best[key] = min(best.get(key, r["cost"]), r["cost"])
-        groups.setdefault((r["objects"], r["state"], r["planner"]), []).append(r)
-    ranked = sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] != "start"))
-    return [
-        {"objects": n, "state": state, "planner": planner, **figures(group, best)}
-        for (n, state, planner), group in ranked
-    ]
-
-
-def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], float]) -> dict[str, Any]:
-    """What one planner did with the problems of one size and state; None where there is nothing to say."""
-    solved = [r for r in group if r["cost"] is not None]
-    gaps = [100 * (r["cost"] / best[r["objects"], r["seed"], r["state"]] - 1) for r in solved]
-    # An empty tour of length 0 is optimal: nothing is left to do there.
-    bounds = [100 * (r["cost"] - r["bound"]) / (r["cost"] or 1.0) for r in solved if r["bound"] is not None]
-    cpu, wall = [r["cpu"] for r in group], [r["wall"] for r in group]
-    return {
-        "problems": len(group),
-        "solved": len(solved),
-        "proven": sum(r["proven"] for r in group),
-        "best": sum(gap < 0.001 for gap in gaps),
-        "gap_mean": float(np.mean(gaps)) if gaps else None,
-        "gap_max": max(gaps, default=None),
-        "bound_gap_max": max(bounds, default=None),
-        "cpu_median": float(np.median(cpu)),
-        "cpu_p95": float(np.percentile(cpu, 95)),
-        "cpu_max": max(cpu),
-        "wall_median": float(np.median(wall)),
-        "wall_p95": float(np.percentile(wall, 95)),
-        "peak_mb": max(r["peak_mb"] for r in group),
-    }
-
-
-def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result for people."""
-    table = Table(title=f"{result['houses']} disorganized apartments; gaps in %, times in s")
-    for heading in ("n", "state", "planner"):
-        table.add_column(heading)
-    for heading in (
-        "problems",
-        "proven",
-        "best",
-        "gap",
-        "max gap",
-        "CPU median",
-        "p95",
-        "max",
-        "wall",
-        "p95",
-        "MB",
-    ):
-        table.add_column(heading, justify="right")
-    previous = None
-    for row in result["summary"]:
-        group = row["objects"], row["state"]
-        if previous not in (None, group):
-            table.add_section()
-        first = ("", "") if group == previous else (str(row["objects"]), row["state"])
-        previous = group
-        table.add_row(*first, row["planner"], *cells(row))
-    text = io.StringIO()
-    Console(file=text, width=140).print(table)
-    yield from text.getvalue().splitlines()
-    for label in result["not_installed"]:
-        yield f"{label}: not installed (pip install 'mjsim[peers]')"
-    yield (
-        "gap: to the best tour found; best: how often it was; unproven: greatest gap to the planner's own bound"
-    )
-    beside = result["live"]
-    yield f"live, {beside['objects']} objects, {beside['houses']} houses, every visit drawn at random:"
-    for name, row in beside["groups"].items():
-        yield (
-            f"  {name}: {row['replans']} replans; first plan {1000 * row['wall_median']:.0f} ms, "
-            f"95 % within {1000 * row['wall_p95']:.0f} ms (CPU {1000 * row['cpu_median']:.0f}, "
-            f"{1000 * row['cpu_p95']:.0f} ms), gap {row['gap_mean']:.2f} %, at most {row['gap_max']:.1f} %; "
-            f"{row['proven']} proven, after {row['proof_wall_median']:.2f} s, 95 % within {row['proof_wall_p95']:.2f} s"
-        )
-    first = result["first_call"]
-    yield f"first answer in a fresh process: {first['wall']:.2f} s, CPU {first['cpu']:.2f} s"
-
-
-def cells(row: dict[str, Any]) -> list[str]:
-    """Figures of a row of the table."""
-    failed = row["problems"] - row["solved"]
-    counts = [
-        f"{row['problems']}" + (f", {failed} failed" if failed else ""),
-        str(row["proven"]),
-        str(row["best"]),
-    ]
-    gaps = [
-        "none" if row[name] is None else f"{row[name]:.2f}"
-        for name in ("gap_mean", "gap_max", "bound_gap_max")
-    ]
-    names = ("cpu_median", "cpu_p95", "cpu_max", "wall_median", "wall_p95")
-    return counts + gaps + [f"{row[name]:.2f}" for name in names] + [f"{row['peak_mb']:.0f}"]
-
-
-def picture(result: dict[str, Any], path: Path) -> None:
-    """Left, mean gap over CPU time with 24 objects (or the most there are); right, CPU time to proof by size."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    sizes = sorted({row["objects"] for row in result["summary"]})
-    shown = max(n for n in sizes if n <= 24)
-    for row in result["summary"]:
-        if row["objects"] == shown and row["state"] == "start" and row["gap_mean"] is not None:
-            left.plot(row["cpu_median"], row["gap_mean"], "o", label=row["planner"])
-            left.annotate(
-                row["planner"],
-                (row["cpu_median"], row["gap_mean"]),
-                xytext=(5, 5),
-                textcoords="offset points",
-            )
-    left.set(
-        xscale="log",
-        xlabel="CPU time, s (median)",
-        ylabel="mean gap, %",
-        title=f"{shown} objects, from the start",
-    )
-    left.margins(x=0.3, y=0.15)
-    exact = [r for r in result["runs"] if r["planner"] == "exact"]
-    for k, state in enumerate(STATES):
-        of_state = [[r for r in exact if (r["objects"], r["state"]) == (n, state)] for n in sizes]
-        colour = f"C{k}"
-        for x, runs in enumerate(of_state):
-            spread = np.linspace(-0.12, 0.12, len(runs)) + 0.36 * k - 0.18
-            for done, marker in ((True, "o"), (False, "x")):
-                points = [
-                    (x + dx, r["cpu"]) for dx, r in zip(spread, runs, strict=True) if r["proven"] == done
-                ]
-                if points:
-                    right.plot(*np.array(points).T, marker, color=colour, markersize=4, alpha=0.7)
-        right.plot([], [], "o", color=colour, label=state)
-    right.plot([], [], "x", color="grey", label="budget spent, not proven")
-    right.set(yscale="log", xlabel="objects", ylabel="CPU time, s", title="exact: time to proof")
-    right.set_xticks(range(len(sizes)), [str(n) for n in sizes])
-    right.legend(loc="upper left")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=110)

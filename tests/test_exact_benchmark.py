@@ -43,9 +43,10 @@ def test_a_planner_without_a_tour_is_reported_and_spoils_no_gap():
     )
     assert [row["gap_mean"] for row in rows] == [0.0, None]
     result = {
-        "houses": 2, "summary": rows, "not_installed": ["vroom"], "first_call": {"wall": 0.5, "cpu": 0.4},
+        "houses": 2, "summary": rows, "not_installed": ["vroom"], "first_call": {"12": {"wall": 0.5, "cpu": 0.4}},
         "live": {"objects": 24, "houses": 1, "groups": {"all": LIVE}},
     }  # fmt: skip
     text = "\n".join(MODULE.lines(result))
-    assert "2 failed" in text and "vroom: not installed" in text and "0.50 s" in text
+    assert "2 failed" in text and "vroom: not installed" in text and "12 objects: 0.50 s" in text
+    assert text.splitlines()[2].split("┃")[-2].strip() == "MB"  # no more columns than headings
     assert "9 replans; first plan 20 ms, 95 % within 45 ms" in text and "8 proven" in text

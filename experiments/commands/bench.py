@@ -41,13 +41,23 @@ def benchmark(name: str, folder: Path = FOLDER) -> ModuleType:
         )
     if name not in names:
         raise ConfigError(f"no benchmark {name!r}; there are {', '.join(names)}")
-    spec = importlib.util.spec_from_file_location(f"benchmarks.{name}", folder / f"{name}.py")
-    if spec is None or spec.loader is None:
-        raise ConfigError(f"{folder / name}.py cannot be loaded as a module")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = load(folder / f"{name}.py")
     if not (hasattr(module, "measure") and hasattr(module, "lines")):
         raise ConfigError(f"{folder / name}.py is no benchmark; define measure() and lines(result)")
+    return module
+
+
+def load(path: Path) -> ModuleType:
+    """Load a module of a folder that is no package.
+
+    Raises:
+        ConfigError: That is no file of a module.
+    """
+    spec = importlib.util.spec_from_file_location(f"{path.parent.name}.{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ConfigError(f"{path} cannot be loaded as a module")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
     return module
 
 

@@ -1,0 +1,175 @@
+"""What the planner benchmark makes of its records: a table, lines of text and a picture."""
+
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+
+def summary(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row per planner, size and state; gaps of the problems that it found a tour for."""
+    best: dict[tuple[int, int, str], float] = {}
+    groups: dict[tuple[int, str, str], list[dict[str, Any]]] = {}
+    for r in records:
+        if r["cost"] is not None:
+            key = r["objects"], r["seed"], r["state"]
+            best[key] = min(best.get(key, r["cost"]), r["cost"])
+        groups.setdefault((r["objects"], r["state"], r["planner"]), []).append(r)
+    ranked = sorted(groups.items(), key=lambda item: (item[0][0], item[0][1] != "start"))
+    return [
+        {"objects": n, "state": state, "planner": planner, **figures(group, best)}
+        for (n, state, planner), group in ranked
+    ]
+
+
+def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], float]) -> dict[str, Any]:
+    """What one planner did with the problems of one size and state; None where there is nothing to say."""
+    solved = [r for r in group if r["cost"] is not None]
+    gaps = [100 * (r["cost"] / best[r["objects"], r["seed"], r["state"]] - 1) for r in solved]
+    # An empty tour of length 0 is optimal: nothing is left to do there.
+    bounds = [100 * (r["cost"] - r["bound"]) / (r["cost"] or 1.0) for r in solved if r["bound"] is not None]
+    cpu, wall = [r["cpu"] for r in group], [r["wall"] for r in group]
+    return {
+        "problems": len(group),
+        "solved": len(solved),
+        "proven": sum(r["proven"] for r in group),
+        "best": sum(gap < 0.001 for gap in gaps),
+        "gap_mean": float(np.mean(gaps)) if gaps else None,
+        "gap_max": max(gaps, default=None),
+        "bound_gap_max": max(bounds, default=None),
+        "cpu_median": float(np.median(cpu)),
+        "cpu_p95": float(np.percentile(cpu, 95)),
+        "cpu_max": max(cpu),
+        "wall_median": float(np.median(wall)),
+        "wall_p95": float(np.percentile(wall, 95)),
+        "peak_mb": max(r["peak_mb"] for r in group),
+    }
+
+
+def lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result for people."""
+    table = Table(title=f"{result['houses']} disorganized apartments; gaps in %, times in s")
+    for heading in ("n", "state", "planner"):
+        table.add_column(heading, no_wrap=True)
+    for heading in (
+        "problems",
+        "proven",
+        "best",
+        "gap",
+        "max gap",
+        "unproven",
+        "CPU median",
+        "p95",
+        "max",
+        "wall",
+        "p95",
+        "MB",
+    ):
+        table.add_column(heading, justify="right")
+    previous = None
+    for row in result["summary"]:
+        group = row["objects"], row["state"]
+        if previous not in (None, group):
+            table.add_section()
+        first = ("", "") if group == previous else (str(row["objects"]), row["state"])
+        previous = group
+        table.add_row(*first, row["planner"], *cells(row))
+    text = io.StringIO()
+    Console(file=text, width=140).print(table)
+    yield from text.getvalue().splitlines()
+    for label in result["not_installed"]:
+        yield f"{label}: not installed (pip install 'mjsim[peers]')"
+    yield (
+        "gap: to the best tour found; best: how often it was; unproven: greatest gap to the planner's own bound; "
+        "MB: most that its process had had by then"
+    )
+    beside = result["live"]
+    yield f"live, {beside['objects']} objects, {beside['houses']} houses, every visit drawn at random:"
+    for name, row in beside["groups"].items():
+        yield (
+            f"  {name}: {row['replans']} replans; first plan {1000 * row['wall_median']:.0f} ms, "
+            f"95 % within {1000 * row['wall_p95']:.0f} ms (CPU {1000 * row['cpu_median']:.0f}, "
+            f"{1000 * row['cpu_p95']:.0f} ms), gap {row['gap_mean']:.2f} %, at most {row['gap_max']:.1f} %; "
+            f"{row['proven']} proven, after {row['proof_wall_median']:.2f} s, 95 % within {row['proof_wall_p95']:.2f} s"
+        )
+    for objects, first in result["first_call"].items():
+        yield (
+            f"first answer in a fresh process, {objects} objects: {first['wall']:.2f} s, CPU {first['cpu']:.2f} s"
+        )
+
+
+def cells(row: dict[str, Any]) -> list[str]:
+    """Figures of a row of the table."""
+    failed = row["problems"] - row["solved"]
+    counts = [
+        f"{row['problems']}" + (f", {failed} failed" if failed else ""),
+        str(row["proven"]),
+        str(row["best"]),
+    ]
+    gaps = [
+        "none" if row[name] is None else f"{row[name]:.2f}"
+        for name in ("gap_mean", "gap_max", "bound_gap_max")
+    ]
+    names = ("cpu_median", "cpu_p95", "cpu_max", "wall_median", "wall_p95")
+    return counts + gaps + [f"{row[name]:.2f}" for name in names] + [f"{row['peak_mb']:.0f}"]
+
+
+def picture(result: dict[str, Any], path: Path) -> None:
+    """Left, mean gap over CPU time with 24 objects (or the most there are); right, CPU time to proof by size."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    draw_gaps(left, result["summary"])
+    draw_proofs(right, [r for r in result["runs"] if r["planner"] == "exact"])
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=110)
+
+
+def draw_gaps(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
+    """A point per planner, labelled; the label of the exact planner below, where no gap can be."""
+    shown = max(row["objects"] for row in rows if row["objects"] <= 24)
+    for row in rows:
+        if row["objects"] != shown or row["state"] != "start" or row["gap_mean"] is None:
+            continue
+        few = "" if row["solved"] == row["problems"] else f"\n({row['solved']} of {row['problems']} solved)"
+        below = row["planner"] == "exact"
+        axes.plot(row["cpu_median"], row["gap_mean"], "o")
+        axes.annotate(
+            row["planner"] + few,
+            (row["cpu_median"], row["gap_mean"]),
+            xytext=(0, -8) if below else (6, 5),
+            textcoords="offset points",
+            ha="center" if below else "left",
+            va="top" if below else "bottom",
+        )
+    axes.set(
+        xscale="log",
+        xlabel="CPU time, s (median)",
+        ylabel="mean gap, %",
+        title=f"{shown} objects, from the start",
+    )
+    axes.margins(x=0.4, y=0.2)
+
+
+def draw_proofs(axes: Any, runs: Sequence[dict[str, Any]]) -> None:
+    """A point per problem, by size and state."""
+    sizes = sorted({r["objects"] for r in runs})
+    for k, state in enumerate(dict.fromkeys(r["state"] for r in runs)):
+        for x, n in enumerate(sizes):
+            group = [r for r in runs if (r["objects"], r["state"]) == (n, state)]
+            spread = x + np.linspace(-0.12, 0.12, len(group)) + 0.36 * k - 0.18
+            for done, marker in ((True, "o"), (False, "x")):
+                points = [(at, r["cpu"]) for at, r in zip(spread, group, strict=True) if r["proven"] == done]
+                if points:
+                    axes.plot(*np.array(points).T, marker, color=f"C{k}", markersize=4, alpha=0.7)
+        axes.plot([], [], "o", color=f"C{k}", label=state)
+    axes.plot([], [], "x", color="grey", label="budget spent, not proven")
+    axes.set(yscale="log", xlabel="objects", ylabel="CPU time, s", title="exact: time to proof")
+    axes.set_xticks(range(len(sizes)), [str(n) for n in sizes])
+    axes.legend(loc="upper left")
