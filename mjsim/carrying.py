@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mjsim import avatar
 from mjsim.clearance import carry_clearance
+from mjsim.filling import object_corners
 from mjsim.inventory import LEFT, RIGHT
 from mjsim.person import Person
-from mjsim.placing import object_corners
 from mjsim.postures import LOWEST, count_strain, drawn_in, update_hands
 from mjsim.scene import Scene
 

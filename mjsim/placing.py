@@ -1,48 +1,25 @@
 """Placing as a motion: over a slot of the receptacle, down to the measured fill, release, wait for rest."""
 
-import itertools
 import math
-from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.escapes import REST_STEPS
+from mjsim.filling import Footprint, Slot, best_slot, held_footprint, object_corners
 from mjsim.person import Motion, Person, Steps, minimum_jerk, wrap
 from mjsim.receptacles import ReceptacleGeometry
 
 Vector = NDArray[np.float64]
 
-_WALL_GAP = 0.012
 HOVER_GAP = 0.03
 RELEASE_GAP = 0.002
 STILL_TIME = 0.08  # s over the slot before the way down
-_PROBE_ABOVE = 0.2
-_PROBES = np.linspace(-1.0, 1.0, 5)
-_GRID = np.stack(np.meshgrid(_PROBES, _PROBES, indexing="ij"), axis=-1).reshape(-1, 2)
-_SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
 HAND_SPEED = 0.9
 DESCENT_SPEED = 0.5
 _TOUCH = 0.0005
 _OVERLAP = 0.001
 _RAISE = 0.003
-
-
-@dataclass(frozen=True, eq=False)
-class Footprint:
-    """Extent of a held object about the hand, in the receptacle's axes: lowest and highest corner, m, (3,)."""
-
-    low: Vector
-    high: Vector
-
-
-@dataclass(frozen=True, eq=False)
-class Slot:
-    """Where the hand lets go: horizontal position (2,) in the receptacle's axes, and the fill height there, m."""
-
-    hand: Vector
-    fill: float
 
 
 def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
@@ -54,41 +31,15 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
     yield from person.face(receptacle.center, heading=square_heading(person, receptacle), tolerance=0.04)
     person.moving_hand = hand
     corners = object_corners(person.scene.model, person.scene.index.geoms(person.scene.index.names[item]))
-    footprint = _footprint(person, hand, item, receptacle, corners)
-    slots = fill_slots(person, item, receptacle, footprint)
-    slot = slots[0]
-    clear = max(float(receptacle.half_size[2]), *(s.fill for s in slots)) + HOVER_GAP
-    yield from _travel(person, hand, receptacle, np.array([*slot.hand, clear - footprint.low[2]]))
-    footprint = _footprint(person, hand, item, receptacle, corners)
+    footprint = held_footprint(person, hand, item, receptacle, corners)
+    slot = best_slot(person, item, receptacle, footprint)
+    hover = hover_height(receptacle, slot) - footprint.low[2]
+    yield from _travel(person, hand, receptacle, np.array([*slot.hand, hover]))
+    footprint = held_footprint(person, hand, item, receptacle, corners)
     yield from _descend(person, hand, item, receptacle, slot, footprint)
     person.grips.open(hand, wake=False)  # it was set down
     success = yield from _settle(person, hand, item, receptacle, pitch)
     return success
-
-
-def object_corners(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Vector:
-    """Points (k, 3) of an object's body frame, m, whose bounding box encloses its colliding geoms.
-
-    Mesh geoms give their vertices, others the corners of their bounding boxes.
-    """
-    points = []
-    for geom in geoms:
-        if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
-            continue
-        rotation = np.zeros(9)
-        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-        points.append(_geom_points(model, int(geom)) @ rotation.reshape(3, 3).T + model.geom_pos[geom])
-    return np.concatenate(points)
-
-
-def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
-    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = int(model.geom_dataid[geom])
-        first = int(model.mesh_vertadr[mesh])
-        return np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], np.float64)
-    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-    box = model.geom_aabb[geom]
-    return np.asarray(box[:3] + signs * box[3:])
 
 
 def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
@@ -100,49 +51,9 @@ def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
     return rig.heading + wrap(side + quarter * round(wrap(towards - side) / quarter) - rig.heading)
 
 
-def _footprint(
-    person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, corners: Vector
-) -> Footprint:
-    body = int(person.scene.index.bodies[item])
-    world = corners @ person.data.xmat[body].reshape(3, 3).T + person.data.xpos[body]
-    local = (world - person.data.site_xpos[person.rig.grip_sites[hand]]) @ receptacle.rotation
-    return Footprint(low=local.min(axis=0), high=local.max(axis=0))
-
-
-def fill_slots(person: Person, item: int, receptacle: ReceptacleGeometry, footprint: Footprint) -> list[Slot]:
-    """The 2 x 2 slots, least filled and most level first, then nearest to the person.
-
-    Fill heights and positions are relative to the centre of the receptacle's volume. Each slot is moved so
-    that the object clears the walls where it can.
-    """
-    half = receptacle.half_size[:2]
-    middle = 0.5 * (footprint.low + footprint.high)[:2]
-    extent = 0.5 * (footprint.high - footprint.low)[:2]
-    room = np.maximum(half - extent - _WALL_GAP, 0.0)
-    me = (np.array([*person.rig.position, 0.0]) - receptacle.center) @ receptacle.rotation
-    centres = [np.clip(half * side, -room, room) for side in _SLOTS]
-    ranked = []
-    surfaces = _surfaces(person, item, receptacle, np.array(centres), np.minimum(extent, half))
-    for at, heights in zip(centres, surfaces, strict=True):
-        fill = float(heights.max())
-        # On a slope things tip over: what is missing below counts as if it were filled.
-        cost = fill + (fill - float(heights.mean()))
-        ranked.append((round(cost, 3), float(np.hypot(*(at - me[:2]))), Slot(hand=at - middle, fill=fill)))
-    ranked.sort(key=lambda entry: entry[:2])
-    return [slot for _, _, slot in ranked]
-
-
-def _surfaces(
-    person: Person, item: int, receptacle: ReceptacleGeometry, centres: Vector, extent: Vector
-) -> Vector:
-    """Heights of what lies below a footprint at each of several centres (k, 2), m above the volume's, (k, 25)."""
-    ignore = np.array([*person.carried_bodies(), person.scene.index.bodies[item]], np.int32)
-    local = (centres[:, None] + extent * _GRID).reshape(-1, 2)
-    points = receptacle.center[:2] + local @ receptacle.rotation[:2, :2].T
-    top = float(receptacle.center[2] + receptacle.half_size[2]) + _PROBE_ABOVE
-    heights = person.soundings.heights(person.data, receptacle, points, top, ignore)
-    lowest = -receptacle.half_size[2]
-    return np.asarray(np.maximum(heights - receptacle.center[2], lowest).reshape(len(centres), -1))
+def hover_height(receptacle: ReceptacleGeometry, slot: Slot) -> float:
+    """How high an object's lowest point crosses the receptacle, m above the centre of its volume."""
+    return max(float(receptacle.half_size[2]), slot.top) + HOVER_GAP
 
 
 def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector) -> Vector:

@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjsim.errors import AssetError
 
-HEAP = 0.08  # m; what rests on a heap within the outline is in the receptacle
-
 
 @dataclass(frozen=True, eq=False)
 class ReceptacleGeometry:
@@ -31,9 +29,8 @@ class ReceptacleGeometry:
     approach: NDArray[np.float64]
 
     def contains(self, point: ArrayLike, margin: float = 0.005) -> bool:
-        """Whether a point (3,), m, lies in the volume grown by `margin` metres, or at most `HEAP` above that."""
+        """Whether a point (3,), m, lies in the volume grown by `margin` metres."""
         local = self.rotation.T @ (np.asarray(point, dtype=np.float64) - self.center)
-        local[2] = min(local[2], max(0.0, local[2] - HEAP))
         return bool(np.all(np.abs(local) <= self.half_size + margin))
 
 

@@ -67,6 +67,15 @@ def small_catalogue(small_house: Path) -> Catalogue:
     return Catalogue.load(str(small_house / "catalogue.toml"))
 
 
+@pytest.fixture(scope="session")
+def cramped_catalogue(tmp_path_factory: pytest.TempPathFactory) -> Catalogue:
+    """The small house with a crate on whose floor there is room for four cubes."""
+    folder = tmp_path_factory.mktemp("cramped_house")
+    write_small_house(folder)
+    (folder / "crate.xml").write_text(_receptacle(0.14), encoding="utf-8")
+    return Catalogue.load(str(folder / "catalogue.toml"))
+
+
 def write_small_house(folder: Path) -> None:
     for name, text in _SMALL_HOUSE.items():
         (folder / name).write_text(text.replace("FOLDER", str(folder)), encoding="utf-8")

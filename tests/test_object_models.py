@@ -201,8 +201,8 @@ def test_the_volume_is_the_interior_and_the_floor_is_40_mm_thick(bin_key: str) -
     volume = model.site("volume")
     center, half = volume.pos, volume.size
     bottom, rim = center[2] - half[2], extent(model, data, collides=True)[1, 2]
-    assert 0.1 <= rim - bottom <= 0.25
-    assert 0.02 <= center[2] + half[2] - rim <= 0.15  # a heap counts
+    assert 0.1 <= rim - bottom <= 0.35
+    assert 0.02 <= center[2] + half[2] - rim <= 0.0601  # a little of a heap
     for x, y in SLOTS:
         above = np.array([center[0] + x * half[0], center[1] + y * half[1], rim + 0.3])
         distance, floor = ray(model, data, above, np.array([0.0, 0.0, -1.0]))

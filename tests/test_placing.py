@@ -10,10 +10,10 @@ from mjsim.actions import IDLE, EventKind, Move, Pick, Place, WorldEvent
 from mjsim.catalogue import Catalogue
 from mjsim.clearance import ClearanceField
 from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.filling import object_corners
 from mjsim.observation import ObjectStatus
 from mjsim.person import minimum_jerk
 from mjsim.picking import lead_blend
-from mjsim.placing import object_corners
 from mjsim.receptacles import ReceptacleGeometry
 from mjsim.rules import receptacle_distance
 from mjsim.scene import Scene, compose
@@ -72,14 +72,22 @@ def test_four_objects_fill_the_four_slots(
     assert len(world.health.settle_times) == 4
 
 
-def test_a_fifth_object_goes_on_top(small_catalogue: Catalogue) -> None:
+def test_a_fifth_object_goes_on_top_where_four_fill_the_floor(cramped_catalogue: Catalogue) -> None:
     spots = [(1.0 + 0.6 * math.cos(a), 3.1 + 0.6 * math.sin(a)) for a in (0.4, -0.3, -0.9, -1.5, -2.1)]
-    world = World(scene_of(small_catalogue, (1.0, 3.1, 2.4), ["cube"] * 5, spots))
+    world = World(scene_of(cramped_catalogue, (1.0, 3.1, 2.4), ["cube"] * 5, spots))
     for number in range(5):
         assert transport(world, f"o{number}") == [EventKind.PICKED, EventKind.PLACED]
     heights = world.observation().object_positions[:, 2]
     assert heights[:4] == pytest.approx(0.04, abs=0.005)  # the crate's floor
     assert heights[4] > 0.1
+
+
+def test_a_fifth_object_goes_beside_four_where_the_floor_has_room(small_catalogue: Catalogue) -> None:
+    spots = [(1.0 + 0.6 * math.cos(a), 3.1 + 0.6 * math.sin(a)) for a in (0.4, -0.3, -0.9, -1.5, -2.1)]
+    world = World(scene_of(small_catalogue, (1.0, 3.1, 2.4), ["cube"] * 5, spots))
+    for number in range(5):
+        assert transport(world, f"o{number}") == [EventKind.PICKED, EventKind.PLACED]
+    assert world.observation().object_positions[:, 2] == pytest.approx(0.04, abs=0.005)
 
 
 def test_a_ball_stays_where_it_is_put(small_catalogue: Catalogue) -> None:

@@ -17,7 +17,7 @@ def meshes() -> dict[str, Surface]:
     """Mesh name -> surface."""
     books = {f"shelf_books_{k}": books for k, books in enumerate(_shelf_books())}
     return {
-        "dish_rack": _dish_rack(0.412, 0.352, 0.06, 0.196),
+        "dish_rack": _dish_rack(0.472, 0.464, 0.06, 0.196),
         "recycling_symbol": _recycling_symbol(0.24),
         "hamper_handle": _handle(),
         "toys_sign": slab(0.3, 0.15, 0.004),

@@ -19,18 +19,15 @@ from mjsim.fidelity.full import Full
 from mjsim.fidelity.gestures import ACROSS_FIRST, STRAIGHT, UP_FIRST, Script
 from mjsim.fidelity.strides import BODY, HANDS
 from mjsim.fidelity.walker import Walker
+from mjsim.filling import Footprint, Slot, best_slot, object_corners
 from mjsim.person import FACE_TIMEOUT
 from mjsim.picking import ALIGN_TIME, LIFT_TIME, REACH_TIME
 from mjsim.placing import (
     DESCENT_SPEED,
     HAND_SPEED,
-    HOVER_GAP,
     RELEASE_GAP,
     STILL_TIME,
-    Footprint,
-    Slot,
-    fill_slots,
-    object_corners,
+    hover_height,
     square_heading,
 )
 from mjsim.receptacles import ReceptacleGeometry
@@ -148,9 +145,9 @@ class Choreographer:
         row = self._face(script, receptacle.center, square_heading(person, receptacle), _SQUARE)
         footprint = self._footprint(hand, receptacle)
         low = float(footprint.low[2])
-        slots = fill_slots(person, item, receptacle, footprint)
-        clear = max(float(receptacle.half_size[2]), *(s.fill for s in slots)) + HOVER_GAP
-        return self._travel(script, row, hand, receptacle, _over(slots[0].hand, clear - low)), slots[0], low
+        slot = best_slot(person, item, receptacle, footprint)
+        hover = _over(slot.hand, hover_height(receptacle, slot) - low)
+        return self._travel(script, row, hand, receptacle, hover), slot, low
 
     def _face(self, script: Script, point: Vector, heading: float, tolerance: float) -> int:
         walker, most = self._walker, self._full.person.steps(FACE_TIMEOUT)
