@@ -17,7 +17,7 @@ SOLVERS = {
     "greedy": ("planner.greedy_solver", "GreedySolver"),
 }
 DEFAULT_SOLVER = "exact"
-PATIENT_WORK = 30_000_000  # states of the exact search, for who can wait half a minute for 30 objects
+PATIENT_WORK = 60_000_000  # states of the exact search, for who can wait half a minute for 30 objects
 
 
 @dataclass(frozen=True)

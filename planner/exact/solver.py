@@ -52,8 +52,8 @@ class ExactSolver:
         (16_000, 60_000),
         (BIN_ROWS, 60_000),
         (1 << 17, 200_000),
-        (1 << 18, 1_000_000),
-        (1 << 19, 2_000_000),
+        (1 << 19, 1_000_000),
+        (1 << 20, 3_000_000),
     )
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:

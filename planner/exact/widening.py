@@ -54,14 +54,14 @@ def widening(
         if narrow.actions is not None:
             upper, actions = narrow.upper, narrow.actions
     yield Found(actions, min(lower, upper), _certificate(bound))
-    done, rate = 0, max(1, len(instance.home) // 2)
+    done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
     for rows, wanted in passes:
         # A pass given up proves nothing, and one hardly wider than the last one little.
         width = min(wanted, work // rate)
         if lower >= upper or width < min(wanted, done + 1) or deadline.over():
             break
-        if rows >= BIN_ROWS:
-            bound = told_apart(bound, upper, BIN_ROWS, deadline)
+        if rows >= BIN_ROWS and not by_bin:  # once: later, the bound has outgrown so few rows
+            bound, by_bin = told_apart(bound, upper, BIN_ROWS, deadline), True
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)
         work -= result.expanded
