@@ -20,6 +20,7 @@ TARGETS = (
     ("turning while standing, at most, degrees in 1 s", "turn_max_deg", "<=", 0.1),
     ("steps that are not finite, or MuJoCo warnings", "errors", "<=", 0),
     ("objects that tunnelled", "object_tunnellings", "<=", 0),
+    ("objects ejected", "ejections", "<=", 0),
     ("objects outside the house at the end", "lost", "<=", 0),
 )
 
@@ -65,7 +66,13 @@ def summarise(walks: Sequence[Walk]) -> dict[str, Any]:
         "failures": [
             {"session": walk.session, "speed": walk.speed, "stuck": walk.stuck, "tunnelled": walk.tunnelled}
             for walk in walks
-            if walk.tunnelled or walk.stuck or walk.error or walk.lost or max(walk.drift, default=0.0) > 1e-3
+            if walk.tunnelled
+            or walk.stuck
+            or walk.error
+            or walk.lost
+            or max(walk.drift, default=0.0) > 1e-3
+            or walk.ejections
+            or walk.object_tunnellings
         ],
     }
 

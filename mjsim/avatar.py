@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from mjsim.errors import AssetError
 
@@ -40,6 +41,11 @@ GRIPS = (0, 1)
 GENTLE, FIRM = "gentle", "firm"  # how a hand holds
 
 TRUNK_RADIUS = 0.20
+SIDES = 64  # of trunk and foot
+# The foot's time constant, s, damping ratio and impedance. With a low impedance the force is that of so many weights
+# of the thing, whatever is behind it: who pinches it against a wall steps over it. With high damping it is the force
+# of being run into, not of standing in it: a pinched thing does not push the person away, and nothing is flung out.
+_YIELDING = (0.1, 3.0, 0.2)
 EYE_HEIGHT = 1.60
 EYE_FORWARD = 0.06
 FIELD_OF_VIEW = 70.0  # vertical, degrees
@@ -158,19 +164,17 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
     body.add_joint(name=PREFIX + "yaw", type=hinge, axis=[0, 0, 1], ref=_angle(spec, heading))
     for name, kv, force in (("x", 7000.0, 600.0), ("y", 7000.0, 600.0), ("yaw", 300.0, 150.0)):
         _add_actuator(spec, name, kp=0.0, kv=kv, force=force)
-    cylinder: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "group": 4, "contype": 0, "mass": 0.0}
     base.add_geom(
         name=TRUNK,
-        size=[TRUNK_RADIUS, 0.84, 0],
         pos=[0, 0, 0.88],
         conaffinity=STATIC_BIT,
         condim=1,  # no friction: the person slides along walls
         priority=2,
         solref=[0.008, 1],
         solimp=[0.98, 0.995, 0.001, 0.5, 2],
-        **cylinder,
+        **_prism(spec, TRUNK, 0.84),
     )
-    # Soft, and lower than any carried object: light things are pushed along the floor, never launched. It reaches
+    # Yielding, and lower than any carried object: light things are pushed along the floor, never launched. It reaches
     # below the floor, so that it meets flat things with its side and never treads on them.
     # A body of its own, since it never meets the house: what a body might meet is decided body by body.
     sole = base.add_body(name=SOLE)
@@ -178,16 +182,29 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
     _set_inertia(sole, 0.0, (0.0, 0.0, 0.0))
     sole.add_geom(
         name=FOOT,
-        size=[TRUNK_RADIUS, 0.48, 0],
         pos=[0, 0, 0.18],
         conaffinity=OBJECT_BIT,
         condim=3,
         priority=1,
-        solref=[0.04, 1],  # softer, and a rolling ball gets inside and is flung; harder, and things wedge
+        solref=list(_YIELDING[:2]),
+        solimp=[_YIELDING[2], _YIELDING[2], 0.001, 0.5, 2.0],
         friction=[0.3, 0.005, 0.0001],
-        **cylinder,
+        **_prism(spec, FOOT, 0.48),
     )
     return body
+
+
+def _prism(spec: mujoco.MjSpec, name: str, half_height: float) -> dict[str, Any]:
+    """What makes a geom an upright prism of `SIDES` sides, as good as round.
+
+    MuJoCo's own cylinders meet edges with wrong normals: where a round side touches the edge of a box, the contact
+    may point along either face of it (`multiccd`, 3.17). Meshes meet everything as they should.
+    """
+    angles = np.arange(SIDES) * (2.0 * math.pi / SIDES)
+    ring = TRUNK_RADIUS * np.column_stack((np.cos(angles), np.sin(angles)))
+    vertices = [(*point, z) for point in ring.tolist() for z in (-half_height, half_height)]
+    spec.add_mesh(name=name, uservert=np.ravel(vertices))
+    return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name, "group": 4, "contype": 0, "mass": 0.0}
 
 
 def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, force: float) -> None:
