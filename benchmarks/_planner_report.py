@@ -169,7 +169,8 @@ def draw_proofs(axes: Any, runs: Sequence[dict[str, Any]]) -> None:
                 if points:
                     axes.plot(*np.array(points).T, marker, color=f"C{k}", markersize=4, alpha=0.7)
         axes.plot([], [], "o", color=f"C{k}", label=state)
-    axes.plot([], [], "x", color="grey", label="budget spent, not proven")
+    if not all(r["proven"] for r in runs):
+        axes.plot([], [], "x", color="grey", label="budget spent, not proven")
     axes.set(yscale="log", xlabel="objects", ylabel="CPU time, s", title="exact: time to proof")
     axes.set_xticks(range(len(sizes)), [str(n) for n in sizes])
     axes.legend(loc="upper left")
