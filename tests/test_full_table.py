@@ -45,6 +45,6 @@ def test_numpy_and_the_kernels_fill_in_and_follow_the_same(seed, n, onboard, bin
 def test_a_table_is_the_same_before_and_after_the_kernels_are_loaded(monkeypatch):
     instance = instance_of(3, 9, 1, 4, True)
     loaded = by_table(instance)
-    monkeypatch.setattr(full_table, "KERNELS", "not loaded")
+    monkeypatch.setattr(full_table, "COMPILER", "not loaded")
     monkeypatch.setattr(full_table, "_by_kernels", None)
     assert by_table(instance) == loaded

@@ -1,4 +1,4 @@
-"""Proven tours from the full table: by compiled kernels, or in plain numpy before these are loaded.
+"""Proven tours from the full table: by compiled kernels, or in plain numpy where their compiler is not loaded.
 
 Both fill in the same numbers and choose the same of equals, so that what comes out never depends on which it was.
 """
@@ -14,10 +14,8 @@ from planner.exact.groups import alone
 from planner.exact.instance import Instance
 from planner.exact.table import Table, new_table, table_bytes
 
-KERNELS = "planner.exact.relaxation"
-SMALL_TABLE = (
-    1 << 22
-)  # bytes, 14 objects and 6 bins: filled in 10 ms, in numpy in 50; to load the kernels takes 500
+COMPILER = "numba"  # takes 0.5 s to load; where something else has loaded it, the kernels cost little more
+SMALL_TABLE = 1 << 22  # bytes, 14 objects and 6 bins: filled in 10 ms by kernels, in 50 by numpy
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ def full_table_bytes(instance: Instance) -> int:
 def by_table(instance: Instance) -> Found:
     """Fill the full table and follow a shortest tour."""
     table = new_table(instance, alone(len(instance.home)))
-    if KERNELS in sys.modules or full_table_bytes(instance) > SMALL_TABLE:
+    if COMPILER in sys.modules or full_table_bytes(instance) > SMALL_TABLE:
         length, actions = _by_kernels(instance, table)
     else:
         fill_layers(instance, table)
