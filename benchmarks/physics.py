@@ -126,11 +126,12 @@ def measure_tier(house: House, fidelity: str, seeds: Sequence[int], repeats: int
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """What drives the engine in one control step: activations, controls, active welds; or a state to go on from."""
+    """What drives the engine in a control step: activations, controls, welds, what wakes; or a state to go on from."""
 
     act: Any = None
     ctrl: Any = None
     active: Any = None
+    asleep: Any = None
     physics: Any = None
 
 
@@ -141,7 +142,8 @@ def drives(errand: Errand) -> tuple[list[Drive], float, float]:
 
     def noted(model: Any, data: Any, nstep: int = 1) -> None:
         nonlocal awake, contacts
-        found.append(Drive(data.act.copy(), data.ctrl.copy(), data.eq_active.copy()))
+        inputs = (data.act, data.ctrl, data.eq_active, data.tree_asleep)
+        found.append(Drive(*(array.copy() for array in inputs)))
         advance(model, data, nstep)
         awake, contacts = awake + data.ntree_awake, contacts + data.ncon
 
@@ -161,7 +163,7 @@ def drives(errand: Errand) -> tuple[list[Drive], float, float]:
 
 def drive_raw(model: Any, data: Any, turn: Sequence[Drive], substeps: int) -> float:
     """Let the engine alone take some steps; CPU seconds of them."""
-    act, ctrl, active = data.act, data.ctrl, data.eq_active
+    act, ctrl, active, asleep = data.act, data.ctrl, data.eq_active, data.tree_asleep
     advance, clock, lost = mujoco.mj_step, time.process_time, 0.0
     start = clock()
     for drive in turn:
@@ -170,7 +172,7 @@ def drive_raw(model: Any, data: Any, turn: Sequence[Drive], substeps: int) -> fl
             set_physics(model, data, drive.physics)
             lost += clock() - began
             continue
-        act[:], ctrl[:], active[:] = drive.act, drive.ctrl, drive.active
+        act[:], ctrl[:], active[:], asleep[:] = drive.act, drive.ctrl, drive.active, drive.asleep
         advance(model, data, substeps)
     return clock() - start - lost
 

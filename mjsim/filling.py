@@ -19,6 +19,7 @@ _CELL = 0.02  # m between soundings at most
 _PROBE_ABOVE = 0.2
 _SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
 _PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
+_SLOPE = 2.0  # cost of a metre that is missing below, in metres of fill
 _WORTH = 0.015  # m by which a place must be lower to be taken instead of a slot
 
 
@@ -120,7 +121,7 @@ def _sound(person: Person, item: int, receptacle: ReceptacleGeometry) -> tuple[V
 def _below(centres: Vector, extent: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
     """Fill height under a footprint at each centre (k, 2), and its cost: on a slope things tip over.
 
-    What is missing below the highest point counts as if it were filled.
+    What is missing below the highest point counts for more than what is filled.
     """
     fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
     reach = np.maximum(extent + _ELBOW_ROOM, _CELL)  # at least one sounding
@@ -132,5 +133,5 @@ def _below(centres: Vector, extent: Vector, points: Vector, heights: Vector) -> 
                 fills[k] = max(fills[k], heights[p])
                 total += heights[p]
                 count += 1
-        costs[k] = 2.0 * fills[k] - total / count
+        costs[k] = fills[k] + _SLOPE * (fills[k] - total / count)
     return fills, costs

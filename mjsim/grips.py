@@ -73,13 +73,13 @@ class Grips:
         self._closed[hand] = (item, grip)
         self._note()
 
-    def open(self, hand: int, *, wake: bool = True) -> None:
-        """Let go of what a hand holds, if anything; `wake` for what must fall, even if it was held still."""
+    def open(self, hand: int) -> None:
+        """Let go of what a hand holds, if anything."""
         closed = self._closed[hand]
         if closed is not None:
             self._data.eq_active[self._welds[hand, closed[0], closed[1]]] = 0
-            if wake:  # falls begin slowly: what was held still would fall asleep in the air
-                self._data.tree_asleep[self._trees[closed[0]]] = AWAKE
+            # Falls begin slowly: what was held still would fall asleep in the air.
+            self._data.tree_asleep[self._trees[closed[0]]] = AWAKE
             self._closed[hand] = None
             self._note()
 

@@ -37,7 +37,7 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
     yield from _travel(person, hand, receptacle, np.array([*slot.hand, hover]))
     footprint = held_footprint(person, hand, item, receptacle, corners)
     yield from _descend(person, hand, item, receptacle, slot, footprint)
-    person.grips.open(hand, wake=False)  # it was set down
+    person.grips.open(hand)
     success = yield from _settle(person, hand, item, receptacle, pitch)
     return success
 

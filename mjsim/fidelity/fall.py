@@ -43,7 +43,7 @@ def drop(full: Full, walker: Walker, hand: int, item: int, receptacle: Receptacl
     options = person.options
     enter(full, walker)
     person.monitor.check(person.held)  # it is in the hand, for the last time
-    person.grips.open(hand, wake=False)
+    person.grips.open(hand)
     walker.live[HOLDS + hand] = -1
     held = [None if other == item else other for other in person.held]
     poses: list[NDArray[np.float64]] = []
