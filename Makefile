@@ -31,7 +31,7 @@ wheel-check: $(READY) ## Build the wheel and use it in an empty environment
 	PYTHON=$(BIN)/python .ci/wheel-check
 
 assets: $(READY) ## Make textures and meshes under models/ anew
-	$(BIN)/python -m mjsim.authoring
+	PYTHONPATH=tools $(BIN)/python -m authoring
 
 pictures: $(READY) ## Make the pictures of the README anew
 	$(BIN)/mjsim gallery --out docs/pictures

@@ -3,7 +3,7 @@
 import mujoco
 
 import mjsim
-from mjsim.assets import models_root
+from mjsim.model.assets import models_root
 
 
 def main() -> None:

@@ -98,9 +98,9 @@ def by_vroom(problem: RoutingProblem) -> Answer:
     import vroom
 
     task: Any = vroom.Input()
-    legs = integer_metric(problem.distances).astype(np.uint32)
-    task.set_durations_matrix("car", legs)
-    task.set_costs_matrix("car", legs)
+    locomotion = integer_metric(problem.distances).astype(np.uint32)
+    task.set_durations_matrix("car", locomotion)
+    task.set_costs_matrix("car", locomotion)
     task.add_vehicle(vroom.Vehicle(1, start=problem.start, capacity=[problem.capacity]))
     for k, s in enumerate(problem.shipments):
         task.add_shipment(

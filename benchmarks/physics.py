@@ -20,13 +20,13 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from experiments.errand import Errand, play, record_errand
 from experiments.house import House
+from experiments.recorded_trial import VisitTask, play, record_errand
 from mjsim.actions import Action, Move
+from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES
-from mjsim.recording import set_physics, take_physics
-from mjsim.scene import Scene, compose
 from mjsim.world import World
+from mjsim.world_state import set_physics, take_physics
 from mjsim.worlds import Worlds
 
 OBJECTS = (6, 12, 18, 24, 48)
@@ -135,7 +135,7 @@ class Drive:
     physics: Any = None
 
 
-def drives(errand: Errand) -> tuple[list[Drive], float, float]:
+def drives(errand: VisitTask) -> tuple[list[Drive], float, float]:
     """What drove the engine in an errand, and how many trees were awake and contacts there were, on average."""
     world, found, awake, contacts = errand.world(), [], 0, 0
     advance = mujoco.mj_step
@@ -177,7 +177,7 @@ def drive_raw(model: Any, data: Any, turn: Sequence[Drive], substeps: int) -> fl
     return clock() - start - lost
 
 
-def measure_overhead(errand: Errand, repeats: int) -> dict[str, Any]:
+def measure_overhead(errand: VisitTask, repeats: int) -> dict[str, Any]:
     """Microseconds of `World.step` and of the raw engine for the same control steps, in turns."""
     calls = [call for call in errand.calls if call[0] in ("step", "restore")]
     found, awake, contacts = drives(errand)
@@ -206,7 +206,7 @@ def measure_overhead(errand: Errand, repeats: int) -> dict[str, Any]:
     }
 
 
-def measure_threads(errand: Errand, repeats: int) -> list[dict[str, Any]]:
+def measure_threads(errand: VisitTask, repeats: int) -> list[dict[str, Any]]:
     """Speed on 1, 2, .. threads relative to 1: of `Worlds`, of the raw engine on threads, and of MuJoCo's `Batch`.
 
     Worlds are stepped together, all by one control step at a time, and for all steps in one call (stretches).
@@ -303,7 +303,7 @@ def measure_set_up(house: House, count: int) -> dict[str, float]:
     return {"sample_ms": float(sample), "compose_ms": float(composed), "world_ms": float(world)}
 
 
-def measure_profile(errand: Errand) -> dict[str, float]:
+def measure_profile(errand: VisitTask) -> dict[str, float]:
     """Share of each part of a control step, by MuJoCo's own timers; empty where the system has no clock for them."""
     library = ctypes.util.find_library("gomp")
     if library is None:

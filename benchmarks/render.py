@@ -24,11 +24,11 @@ from experiments.trial import TrialConfig
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.state import HudState
+from mjsim.model.scene import Scene, compose
 from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info, render_pictures
 from mjsim.render.cameras import View
 from mjsim.render.context import current_context
 from mjsim.render.markers import add_markers
-from mjsim.scene import Scene, compose
 from mjsim.world import World
 
 SIZES = ((320, 240), (640, 480), (1280, 720))

@@ -13,9 +13,9 @@ from experiments.house import House
 from experiments.metrics import compute_metrics
 from experiments.records import EventLog
 from experiments.trial import TrialConfig, prepare_session
+from mjsim.model.scene import Scene, compose
 from mjsim.observation import ObjectStatus
 from mjsim.options import FIDELITIES
-from mjsim.scene import Scene, compose
 from planner.replanner import Replanner
 from planner.route import Route, TaskState
 from planner.solver import solver

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from experiments.assistant import Assistant
 from experiments.errors import RecordError
-from experiments.glasses import FilmConfig, Glasses
+from experiments.first_person import FilmConfig, FirstPersonRenderer
 from experiments.house import House
 from experiments.records import EventLog
 from experiments.trial import TrialConfig, prepare_session
 from mjsim.files import replacing
+from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.scene import compose
 from mjsim.visibility import visible_objects
 from mjsim.world import World
 
@@ -91,7 +91,7 @@ class _Photographer:
     """A viewer that takes pictures when their moments come."""
 
     def __init__(
-        self, glasses: Glasses, shots: Sequence[Shot], targets: Mapping[str, NDArray[np.float64]]
+        self, glasses: FirstPersonRenderer, shots: Sequence[Shot], targets: Mapping[str, NDArray[np.float64]]
     ) -> None:
         self._glasses = glasses
         self._due = list(shots)
@@ -159,7 +159,7 @@ def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
         scene = compose(house.sample_episode(objects=trial.objects, seed=trial.seed), house.catalogue)
         mine = [shot for shot in shots if shot.trial == trial]
         targets = {name: house.receptacles[key].center for name, key in scene.episode.targets.items()}
-        with Glasses(scene, house, film) as glasses:
+        with FirstPersonRenderer(scene, house, film) as glasses:
             photographer = _Photographer(glasses, mine, targets)
             patient = dataclasses.replace(trial, time_limit=PATIENCE)
             session, _ = prepare_session(patient, house, scene, EventLog(), photographer)

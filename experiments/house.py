@@ -7,14 +7,14 @@ from functools import cached_property
 import numpy as np
 
 from experiments.known_house import KnownHouse, spread_viewpoints
-from mjsim.avatar import TRUNK_RADIUS
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode
-from mjsim.footprint import footprint
-from mjsim.receptacles import ReceptacleGeometry, receptacle_geometries
-from mjsim.rooms import RoomMap
-from mjsim.sampling import sample_episode
-from mjsim.scene import compose_house
+from mjsim.model.avatar import TRUNK_RADIUS
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import footprint
+from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
+from mjsim.model.rooms import RoomMap
+from mjsim.model.sampling import sample_episode
+from mjsim.model.scene import compose_house
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mjsim.actions import Action
 from mjsim.crew import Crew
 from mjsim.errors import PhysicsError
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
 from mjsim.world import StepResult, World
 
 T = TypeVar("T")
@@ -38,7 +38,7 @@ class Walk:
     world: World
     moves: NDArray[np.float64]
 
-    def perform(self) -> Stretch:
+    def perform(self) -> Rollout:
         """Do it; raises `PhysicsError` as `World.walk`."""
         return self.world.walk(self.moves)
 
@@ -49,13 +49,13 @@ class Finish:
 
     world: World
 
-    def perform(self) -> Stretch:
+    def perform(self) -> Rollout:
         """Do it; raises `PhysicsError` as `World.finish`."""
         return self.world.finish()
 
 
 Request = Step | Walk | Finish
-Outcome = StepResult | Stretch
+Outcome = StepResult | Rollout
 # Yields what a world is to do, takes what came of it, or is thrown the PhysicsError or KeyboardInterrupt that came.
 Play = Generator[Request, Outcome, T]
 # Does what several sessions ask, each of a world of its own.

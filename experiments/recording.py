@@ -13,8 +13,8 @@ from experiments.errors import RecordError
 from experiments.files import read_arrays, save_arrays
 from experiments.records import EventLog
 from mjsim.observation import Observation
-from mjsim.recording import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint
 from mjsim.world import World
+from mjsim.world_state import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint
 
 FAR_OFF = 1000  # control steps, where no checkpoint is to come
 

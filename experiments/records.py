@@ -14,9 +14,9 @@ from experiments.errors import RecordError
 from experiments.files import save_arrays
 from mjsim.actions import Action, Move, Pick, Place
 from mjsim.errors import ActionError
-from mjsim.health import HealthSample
+from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
 
 LOG_FORMAT = 3  # 2 had no health of the physics, 1 neither state hashes nor checkpoints
 EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
@@ -138,7 +138,7 @@ class Trajectory:
         self._rows.append((*self._poses(observation), self._encode(action), health.row))
 
     def extend(
-        self, observation: Observation, health: HealthSample, stretch: Stretch, moves: NDArray[np.float64]
+        self, observation: Observation, health: HealthSample, stretch: Rollout, moves: NDArray[np.float64]
     ) -> None:
         """Add the control steps of a stretch.
 

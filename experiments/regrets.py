@@ -8,9 +8,9 @@ from typing import Protocol
 
 from planner.errors import PlannerError
 from planner.geodesics import Geodesics
-from planner.judge import Judge, same_state
 from planner.plan import Plan
 from planner.regret import Regret
+from planner.regret_evaluator import RegretEvaluator, same_state
 from planner.replanner import Stop
 from planner.route import TaskState
 from planner.solver import SolveLimit
@@ -51,7 +51,7 @@ class RegretsAtOnce:
     """Works out what is asked when it is asked. Budgets count work, so the answers repeat."""
 
     def __init__(self, geodesics: Geodesics) -> None:
-        self._judge = Judge(geodesics)
+        self._evaluator = RegretEvaluator(geodesics)
         self._state: TaskState | None = None
         self._plan: Plan | None = None
 
@@ -64,11 +64,11 @@ class RegretsAtOnce:
 
     def known(self) -> Mapping[Stop, Regret]:
         """See :class:`Regrets`."""
-        return {} if self._state is None else self._judge.all(self._state, self._plan)
+        return {} if self._state is None else self._evaluator.all(self._state, self._plan)
 
     def exact(self, stop: Stop) -> float | None:
         """See :class:`Regrets`."""
-        return None if self._state is None else self._judge.of(self._state, stop, self._plan)
+        return None if self._state is None else self._evaluator.of(self._state, stop, self._plan)
 
     def judge(self, number: int, stop: Stop) -> float | None:  # noqa: ARG002 - nothing is left for later
         """See :class:`Regrets`."""
@@ -95,7 +95,7 @@ class _Job:
         """Find them, unless somebody says stop; the planner itself tells of a task that cannot be done."""
         limit = SolveLimit(seconds=PATIENCE, stop=self.stop)
         with contextlib.suppress(PlannerError):
-            found = Judge(geodesics, limit=limit).all(self.state, self.plan)
+            found = RegretEvaluator(geodesics, limit=limit).all(self.state, self.plan)
             self.found = None if self.stop.is_set() else found
 
 
@@ -107,7 +107,7 @@ class RegretsBeside:
 
     def __init__(self, geodesics: Geodesics) -> None:
         self._geodesics = geodesics
-        self._judge = Judge(geodesics)
+        self._evaluator = RegretEvaluator(geodesics)
         self._job: _Job | None = None
         self._thread: threading.Thread | None = None
         self._state: TaskState | None = None
@@ -147,7 +147,7 @@ class RegretsBeside:
 
     def exact(self, stop: Stop) -> float | None:
         """See :class:`Regrets`."""
-        return None if self._state is None else self._judge.of(self._state, stop, self._plan)
+        return None if self._state is None else self._evaluator.of(self._state, stop, self._plan)
 
     def judge(self, number: int, stop: Stop) -> float | None:
         """None: it is left for `later`."""
@@ -158,7 +158,7 @@ class RegretsBeside:
     def later(self) -> Iterator[tuple[int, float | None]]:
         """See :class:`Regrets`."""
         for number, state, stop, plan in self._made:
-            yield number, self._judge.of(state, stop, plan)
+            yield number, self._evaluator.of(state, stop, plan)
         self._made = []
 
     def close(self) -> None:

@@ -17,7 +17,7 @@ from experiments.records import EventLog, Trajectory
 from mjsim.actions import IDLE, Action, ActionResult, WorldEvent
 from mjsim.errors import PhysicsError
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
 from mjsim.visibility import visible_objects
 from mjsim.world import StepResult, World
 
@@ -187,10 +187,10 @@ class Session:
             in_time = left * self._world.control_timestep > LONGEST_MOTION
             return Finish(self._world) if in_time and participant.waits() else None
         limit = min(left, self.recording.steps_to_checkpoint)
-        legs = self._world.legs
-        if limit < 1 or legs is None:
+        locomotion = self._world.locomotion
+        if limit < 1 or locomotion is None:
             return None
-        moves = participant.foresee(percept, Outlook(legs, limit, stray=OFF_THE_PATH))
+        moves = participant.foresee(percept, Outlook(locomotion, limit, stray=OFF_THE_PATH))
         return Walk(self._world, moves) if len(moves) else None
 
     def _stride(self, request: Walk | Finish) -> Generator[Request, Outcome, tuple[WorldEvent, ...]]:
@@ -198,7 +198,7 @@ class Session:
         self._recorded_until = self._now.time
         self.recording.append()
         health = self._world.health_sample
-        stretch = cast(Stretch, (yield request))
+        stretch = cast(Rollout, (yield request))
         count = len(stretch)
         moves = request.moves[:count] if isinstance(request, Walk) else np.zeros((count, 4))
         self.recording.extend(stretch.state_hashes[:-1])

@@ -15,7 +15,7 @@ from experiments.analysis.topdown import draw_topdown
 from experiments.assistant import Assistant
 from experiments.errors import ConfigError
 from experiments.files import save_arrays, write_json
-from experiments.glasses import FilmConfig, Filming, Glasses
+from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
 from experiments.health import summarise_health
 from experiments.house import House
 from experiments.lockstep import Play, drive
@@ -28,9 +28,9 @@ from experiments.run_directory import keep_failed, run_directory
 from experiments.session import OnProgress, Session, Viewer
 from experiments.video import VideoWriter
 from mjsim.errors import PhysicsError
+from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES, WorldOptions
 from mjsim.render import gl_info
-from mjsim.scene import Scene, compose
 from mjsim.world import World
 from planner.live import LiveReplanner
 from planner.replanner import Replanner
@@ -203,7 +203,7 @@ def _simulate_once(
         log = stack.enter_context(EventLog(folder / records.EVENTS))
         video = viewer = None
         if film is not None:
-            glasses = stack.enter_context(Glasses(scene, house, film))
+            glasses = stack.enter_context(FirstPersonRenderer(scene, house, film))
             target = folder / records.VIDEO
             video = stack.enter_context(VideoWriter(target, width=film.width, height=film.height))
             viewer = Filming(glasses, video)

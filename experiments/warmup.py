@@ -7,7 +7,7 @@ from experiments.house import House
 from experiments.participants import DEFAULT_FOR_ASSISTANCE
 from experiments.records import EventLog
 from experiments.trial import TrialConfig, prepare_session
-from mjsim.scene import compose
+from mjsim.model.scene import compose
 
 STEPPED, FORESEEN = ("full", 2.0), ("event", 60.0)  # how far a trial is played, s
 

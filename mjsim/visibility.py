@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.scene import Scene
+from mjsim.model.scene import Scene
 
 SHOWN_GROUPS = (0, 1, 2)  # what the first-person view draws of the house and the objects
 PASS = 1e-4  # share of a ray that is skipped to get through a surface of the person

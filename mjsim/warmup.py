@@ -6,11 +6,11 @@ Run once after installing: `python -m mjsim.warmup`.
 import math
 
 from mjsim.actions import Move, Pick, Place
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.receptacles import receptacle_geometries
+from mjsim.model.scene import Scene, compile_house, compose
 from mjsim.options import FIDELITIES, WorldOptions
-from mjsim.receptacles import receptacle_geometries
-from mjsim.scene import Scene, compile_house, compose
 from mjsim.world import World
 
 _TIERS = FIDELITIES

@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 from mjsim.actions import Action, ActionResult, WorldEvent
 from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.fidelity import make_tier
-from mjsim.health import Health, HealthSample
-from mjsim.kinematics import Legs
+from mjsim.fidelity.kinematics import LocomotionState
+from mjsim.health.values import Health, HealthSample
+from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
-from mjsim.recording import WorldState
-from mjsim.scene import Scene
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
+from mjsim.world_state import WorldState
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +88,9 @@ class World:
         return self._tier.busy
 
     @property
-    def legs(self) -> Legs | None:
-        """What the walk depends on, for foreseeing it with `mjsim.kinematics`; None while physics moves the person."""
-        return self._tier.legs
+    def locomotion(self) -> LocomotionState | None:
+        """What the walk depends on, for `mjsim.fidelity.kinematics`; None while physics moves the person."""
+        return self._tier.locomotion
 
     def reset(self) -> Observation:
         """Return to the episode's beginning; the same actions then lead to bit-identical states."""
@@ -117,7 +117,7 @@ class World:
         """Go on from a state, of this world or of another one of the same scene and options.
 
         The physics is reset on the way, so the world that the state was taken from goes on in the very same
-        way only if it is restored, too (`mjsim.recording`).
+        way only if it is restored, too (`mjsim.world_state`).
 
         Raises:
             StateError: The state does not fit the scene, or is of another fidelity.
@@ -133,9 +133,9 @@ class World:
             PhysicsError: MuJoCo warned or the state is not finite; call `reset` before stepping on.
         """
         result = self._tier.step(action)
-        return StepResult(self._tier.observation(), result, tuple(self._tier.ledger.events))
+        return StepResult(self._tier.observation(), result, tuple(self._tier.episode_state.events))
 
-    def walk(self, moves: ArrayLike) -> Stretch:
+    def walk(self, moves: ArrayLike) -> Rollout:
         """Take one control step per row, as `step(Move(*row))` would; stops early after a step with events.
 
         Args:
@@ -152,7 +152,7 @@ class World:
             raise ActionError(f"moves must be finite numbers of shape (n, 4), got shape {rows.shape}")
         return self._tier.walk(rows)
 
-    def finish(self) -> Stretch:
+    def finish(self) -> Rollout:
         """Step with `IDLE` until no pick or place is under way; no step at all when none is.
 
         As `walk`, it stops early after a step with events; where one happened besides, the world is busy still.

@@ -16,7 +16,7 @@ from mjsim.actions import Action
 from mjsim.crew import Crew
 from mjsim.errors import ActionError
 from mjsim.observation import Observation
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
 from mjsim.world import StepResult, World
 
 T = TypeVar("T")
@@ -84,7 +84,7 @@ class Worlds(Sequence[World]):
         pairs = zip(self._worlds, actions, strict=True)
         return self._crew.all([partial(world.step, action) for world, action in pairs])
 
-    def walk(self, moves: Sequence[ArrayLike]) -> list[Stretch]:
+    def walk(self, moves: Sequence[ArrayLike]) -> list[Rollout]:
         """Advance every world by its own moves, as `World.walk` does; one array per world, of any length.
 
         Raises:
@@ -95,7 +95,7 @@ class Worlds(Sequence[World]):
         pairs = zip(self._worlds, moves, strict=True)
         return self._crew.all([partial(world.walk, rows) for world, rows in pairs])
 
-    def finish(self) -> list[Stretch]:
+    def finish(self) -> list[Rollout]:
         """Let every world finish its pick or place, as `World.finish` does.
 
         Raises:

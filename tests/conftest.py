@@ -6,11 +6,11 @@ import mujoco
 import pytest
 from hypothesis import settings
 
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode
-from mjsim.footprint import Footprint, footprint
-from mjsim.sampling import sample_episode
-from mjsim.scene import Scene, compile_house, compose
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import Footprint, footprint
+from mjsim.model.sampling import sample_episode
+from mjsim.model.scene import Scene, compile_house, compose
 from planner.navmesh import NavMesh
 
 # Whether a test passes must not depend on how busy the machine is.

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mjsim.authoring import __main__ as authoring
-from mjsim.authoring import textures
-from mjsim.authoring.patterns import noise
+from authoring import __main__ as authoring
+from authoring import textures
+from authoring.patterns import noise
 from mjsim.errors import AssetError
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -197,7 +197,7 @@ def test_nothing_can_be_kicked_under_low_furniture(model: mujoco.MjModel, data: 
 def test_textures_are_what_the_scripts_paint(name: str) -> None:
     """One grey level of slack: another processor may round the last bit of a noise field differently."""
     stored = cv2.imread(str(MODELS / "textures" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
-    assert stored is not None, "run python -m mjsim.authoring"
+    assert stored is not None, "run python -m authoring"
     painted = textures.paint(name)
     if painted.ndim == 3:
         painted = painted[..., [2, 1, 0, *range(3, painted.shape[2])]]

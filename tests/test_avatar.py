@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim import avatar
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import AssetError
-from mjsim.scene import Scene, compose
+from mjsim.model import avatar
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import Scene, compose
 
 START = StartPose(1.2, 0.9, 0.7)
 

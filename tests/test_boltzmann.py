@@ -13,8 +13,8 @@ from experiments.participants.base import Choice
 from experiments.participants.boltzmann import draw
 from experiments.records import EventLog
 from experiments.trial import TrialConfig, prepare_session, run_trial
-from mjsim.scene import compose
-from planner.judge import Judge
+from mjsim.model.scene import compose
+from planner.regret_evaluator import RegretEvaluator
 
 TRUE = (0.0, 0.3, 0.8, 2.0, 3.0)
 BOUND = (0.0, 0.3, 0.5, 0.5, 0.5)  # the last three are only known to be at least 0.5 m
@@ -61,7 +61,12 @@ def test_without_any_temperature_the_best_is_taken():
 
 def walked_by_drawing(geodesics, temperature, seed):
     """Length of a task of eight objects, done in an order drawn from its regrets."""
-    task, rng, judge, length = Task(geodesics, 8, seed), np.random.default_rng(seed), Judge(geodesics), 0.0
+    task, rng, judge, length = (
+        Task(geodesics, 8, seed),
+        np.random.default_rng(seed),
+        RegretEvaluator(geodesics),
+        0.0,
+    )
     while found := judge.all(task.state):
         options = [
             Choice(k.value, n, np.zeros(2), r.regret, False, lambda: None) for (k, n), r in found.items()
@@ -75,7 +80,8 @@ def walked_by_drawing(geodesics, temperature, seed):
 def test_the_colder_the_shorter_and_at_zero_the_optimum():
     geodesics = two_rooms()
     best = [
-        next(iter(Judge(geodesics).all(Task(geodesics, 8, seed).state).values())).cost for seed in range(6)
+        next(iter(RegretEvaluator(geodesics).all(Task(geodesics, 8, seed).state).values())).cost
+        for seed in range(6)
     ]
     means = []
     for temperature in (0.0, 0.001, 0.5, 5.0, 1e6):

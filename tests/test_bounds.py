@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjsim.bounds import surface_area_tree, tighten
-from mjsim.catalogue import Catalogue
-from mjsim.scene import compose_house
+from mjsim.model.bounding_volumes import surface_area_tree, tighten
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import compose_house
 
 
 def _cluttered(seed: int, moving: int) -> mujoco.MjSpec:

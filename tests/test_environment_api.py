@@ -15,12 +15,12 @@ from dm_env import specs, test_utils
 from gymnasium.utils.env_checker import check_env
 
 import mjsim
-from mjsim.catalogue import Catalogue
 from mjsim.environments import gymnasium_environment, viewer
 from mjsim.environments.control import MOVES
 from mjsim.environments.errors import EnvironmentConfigError, EnvironmentStateError, ViewerError
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import ActionError, PhysicsError
+from mjsim.model.catalogue import Catalogue
 from mjsim.world import World
 
 FORWARD, PICK, PLACE = MOVES.index("forward"), MOVES.index("pick"), MOVES.index("place")

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 import mjsim
 from mjsim.actions import IDLE, Move, Pick, Place
-from mjsim.catalogue import Catalogue
 from mjsim.environments import navigable
 from mjsim.environments.control import MOVES, Continuous, Discrete
 from mjsim.environments.core import Rearrangement
@@ -25,6 +24,7 @@ from mjsim.environments.options import EnvironmentOptions, build
 from mjsim.environments.rewards import TimeReward, potential
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import ActionError, PhysicsError, SamplingError
+from mjsim.model.catalogue import Catalogue
 from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.navmesh import NavMesh

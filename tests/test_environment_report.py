@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjsim.environment_report import advise, egl_vendors, environment_report
+from mjsim.diagnostics import advise, egl_vendors, environment_report
 from mjsim.render.context import GlInfo, is_software
 
 GPU = GlInfo("NVIDIA Corporation", "NVIDIA H100/PCIe/SSE2", "4.6.0", False)
@@ -48,7 +48,7 @@ def test_software_rasterisers_are_recognised():
 def test_a_machine_without_opengl_still_gets_a_report():
     """Rendering switched off stands in for a missing library: importing must work, the report must say why."""
     code = (
-        "from mjsim.environment_report import environment_report as e; r = e(); "
+        "from mjsim.diagnostics import environment_report as e; r = e(); "
         "print(r.usable, r.gl, 'MUJOCO_GL' in r.problem, 'libegl1' in r.advice[-1], 'unusable' in str(r.lines()))"
     )
     run = subprocess.run(

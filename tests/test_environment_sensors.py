@@ -13,7 +13,6 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 import mjsim
-from mjsim.catalogue import Catalogue
 from mjsim.environments.core import Rearrangement
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.layout import CameraOptions
@@ -21,6 +20,7 @@ from mjsim.environments.sensors import SENSORS, Moment, Sensor, resolve_sensors,
 from mjsim.environments.sensors.house import MAP_SIZE, RANGE, RAYS
 from mjsim.environments.sensors.sight import visible_pixels
 from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.model.catalogue import Catalogue
 from planner.navmesh import NavMesh
 
 # In the west room, looking at the crate in its corner. The cube is at the feet, too low to be in the picture; the

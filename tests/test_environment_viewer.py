@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mjsim.catalogue import Catalogue
 from mjsim.environments import viewer
 from mjsim.environments.errors import ViewerError
 from mjsim.episode import Episode, PlacedObject, StartPose
-from mjsim.scene import compose
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import compose
 from mjsim.world import World
 
 

@@ -11,12 +11,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim import avatar
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import AssetError
-from mjsim.export import export_house
-from mjsim.scene import Scene, compose
+from mjsim.model import avatar
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.export import export_house
+from mjsim.model.scene import Scene, compose
 
 STOCK = """
 import json, sys

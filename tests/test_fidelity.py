@@ -12,22 +12,24 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjsim import avatar, kinematics, trunk
 from mjsim.actions import IDLE, Action, EventKind, Move, Pick, Place, WorldEvent
-from mjsim.body import X, Y, standing
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import ActionError, StateError
-from mjsim.footprint import Footprint
-from mjsim.kinematics import Gait
+from mjsim.fidelity import kinematics
+from mjsim.fidelity import trunk_contact as trunk
+from mjsim.fidelity.body_state import X, Y, standing
+from mjsim.fidelity.kinematics import Gait
+from mjsim.fidelity.trunk_contact import Floor
+from mjsim.model import avatar
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import Footprint
+from mjsim.model.scene import Scene, compose
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import FIDELITIES, WorldOptions
-from mjsim.recording import WorldState
-from mjsim.scene import Scene, compose
-from mjsim.stretch import Stretch
-from mjsim.trunk import Floor
+from mjsim.rollout import Rollout
 from mjsim.visibility import visible_objects
 from mjsim.world import World
+from mjsim.world_state import WorldState
 
 CATEGORY = {"cube": "solids", "wedge": "solids", "ball": "rounds"}
 KINEMATIC = ("windows", "event")
@@ -134,7 +136,7 @@ def wander(count: int, seed: int) -> np.ndarray:
 
 
 def check_rows(
-    stretch: Stretch, seen: list[Observation], hashes: list[int], health: list[tuple[float, ...]]
+    stretch: Rollout, seen: list[Observation], hashes: list[int], health: list[tuple[float, ...]]
 ) -> None:
     assert stretch.times.tolist() == [o.time for o in seen]
     assert np.array_equal(stretch.positions, [o.position for o in seen])

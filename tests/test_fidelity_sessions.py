@@ -17,8 +17,8 @@ from experiments.records import EventLog, read_events
 from experiments.replaying.replay import replay
 from experiments.trial import TrialConfig, play_trial, prepare_session, run_trial
 from mjsim.errors import PhysicsError
-from mjsim.monitoring import HealthMonitor
-from mjsim.scene import compose
+from mjsim.health.monitor import HealthMonitor
+from mjsim.model.scene import compose
 
 FILES = (records.EVENTS, records.EPISODE, records.TRAJECTORY, records.RECORDING, records.PLAN)
 

@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim import avatar
 from mjsim.actions import IDLE, EventKind, Move
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.model import avatar
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
-from mjsim.scene import compose
 from mjsim.world import World
 
 HALF = np.array([0.30, 0.10])  # of the box, m

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mjsim.catalogue import Catalogue
 from mjsim.errors import AssetError
-from mjsim.footprint import Footprint, footprint
-from mjsim.scene import Scene, compile_house
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import Footprint, footprint
+from mjsim.model.scene import Scene, compile_house
 
 ROOM = '<site name="room:r" type="box" pos="1 2 1" size="3 4 1"/>'
 WEDGE = '<asset><mesh name="wedge" vertex="0 0 0 .4 0 0 0 .3 0 0 0 .5"/></asset>'

@@ -26,8 +26,8 @@ from hud.projection import CameraView, in_view
 from hud.state import HudState, Marker
 from hud.task import PlannedStep, TaskView
 from mjsim.episode import Episode
+from mjsim.model.scene import Scene, compose
 from mjsim.render import CameraPose, Renderer, render_house_map, render_pictures
-from mjsim.scene import Scene, compose
 from mjsim.testing import FrameMismatchError, compare_frame, fixtures, psnr
 from mjsim.world import World
 

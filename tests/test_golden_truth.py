@@ -16,10 +16,10 @@ from shapely import LineString, Point
 
 from experiments.house import House
 from hud.markers import BREADCRUMB_RADIUS, CHEST_HEIGHT, breadcrumbs
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import Scene, compose
 from mjsim.render import CameraPose, Labels, Renderer
-from mjsim.scene import Scene, compose
 
 EPISODE = Path(__file__).parent / "golden" / "episode.json"
 
@@ -211,7 +211,7 @@ from hud.compose import Compositor
 from hud.conditions import condition
 from mjsim.episode import Episode
 from mjsim.render import Renderer, render_pictures
-from mjsim.scene import compose
+from mjsim.model.scene import compose
 from mjsim.world import World
 import pathlib
 house = House.load("apartment")

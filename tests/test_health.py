@@ -7,9 +7,9 @@ import pytest
 
 from experiments.health import summarise_health
 from mjsim.actions import IDLE, EventKind, Pick
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
-from mjsim.scene import compose
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import compose
 from mjsim.world import World
 
 

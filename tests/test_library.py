@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim import library
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode
 from mjsim.errors import AssetError
-from mjsim.library import LOOKS, Library
-from mjsim.recording import model_fingerprint
-from mjsim.scene import compile_house, compose
+from mjsim.model import library
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.library import LOOKS, Library
+from mjsim.model.scene import compile_house, compose
+from mjsim.world_state import model_fingerprint
 
 _OBJECT = """
 <mujoco>
@@ -90,7 +90,9 @@ def test_files_are_read_once_and_models_do_not_change(
 ) -> None:
     read: list[str] = []
     original = library.read_model
-    monkeypatch.setattr("mjsim.scene.read_model", lambda p, **kw: (read.append(str(p)), original(p, **kw))[1])
+    monkeypatch.setattr(
+        "mjsim.model.scene.read_model", lambda p, **kw: (read.append(str(p)), original(p, **kw))[1]
+    )
     monkeypatch.setattr(library, "read_model", lambda p, **kw: (read.append(str(p)), original(p, **kw))[1])
     catalogue = Catalogue.load(str(small_house / "catalogue.toml"))
     first, second = compile_house(catalogue), compile_house(catalogue)

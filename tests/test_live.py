@@ -12,7 +12,7 @@ from experiments.house import House
 from experiments.records import EventLog
 from experiments.replaying.logged_plans import LoggedPlans
 from experiments.trial import TrialConfig, prepare_session
-from mjsim.scene import compose
+from mjsim.model.scene import compose
 from planner.checker import check
 from planner.errors import ProblemError, UnreachableError
 from planner.exact.solver import ExactSolver

@@ -10,9 +10,9 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from mjsim.assets import models_root
-from mjsim.authoring.objects import build_meshes
-from mjsim.catalogue import Catalogue
+from authoring.objects import build_meshes
+from mjsim.model.assets import models_root
+from mjsim.model.catalogue import Catalogue
 
 CATALOGUE = Catalogue.load()
 FLOOR = """<mujoco><option timestep="0.004" integrator="implicitfast" cone="elliptic" impratio="10"/>

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from experiments.glasses import FilmConfig
+from experiments.first_person import FilmConfig
 from experiments.replaying.overview import Overview, camera_path
-from mjsim.footprint import Footprint
+from mjsim.model.footprint import Footprint
 from mjsim.world import World
 
 BOUNDS = (-1.0, 2.0, 9.0, 8.0)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mjsim.catalogue import Catalogue
 from mjsim.errors import AssetError, RenderError
+from mjsim.model.catalogue import Catalogue
 from mjsim.render import render_picture, render_pictures
 
 RED_BALL = """<mujoco><worldbody><body name="object">

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from mjsim.actions import IDLE, EventKind, Move, Pick, Place, WorldEvent
-from mjsim.catalogue import Catalogue
-from mjsim.clearance import ClearanceField
 from mjsim.episode import Episode, PlacedObject, StartPose
-from mjsim.filling import object_corners
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.clearance import ClearanceField
+from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.model.scene import Scene, compose
 from mjsim.observation import ObjectStatus
-from mjsim.person import minimum_jerk
-from mjsim.picking import lead_blend
-from mjsim.receptacles import ReceptacleGeometry
-from mjsim.rules import receptacle_distance
-from mjsim.scene import Scene, compose
+from mjsim.person.feasibility import receptacle_distance
+from mjsim.person.person import minimum_jerk
+from mjsim.person.picking import lead_blend
+from mjsim.person.slots import object_corners
 from mjsim.world import World
 
 Pose = tuple[float, float, float]

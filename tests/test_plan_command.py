@@ -206,7 +206,9 @@ def test_a_certificate_is_verified_from_its_files_alone(tmp_path, capsys, proble
     assert (answer["cost"], answer["lower_bound"]) == (written["cost"], written["lower_bound"])
     assert 0 <= answer["verified_bound"] <= answer["cost"]
     if planner == "exact":
-        assert answer["verified_bound"] == pytest.approx(answer["cost"], abs=2e-2)  # rounding of 43 legs
+        assert answer["verified_bound"] == pytest.approx(
+            answer["cost"], abs=2e-2
+        )  # rounding of 43 locomotion
         assert (answer["verified_optimal"], answer["unverified"]) == (True, "")
 
 

@@ -9,11 +9,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mjsim.actions import IDLE, Move, Pick
-from mjsim.catalogue import Catalogue
 from mjsim.errors import StateError
-from mjsim.recording import StateHash, WorldState, engine_versions, model_fingerprint
-from mjsim.scene import compose
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import compose
 from mjsim.world import World
+from mjsim.world_state import StateHash, WorldState, engine_versions, model_fingerprint
 
 FEW = settings(
     max_examples=15,

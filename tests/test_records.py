@@ -15,9 +15,9 @@ from experiments.files import read_arrays, read_json
 from experiments.records import EPISODE, EVENTS, EventLog, Trajectory, decode_action, read_events
 from experiments.run_directory import keep_failed, run_directory
 from mjsim.actions import Move, Pick, Place
-from mjsim.health import HealthSample
+from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
 
 
 def observation(time=0.0, hands=(None, "b")):
@@ -130,7 +130,7 @@ def test_a_stretch_is_recorded_as_its_single_steps(tmp_path):
         for step in range(7)
     ]
     healths = [HealthSample(penetration_m=0.001 * step, weld_error_m=(math.nan, 0.1)) for step in range(7)]
-    stretch = Stretch.of(seen[2:], list(range(5)), seen[-1], (), [h.row for h in healths[2:]])
+    stretch = Rollout.of(seen[2:], list(range(5)), seen[-1], (), [h.row for h in healths[2:]])
     single, at_once = Trajectory(["a", "b"]), Trajectory(["a", "b"])
     for trajectory in (single, at_once):
         trajectory.append(seen[0], Pick("b"), healths[0])

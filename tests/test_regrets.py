@@ -7,8 +7,8 @@ from planning_cases import Task, two_rooms
 
 from experiments import regrets
 from experiments.regrets import RegretsAtOnce, RegretsBeside
-from planner.judge import Judge
 from planner.plan import VisitKind
+from planner.regret_evaluator import RegretEvaluator
 from planner.replanner import Replanner
 from planner.solver import solver
 
@@ -24,13 +24,13 @@ def slow(monkeypatch):
     go = threading.Event()
     states = []
 
-    class Slow(Judge):
+    class Slow(RegretEvaluator):
         def all(self, state, plan=None):
             states.append(state)
             go.wait(10)
             return super().all(state, plan)
 
-    monkeypatch.setattr(regrets, "Judge", Slow)
+    monkeypatch.setattr(regrets, "RegretEvaluator", Slow)
     return go, states
 
 
@@ -74,7 +74,7 @@ def test_visits_beside_a_person_are_judged_after_the_task(geodesics):
     expected = []
     for number in range(4):
         plan = planned(geodesics, task)
-        stop = list(Judge(geodesics).all(task.state))[-1]
+        stop = list(RegretEvaluator(geodesics).all(task.state))[-1]
         for keeper in (beside, at_once):
             keeper.begin(task.state, plan)
         expected.append((number, at_once.judge(number, stop)))

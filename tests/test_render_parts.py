@@ -233,7 +233,7 @@ class GLContext:
 module.GLContext = GLContext
 import mujoco
 sys.modules["mujoco.egl"] = module
-from mjsim.environment_report import environment_report
+from mjsim.diagnostics import environment_report
 from mjsim.errors import RenderError
 from mjsim.render import gl_info
 try:

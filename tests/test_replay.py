@@ -15,7 +15,7 @@ from experiments import records
 from experiments.cli import main
 from experiments.errors import RecordError, ReplayError
 from experiments.files import read_arrays, read_json
-from experiments.glasses import FilmConfig
+from experiments.first_person import FilmConfig
 from experiments.house import House
 from experiments.records import read_events
 from experiments.replaying.replay import ReplayFilm, replay

@@ -16,12 +16,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import SamplingError
-from mjsim.sampling import sample_episode, sample_points
-from mjsim.scene import compose
-from mjsim.settling import settle
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.sampling import sample_episode, sample_points
+from mjsim.model.scene import compose
+from mjsim.model.settling import settle
 from planner.navmesh import NavMesh
 
 LEVELS = (6, 12, 18, 24)
@@ -183,10 +183,10 @@ def test_same_seed_same_episode_in_another_process(
 ) -> None:
     code = """
 import hashlib
-from mjsim.catalogue import Catalogue
-from mjsim.footprint import footprint
-from mjsim.sampling import sample_episode
-from mjsim.scene import compile_house
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import footprint
+from mjsim.model.sampling import sample_episode
+from mjsim.model.scene import compile_house
 from planner.navmesh import NavMesh
 catalogue = Catalogue.load("apartment")
 plan = footprint(compile_house(catalogue))

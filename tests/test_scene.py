@@ -7,13 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim import avatar
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import AssetError, EpisodeError
-from mjsim.receptacles import ReceptacleGeometry, receptacle_geometries
-from mjsim.rooms import RoomMap
-from mjsim.scene import Scene, SceneIndex, compile_house, compose, compose_house
+from mjsim.model import avatar
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
+from mjsim.model.rooms import RoomMap
+from mjsim.model.scene import Scene, SceneIndex, compile_house, compose, compose_house
 
 
 def small_episode(catalogue: Catalogue, *placed: tuple[str, float, float]) -> Episode:

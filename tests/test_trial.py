@@ -11,7 +11,7 @@ import pytest
 from experiments import records
 from experiments.errors import ConfigError, SessionError
 from experiments.files import read_json
-from experiments.glasses import FilmConfig
+from experiments.first_person import FilmConfig
 from experiments.house import House
 from experiments.records import read_events
 from experiments.trial import TrialConfig, run_trial

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
-from mjsim.scene import Scene, compose
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import Scene, compose
 from mjsim.visibility import FieldOfView, visible_objects
 from planner.navmesh import NavMesh
 

@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 from mjsim.actions import Move
-from mjsim.catalogue import Catalogue
+from mjsim.model.catalogue import Catalogue
 from mjsim.episode import Episode
-from mjsim.scene import compose
+from mjsim.model.scene import compose
 from mjsim.warmup import compile_kernels
 from mjsim.world import World
 

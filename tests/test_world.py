@@ -13,14 +13,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mjsim import avatar
 from mjsim.actions import IDLE, Action, EventKind, Move, Pick, Place, Refusal, WorldEvent
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import ActionError, AssetError, PhysicsError
+from mjsim.model import avatar
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus
 from mjsim.options import WorldOptions
-from mjsim.scene import compose
 from mjsim.world import World
 
 CATEGORY = {"cube": "solids", "wedge": "solids", "ball": "rounds"}

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from mjsim.actions import Action, EventKind, Move, Pick, Place
-from mjsim.catalogue import Catalogue
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import ActionError, PhysicsError
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES, WorldOptions
-from mjsim.scene import Scene, compose
 from mjsim.world import World
 from mjsim.worlds import Worlds
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.records import Event
 from mjsim.files import replacing
+from mjsim.model.scene import Scene
 from mjsim.render import render_floorplan
-from mjsim.scene import Scene
 from mjsim.world import World
 
 # Okabe-Ito colours, told apart in all common kinds of colour vision.

@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from mjsim.environment_report import environment_report
+from mjsim.diagnostics import environment_report
 
 DESCRIPTION = """\
 Show versions, the EGL vendor and the GL renderer, whether rendering happens in software, and what to install when

@@ -7,8 +7,8 @@ from typing import Any
 from rich.console import Console
 
 from experiments.commands.options import add_frame
+from experiments.first_person import FilmConfig
 from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
-from experiments.glasses import FilmConfig
 from experiments.trial import TrialConfig
 
 SEED = 7

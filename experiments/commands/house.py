@@ -6,8 +6,8 @@ from typing import Any
 
 from experiments.commands.options import add_house
 from experiments.house import House
-from mjsim.export import export_house
-from mjsim.scene import compose
+from mjsim.model.export import export_house
+from mjsim.model.scene import compose
 
 DESCRIPTION = """\
 Sample a disorganized house and write it as self-contained MJCF: the file, its meshes and textures in a folder

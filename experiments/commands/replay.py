@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from experiments.commands.options import add_frame, assistance_help
 from experiments.errors import ConfigError, ReplayError
-from experiments.glasses import FilmConfig
+from experiments.first_person import FilmConfig
 from experiments.replaying.overview import CAMERAS, FIRST_PERSON
 from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
 

@@ -17,7 +17,7 @@ from experiments.commands.options import (
     add_user,
     assistance_help,
 )
-from experiments.glasses import FilmConfig
+from experiments.first_person import FilmConfig
 from experiments.session import Progress as SessionProgress
 from experiments.trial import TrialConfig, run_trial
 

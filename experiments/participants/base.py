@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.known_house import KnownHouse
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult
-from mjsim.kinematics import Legs
+from mjsim.fidelity.kinematics import LocomotionState
 
 Point = NDArray[np.float64]
 
@@ -165,12 +165,12 @@ class Outlook:
     """What a walk depends on as long as nothing happens; not for deciding, only for foreseeing one's own steps.
 
     Attributes:
-        legs: What moves the person.
+        locomotion: What moves the person.
         limit: How many control steps to foresee at most.
         stray: How far from the way that is shown another one is shown, m.
     """
 
-    legs: Legs
+    locomotion: LocomotionState
     limit: int
     stray: float
 

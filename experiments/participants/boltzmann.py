@@ -14,8 +14,8 @@ import numpy as np
 from experiments.errors import ConfigError
 from experiments.known_house import KnownHouse
 from experiments.participants.base import Choice, Participant, ParticipantFactory, Percept
-from experiments.participants.deciding import Decider
-from experiments.participants.errands import Errand, Visit
+from experiments.participants.visit_participant import Decider
+from experiments.participants.visit_tasks import Visit, VisitTask
 
 TEMPERATURE = 0.5  # m
 
@@ -62,7 +62,7 @@ class Boltzmann(Decider):
         self._temperature = temperature
         self._choice: Visit | None = None
 
-    def errand(self, percept: Percept) -> Errand | None:
+    def errand(self, percept: Percept) -> VisitTask | None:
         """What was drawn, until it is done with."""
         choices = {(choice.kind, choice.object): choice for choice in percept.choices}
         if not choices:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse
 from experiments.participants.base import Guidance, Outlook, Participant, Percept
-from experiments.participants.errands import NO_MOVES, Errand, ErrandRunner
+from experiments.participants.visit_tasks import NO_MOVES, VisitExecutor, VisitTask
 from mjsim.actions import IDLE, Action
 
 
@@ -15,7 +15,7 @@ class Follower:
     needs = frozenset({"goal"})
 
     def __init__(self, house: KnownHouse) -> None:
-        self._runner = ErrandRunner(house)
+        self._runner = VisitExecutor(house)
 
     def act(self, percept: Percept) -> Action:
         """Walk along the breadcrumbs; pick or place at their end."""
@@ -38,8 +38,8 @@ class Follower:
         return True
 
 
-def _errand(step: Guidance) -> Errand:
-    return Errand(step.kind, step.object, step.goal, step.path[-1])
+def _errand(step: Guidance) -> VisitTask:
+    return VisitTask(step.kind, step.object, step.goal, step.path[-1])
 
 
 def build(house: KnownHouse, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance

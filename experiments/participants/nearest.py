@@ -4,8 +4,8 @@ import numpy as np
 
 from experiments.known_house import KnownHouse
 from experiments.participants.base import Participant, Percept
-from experiments.participants.deciding import Decider
-from experiments.participants.errands import Errand, Visit, nearest_visit
+from experiments.participants.visit_participant import Decider
+from experiments.participants.visit_tasks import Visit, VisitTask, nearest_visit
 
 
 class Nearest(Decider):
@@ -21,7 +21,7 @@ class Nearest(Decider):
         """It reaches and looks on."""
         return True
 
-    def errand(self, percept: Percept) -> Errand | None:
+    def errand(self, percept: Percept) -> VisitTask | None:
         """The nearest flagpole or bin, until it is done with."""
         feasible = [("place", name) for name in percept.carried]
         if None in percept.hands:

@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse, Point
 from experiments.participants.base import Outlook, Participant, Percept
-from experiments.participants.errands import (
+from experiments.participants.visit_tasks import (
     NO_MOVES,
-    Errand,
-    ErrandRunner,
     Visit,
+    VisitExecutor,
+    VisitTask,
     estimated_distances,
     nearest_visit,
 )
-from experiments.participants.strides import TICK
+from experiments.participants.walking_rollout import TICK
 from mjsim.actions import IDLE, Action, Move
 
 LOOK_INTERVAL = 0.2  # s between two looks while walking
@@ -35,7 +35,7 @@ class Searcher:
     def __init__(self, house: KnownHouse, rng: np.random.Generator) -> None:
         self._house = house
         self._rng = rng
-        self._runner = ErrandRunner(house)
+        self._runner = VisitExecutor(house)
         self._remembered: dict[str, Point] = {}
         self._unsearched: list[tuple[str, Point]] = []
         self._target: tuple[str, Point] | None = None
@@ -59,7 +59,7 @@ class Searcher:
     def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
         """Moves up to the next look, while it walks somewhere."""
         self._look(percept)
-        steps = math.ceil((self._next_look - TICK - percept.time) / outlook.legs.gait.dt)
+        steps = math.ceil((self._next_look - TICK - percept.time) / outlook.locomotion.gait.dt)
         outlook = dataclasses.replace(outlook, limit=min(outlook.limit, steps))
         errand = self._errand(percept)
         if errand is not None:
@@ -85,7 +85,7 @@ class Searcher:
         self._next_look = percept.time + LOOK_INTERVAL
         self._remembered.update(percept.look())
 
-    def _errand(self, percept: Percept) -> Errand | None:
+    def _errand(self, percept: Percept) -> VisitTask | None:
         """What can be done with what is known: fetch the nearest known object, or bring what is carried."""
         bins = [("place", name) for name in percept.carried]
         known = [("pick", name) for name in sorted(self._remembered)]
@@ -100,7 +100,7 @@ class Searcher:
             return self._errand(percept)
         return chosen
 
-    def _has_gone(self, percept: Percept, errand: Errand) -> bool:
+    def _has_gone(self, percept: Percept, errand: VisitTask) -> bool:
         refused = percept.answer is not None and not percept.answer.applied
         near = float(np.linalg.norm(errand.goal - percept.position)) < GONE
         return refused and near and errand.object not in percept.look()

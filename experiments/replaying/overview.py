@@ -7,14 +7,14 @@ from types import TracebackType
 import numpy as np
 
 from experiments.assistant import Assistant
-from experiments.glasses import FilmConfig
+from experiments.first_person import FilmConfig
 from experiments.video import VideoWriter
 from hud.state import Marker, Rgba, Vec3
-from mjsim.avatar import EYE_HEIGHT, TRUNK_RADIUS
+from mjsim.model.avatar import EYE_HEIGHT, TRUNK_RADIUS
+from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.render import CameraPose, Renderer
 from mjsim.render.stage import TOP_DOWN_GROUPS
-from mjsim.scene import Scene
 from mjsim.world import World
 
 FIRST_PERSON, TOP_DOWN, FREE = "first-person", "top-down", "free"

@@ -8,7 +8,7 @@ from pathlib import Path
 from experiments import records
 from experiments.errors import ConfigError, RecordError
 from experiments.files import read_json
-from experiments.glasses import FilmConfig, Filming, Glasses
+from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
 from experiments.house import House
 from experiments.replaying.check import first_fault
 from experiments.replaying.overview import CAMERAS, FIRST_PERSON, Overview, camera_path
@@ -124,7 +124,7 @@ def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[
     path = stack.enter_context(replacing(film.path))
     config, scene, house = film.config, replayer.scene, replayer.house
     if film.camera == FIRST_PERSON:
-        glasses = stack.enter_context(Glasses(scene, house, config))
+        glasses = stack.enter_context(FirstPersonRenderer(scene, house, config))
         video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))
         return Filming(glasses, video), video
     camera = camera_path(film.camera, house.bounds, config.width / config.height, film.eye, film.target)

@@ -11,7 +11,7 @@ from experiments.assistant import Assistant
 from experiments.errors import RecordError, ReplayError
 from experiments.house import House
 from experiments.participants.base import Outlook, Percept
-from experiments.participants.errands import NO_MOVES
+from experiments.participants.visit_tasks import NO_MOVES
 from experiments.recording import Recording, provenance
 from experiments.records import Event, EventLog
 from experiments.replaying.logged_plans import LoggedPlans
@@ -19,9 +19,9 @@ from experiments.replaying.run_record import WORLD_EVENTS, Fault, RunRecord
 from experiments.session import INTERRUPTED, PHYSICS_ERROR, Session, Viewer
 from mjsim.actions import Action, WorldEvent
 from mjsim.errors import PhysicsError, StateError
+from mjsim.model.scene import compose
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
-from mjsim.scene import compose
 from mjsim.world import World
 from planner.replanner import Replanner
 

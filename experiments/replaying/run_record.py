@@ -16,9 +16,9 @@ from experiments.files import read_arrays
 from experiments.recording import Recorded, action_hashes
 from experiments.records import STATUS_CODE, Event, LogDigest, decode_action
 from mjsim.actions import Action, EventKind
-from mjsim.avatar import EYE_HEIGHT
 from mjsim.episode import Episode
 from mjsim.errors import EpisodeError
+from mjsim.model.avatar import EYE_HEIGHT
 from mjsim.observation import Observation
 
 STATUS = {code: status for status, code in STATUS_CODE.items()}

@@ -14,7 +14,7 @@ from experiments.house import House
 from experiments.participants.walking import path_length, point_along, project, wrap_angle
 from mjsim.actions import IDLE, Action, EventKind, Move, Pick
 from mjsim.episode import Episode, PlacedObject, StartPose
-from mjsim.scene import compose
+from mjsim.model.scene import compose
 from mjsim.world import World
 
 SEED = 2027

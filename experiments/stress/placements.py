@@ -15,8 +15,8 @@ from experiments.house import House
 from mjsim.actions import IDLE, EventKind, Pick, Place
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import PhysicsError
-from mjsim.rules import receptacle_distance
-from mjsim.scene import compose
+from mjsim.model.scene import compose
+from mjsim.person.feasibility import receptacle_distance
 from mjsim.world import World
 
 SEED = 2026

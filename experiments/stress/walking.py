@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.participants.walking import point_along
 from mjsim.actions import Move
-from mjsim.avatar import TRUNK_RADIUS
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import PhysicsError
-from mjsim.footprint import footprint
+from mjsim.model.avatar import TRUNK_RADIUS
+from mjsim.model.footprint import footprint
+from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
-from mjsim.scene import compose
 from mjsim.world import World
 from planner.errors import UnreachableError
 
@@ -45,8 +45,8 @@ class Walk:
         speed: Commanded speed, m/s.
         simulated: Simulated time, s.
         tunnelled: Control steps at which the body's axis was in something solid or had crossed it.
-        stuck: Escapes in which the body got no farther than `NOT_STUCK` m from where it was.
-        escapes: Escapes tried.
+        stuck: AnomalyDetector in which the body got no farther than `NOT_STUCK` m from where it was.
+        escapes: AnomalyDetector tried.
         drift: How far the body moved in the last second of standing still, m, by occasion.
         turned: How far it turned then, rad, by occasion.
         overlap: Depth of the trunk in walls and furniture at each control step, m.

@@ -11,10 +11,10 @@ from mjsim.environments.dm_physics import physics_of
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.layout import HouseKit
 from mjsim.episode import Episode
+from mjsim.model.sampling import sample_episode
+from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
 from mjsim.render import Labels, Renderer
-from mjsim.sampling import sample_episode
-from mjsim.scene import compose
 from mjsim.world import World
 
 _LEVEL = 41  # keeps the choice of a level apart from what the seed decides in the house

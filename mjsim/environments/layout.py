@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.catalogue import Catalogue
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.navigable import NavigableBuilder, installed_builder
-from mjsim.footprint import Footprint, footprint
-from mjsim.sampling import NavigablePoints
-from mjsim.scene import compile_house
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import Footprint, footprint
+from mjsim.model.sampling import NavigablePoints
+from mjsim.model.scene import compile_house
 
 
 @dataclass(frozen=True)

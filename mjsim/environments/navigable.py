@@ -12,7 +12,7 @@ from typing import Protocol
 from numpy.typing import ArrayLike
 
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.sampling import NavigablePoints
+from mjsim.model.sampling import NavigablePoints
 
 GROUP = "mjsim.navigable"
 

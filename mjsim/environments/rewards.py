@@ -8,8 +8,8 @@ import numpy as np
 
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.episode import CAPACITY
+from mjsim.model.scene import Scene
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.scene import Scene
 
 WALKING_SPEED = 1.3  # m/s
 HANDLING_TIME = 2.0  # s, about what a pick or a place takes

@@ -6,8 +6,8 @@ from mjsim.fidelity.event import Event
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.tier import Tier
 from mjsim.fidelity.windows import Windows
+from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
-from mjsim.scene import Scene
 
 __all__ = ["Tier", "make_tier"]
 

@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 
 from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick
 from mjsim.errors import StateError
-from mjsim.fidelity.choreography import Choreographer, Plan
 from mjsim.fidelity.full import Full
-from mjsim.fidelity.strides import Rows
-from mjsim.fidelity.walker import Walker
-from mjsim.health import Health, HealthSample
-from mjsim.kinematics import Legs
+from mjsim.fidelity.kinematic_steps import Rows
+from mjsim.fidelity.kinematic_world import Walker
+from mjsim.fidelity.kinematics import LocomotionState
+from mjsim.fidelity.motion_planner import MotionPlanner, Plan
+from mjsim.health.values import Health, HealthSample
+from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
-from mjsim.recording import WorldState
-from mjsim.scene import Scene
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
+from mjsim.world_state import WorldState
 
 
 @dataclass(eq=False)
@@ -44,15 +44,15 @@ class Event:
     """The tier `event`.
 
     Attributes:
-        ledger: Who holds what, what is put away, what happened in the latest control step.
+        episode_state: Who holds what, what is put away, what happened in the latest control step.
     """
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         self._scene = scene
         self._full = Full(scene, options)
-        self.ledger = self._full.ledger
+        self.episode_state = self._full.episode_state
         self._walker = Walker(scene, options, self._full.person.rig, self._full.carrying)
-        self._choreographer = Choreographer(self._full, self._walker)
+        self._motion_planner = MotionPlanner(self._full, self._walker)
         self._motion: _Motion | None = None
         self._written = False
 
@@ -85,9 +85,9 @@ class Event:
         return self._walker.health_sample
 
     @property
-    def legs(self) -> Legs | None:
+    def locomotion(self) -> LocomotionState | None:
         """What the walk depends on; None while the person picks or places."""
-        return None if self.busy else self._walker.legs
+        return None if self.busy else self._walker.locomotion
 
     def reset(self) -> None:
         """Return to the episode's beginning."""
@@ -103,7 +103,7 @@ class Event:
             result = self._full.resolve(action, busy=self.busy)
             if result is not None and result.applied:
                 self._motion = self._begin(result)
-        self.ledger.events = []
+        self.episode_state.events = []
         if self._motion is None:
             self._walker.step(action if isinstance(action, Move) else IDLE)
         else:
@@ -111,24 +111,26 @@ class Event:
         self._written = False
         return result
 
-    def walk(self, moves: NDArray[np.float64]) -> Stretch:
+    def walk(self, moves: NDArray[np.float64]) -> Rollout:
         """One control step per row (n, 4)."""
-        self.ledger.events = []
+        self.episode_state.events = []
         self._written = self._written and not len(moves)
-        return self._walker.stretch(self._walker.rows(moves), self.ledger)
+        return self._walker.stretch(self._walker.rows(moves), self.episode_state)
 
-    def finish(self) -> Stretch:
+    def finish(self) -> Rollout:
         """Play what is under way to its end, or until a step brings events."""
-        self.ledger.events = []
+        self.episode_state.events = []
         if self._motion is None:
             return self.walk(np.zeros((0, 4)))
         rows = self._play(self._motion, self._motion.halt + 1)
         self._written = False
-        return self._walker.stretch(rows, self.ledger, busy=self.busy, events=self.ledger.events)
+        return self._walker.stretch(
+            rows, self.episode_state, busy=self.busy, events=self.episode_state.events
+        )
 
     def observation(self) -> Observation:
         """The present state."""
-        return self._walker.observation(self.ledger, busy=self.busy)
+        return self._walker.observation(self.episode_state, busy=self.busy)
 
     def state_hash(self) -> int:
         """64 bits that differ whenever the state differs (up to chance)."""
@@ -136,7 +138,7 @@ class Event:
 
     def state(self) -> WorldState:
         """Everything from which `restore` goes on."""
-        memory = {"health": self._full.person.monitor.memory(), **self.ledger.memory()}
+        memory = {"health": self._full.person.monitor.memory(), **self.episode_state.memory()}
         return WorldState(self._walker.pack(), json.dumps(memory))
 
     def restore(self, state: WorldState) -> None:
@@ -148,7 +150,7 @@ class Event:
         self._walker.unpack(state.physics)
         try:
             memory = json.loads(state.memory)
-            self.ledger.recall(memory)
+            self.episode_state.recall(memory)
             self._full.person.monitor.recall(memory["health"])
         except (KeyError, TypeError, ValueError) as error:
             raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
@@ -157,9 +159,9 @@ class Event:
     def _begin(self, result: ActionResult) -> _Motion:
         hand, item = self._full.hand_for(result)
         if isinstance(result.action, Pick):
-            return _Motion(self._choreographer.pick(hand, item), result, hand, item)
+            return _Motion(self._motion_planner.pick(hand, item), result, hand, item)
         receptacle = self._scene.receptacles[str(result.receptacle)]
-        return _Motion(self._choreographer.place(hand, item, receptacle), result, hand, item)
+        return _Motion(self._motion_planner.place(hand, item, receptacle), result, hand, item)
 
     def _play(self, motion: _Motion, until: int) -> Rows:
         """Go on to control step `until` of a motion, and report what happened in the last one."""
@@ -169,13 +171,13 @@ class Event:
         motion.played = until
         for step, kind, item in plan.incidents:
             if step == until - 1 and kind is EventKind.DISLODGED:
-                self.ledger.dislodged(walker.time, item)
+                self.episode_state.dislodged(walker.time, item)
             elif step == until - 1:
-                self.ledger.report(walker.time, kind, item)
+                self.episode_state.report(walker.time, kind, item)
         if until == plan.length:
             self._motion = None
             if isinstance(motion.result.action, Pick):
-                self.ledger.picked(before, motion.hand, motion.item, plan.success)
+                self.episode_state.picked(before, motion.hand, motion.item, plan.success)
             else:
-                self.ledger.placed(before, motion.item, motion.result.receptacle, plan.success)
+                self.episode_state.placed(before, motion.item, motion.result.receptacle, plan.success)
         return rows

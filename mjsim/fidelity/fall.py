@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import EventKind
-from mjsim.escapes import REST_STEPS
 from mjsim.fidelity.full import Full
-from mjsim.fidelity.handover import enter
-from mjsim.fidelity.strides import HOLDS
-from mjsim.fidelity.walker import Walker
-from mjsim.receptacles import ReceptacleGeometry
+from mjsim.fidelity.kinematic_steps import HOLDS
+from mjsim.fidelity.kinematic_world import Walker
+from mjsim.fidelity.transitions import enter
+from mjsim.health.anomalies import REST_STEPS
+from mjsim.model.receptacles import ReceptacleGeometry
 
 _COMING_TO_REST = 1.0  # s, for what still moves when the object has been found at rest
 

@@ -9,27 +9,27 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim import avatar
 from mjsim.actions import IDLE, Action, ActionResult, Move, Pick, Place
-from mjsim.carrying import Carrying
 from mjsim.errors import ActionError, StateError
-from mjsim.fidelity.ledger import Ledger
+from mjsim.fidelity.episode_state import EpisodeState
+from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.fidelity.tier import by_steps
-from mjsim.grips import Grips
-from mjsim.health import Health, HealthSample
+from mjsim.health.monitor import HealthMonitor
+from mjsim.health.values import Health, HealthSample
 from mjsim.inventory import LEFT, RIGHT
-from mjsim.kinematics import Legs
-from mjsim.monitoring import HealthMonitor
+from mjsim.model import avatar
+from mjsim.model.scene import Scene
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
-from mjsim.person import Motion, Person
-from mjsim.picking import pick, take
-from mjsim.placing import place
-from mjsim.recording import StateHash, WorldState, set_physics, take_physics
-from mjsim.rig import Rig
-from mjsim.rules import resolve_pick, resolve_place
-from mjsim.scene import Scene
-from mjsim.stretch import Stretch
+from mjsim.person.carrying import Carrying
+from mjsim.person.feasibility import resolve_pick, resolve_place
+from mjsim.person.grips import Grips
+from mjsim.person.person import Motion, Person
+from mjsim.person.picking import pick, take
+from mjsim.person.placing import place
+from mjsim.person.rig import Rig
+from mjsim.rollout import Rollout
+from mjsim.world_state import StateHash, WorldState, set_physics, take_physics
 
 # A delivered object may be shoved a little by the next one; farther out than this it is out.
 _DISLODGED_MARGIN = 0.03
@@ -51,7 +51,7 @@ class Full:
 
     Attributes:
         data: The state of the physics.
-        ledger: Who holds what, what is put away, what happened in the latest control step.
+        episode_state: Who holds what, what is put away, what happened in the latest control step.
         person: The body in this physics.
         carrying: How it keeps what it holds off the house.
     """
@@ -59,11 +59,11 @@ class Full:
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         self.scene = scene
         self.data = mujoco.MjData(scene.model)
-        self.ledger = Ledger(scene)
+        self.episode_state = EpisodeState(scene)
         rig = Rig(scene, self.data, options.control_timestep)
         grips = Grips(scene, self.data, rig)
         monitor = HealthMonitor(scene, options, rig, grips)
-        self.person = Person(scene, options, self.data, rig, grips, monitor, held=self.ledger.held)
+        self.person = Person(scene, options, self.data, rig, grips, monitor, held=self.episode_state.held)
         self.carrying = Carrying(self.person)
         self._motion: _Motion | None = None
         self._hash = StateHash(scene.model)
@@ -89,7 +89,7 @@ class Full:
         return self.person.monitor.sample
 
     @property
-    def legs(self) -> Legs | None:
+    def locomotion(self) -> LocomotionState | None:
         """Physics moves the person."""
         return None
 
@@ -103,7 +103,7 @@ class Full:
         person.monitor.reset()
         self.carrying.reset()
         self._end_motion()
-        self.ledger.reset()
+        self.episode_state.reset()
 
     def step(self, action: Action) -> ActionResult | None:
         """Advance by one control step."""
@@ -113,11 +113,11 @@ class Full:
         self.advance(action if isinstance(action, Move) else IDLE)
         return result
 
-    def walk(self, moves: NDArray[np.float64]) -> Stretch:
+    def walk(self, moves: NDArray[np.float64]) -> Rollout:
         """One control step per row (n, 4), until a step brings events."""
         return by_steps(self, (Move(*row) for row in moves.tolist()))
 
-    def finish(self) -> Stretch:
+    def finish(self) -> Rollout:
         """Idle until no pick or place is under way, or a step brings events."""
         return by_steps(self, iter(lambda: IDLE if self.busy else None, None))
 
@@ -130,17 +130,19 @@ class Full:
         if isinstance(action, Move):
             return None
         if isinstance(action, Pick):
-            return resolve_pick(self.person, action, self.ledger.inventory, self.ledger.status, busy=busy)
+            return resolve_pick(
+                self.person, action, self.episode_state.inventory, self.episode_state.status, busy=busy
+            )
         if isinstance(action, Place):
-            return resolve_place(self.person, action, self.ledger.inventory, busy=busy)
+            return resolve_place(self.person, action, self.episode_state.inventory, busy=busy)
         raise ActionError(f"expected a Move, Pick or Place, got {action!r}")
 
     def hand_for(self, result: ActionResult) -> tuple[int, int]:
         """Hand and object of a pick or place that is feasible: for a pick the free hand, or that on its side."""
         item = self.scene.index.position_of(str(result.object))
         if isinstance(result.action, Place):
-            return self.ledger.held.index(item), item
-        free = self.ledger.inventory.free_hands
+            return self.episode_state.held.index(item), item
+        free = self.episode_state.inventory.free_hands
         if len(free) == 1:
             return free[0], item
         return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item
@@ -169,7 +171,7 @@ class Full:
         Raises:
             PhysicsError: MuJoCo warned or the state is not finite.
         """
-        self.ledger.events = []
+        self.episode_state.events = []
         if self._motion is None:
             self.person.walk(move)
         else:
@@ -177,10 +179,10 @@ class Full:
         self.carrying.update(self._held_posture())
         self.person.rig.advance()
         for kind, item in self.person.monitor.check(self.person.held):
-            self.ledger.report(self.time, kind, item)
+            self.episode_state.report(self.time, kind, item)
         self._watch_grips()
         for item in self.dislodged():
-            self.ledger.dislodged(self.time, item)
+            self.episode_state.dislodged(self.time, item)
 
     def observation(self) -> Observation:
         """The present state."""
@@ -196,8 +198,8 @@ class Full:
             object_names=index.names,
             object_positions=positions,
             object_quaternions=quaternions,
-            object_status=tuple(self.ledger.status),
-            hands=self.ledger.inventory.hands,
+            object_status=tuple(self.episode_state.status),
+            hands=self.episode_state.inventory.hands,
             busy=self.busy,
         )
 
@@ -214,7 +216,7 @@ class Full:
             "carrying": self.carrying.memory(),
             "health": person.monitor.memory(),
             "hand_velocities": person.hand_velocities.tolist(),
-            **self.ledger.memory(),
+            **self.episode_state.memory(),
         }
         return WorldState(take_physics(self.scene.model, self.data), json.dumps(memory))
 
@@ -234,7 +236,7 @@ class Full:
             person.grips.recall(memory["grips"])
             person.hand_velocities = np.array(memory["hand_velocities"])
             self.carrying.recall(memory["carrying"])
-            self.ledger.recall(memory)
+            self.episode_state.recall(memory)
         except (KeyError, TypeError, ValueError) as error:
             raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
 
@@ -244,7 +246,7 @@ class Full:
             return []
         return [
             item
-            for item, status in enumerate(self.ledger.status)
+            for item, status in enumerate(self.episode_state.status)
             if status is ObjectStatus.DELIVERED and not self.person.asleep(item) and not self._in_place(item)
         ]
 
@@ -281,9 +283,9 @@ class Full:
             success = bool(finished.value)
         self._end_motion()
         if isinstance(motion.action, Pick):
-            self.ledger.picked(self.time, motion.hand, motion.item, success)
+            self.episode_state.picked(self.time, motion.hand, motion.item, success)
         else:
-            self.ledger.placed(self.time, motion.item, motion.receptacle, success)
+            self.episode_state.placed(self.time, motion.item, motion.receptacle, success)
 
     def _end_motion(self) -> None:
         self.person.hand_velocities = np.zeros((2, 3))
@@ -303,7 +305,7 @@ class Full:
             if item is None:
                 continue
             self.person.grips.open(hand)
-            self.ledger.lost(self.time, item)
+            self.episode_state.lost(self.time, item)
             if motion is not None and motion.hand == hand:
                 motion.steps.close()
                 self._end_motion()

@@ -8,22 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import Action, ActionResult, WorldEvent
-from mjsim.fidelity.ledger import Ledger
-from mjsim.health import Health, HealthSample
-from mjsim.kinematics import Legs
+from mjsim.fidelity.episode_state import EpisodeState
+from mjsim.fidelity.kinematics import LocomotionState
+from mjsim.health.values import Health, HealthSample
 from mjsim.observation import Observation
-from mjsim.recording import WorldState
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
+from mjsim.world_state import WorldState
 
 
 class Tier(Protocol):
     """One way to advance a household by control steps.
 
     Attributes:
-        ledger: Who holds what, what is put away, what happened in the latest control step.
+        episode_state: Who holds what, what is put away, what happened in the latest control step.
     """
 
-    ledger: Ledger
+    episode_state: EpisodeState
 
     @property
     def data(self) -> mujoco.MjData:
@@ -51,7 +51,7 @@ class Tier(Protocol):
         ...
 
     @property
-    def legs(self) -> Legs | None:
+    def locomotion(self) -> LocomotionState | None:
         """What the walk depends on; None while physics moves the person."""
         ...
 
@@ -60,14 +60,14 @@ class Tier(Protocol):
         ...
 
     def step(self, action: Action) -> ActionResult | None:
-        """Advance by one control step; events are in the ledger then."""
+        """Advance by one control step; events are in the episode_state then."""
         ...
 
-    def walk(self, moves: NDArray[np.float64]) -> Stretch:
+    def walk(self, moves: NDArray[np.float64]) -> Rollout:
         """One control step per row (n, 4), until a step brings events; not while busy."""
         ...
 
-    def finish(self) -> Stretch:
+    def finish(self) -> Rollout:
         """Idle until no pick or place is under way, or a step brings events."""
         ...
 
@@ -92,7 +92,7 @@ class Tier(Protocol):
         ...
 
 
-def by_steps(tier: Tier, actions: Iterable[Action]) -> Stretch:
+def by_steps(tier: Tier, actions: Iterable[Action]) -> Rollout:
     """One control step per action, until a step brings events."""
     observations: list[Observation] = []
     hashes: list[int] = []
@@ -103,8 +103,8 @@ def by_steps(tier: Tier, actions: Iterable[Action]) -> Stretch:
         observations.append(tier.observation())
         hashes.append(tier.state_hash())
         health.append(tier.health_sample.row)
-        events = tuple(tier.ledger.events)
+        events = tuple(tier.episode_state.events)
         if events:
             break
     last = observations[-1] if observations else tier.observation()
-    return Stretch.of(observations, hashes, last, events, health)
+    return Rollout.of(observations, hashes, last, events, health)

@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 
 from mjsim.actions import IDLE, Action, ActionResult, Move
 from mjsim.errors import StateError
-from mjsim.fidelity.choreography import Choreographer
 from mjsim.fidelity.full import Full
-from mjsim.fidelity.gestures import Script
-from mjsim.fidelity.handover import enter, leave
+from mjsim.fidelity.kinematic_world import Walker
+from mjsim.fidelity.kinematics import LocomotionState
+from mjsim.fidelity.motion_planner import MotionPlanner
+from mjsim.fidelity.motion_primitives import Script
 from mjsim.fidelity.tier import by_steps
-from mjsim.fidelity.walker import Walker
-from mjsim.health import Health, HealthSample
-from mjsim.kinematics import Legs
+from mjsim.fidelity.transitions import enter, leave
+from mjsim.health.values import Health, HealthSample
+from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
-from mjsim.recording import WorldState
-from mjsim.scene import Scene
-from mjsim.stretch import Stretch
+from mjsim.rollout import Rollout
+from mjsim.world_state import WorldState
 
 
 @dataclass(eq=False)
@@ -57,15 +57,15 @@ class Windows:
     that nobody holds sleeps or is slow.
 
     Attributes:
-        ledger: Who holds what, what is put away, what happened in the latest control step.
+        episode_state: Who holds what, what is put away, what happened in the latest control step.
     """
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         self._scene, self._options = scene, options
         self._full = Full(scene, options)
-        self.ledger = self._full.ledger
+        self.episode_state = self._full.episode_state
         self._walker = Walker(scene, options, self._full.person.rig, self._full.carrying)
-        self._choreographer = Choreographer(self._full, self._walker)
+        self._motion_planner = MotionPlanner(self._full, self._walker)
         self._coming: _Approach | None = None
         self._open = False
         self._written = False
@@ -97,9 +97,9 @@ class Windows:
         return self._full.health_sample if self._open else self._walker.health_sample
 
     @property
-    def legs(self) -> Legs | None:
+    def locomotion(self) -> LocomotionState | None:
         """What the walk depends on; None while physics or a motion moves the person."""
-        return None if self._open or self.busy else self._walker.legs
+        return None if self._open or self.busy else self._walker.locomotion
 
     def reset(self) -> None:
         """Return to the episode's beginning."""
@@ -119,7 +119,7 @@ class Windows:
             result = self._full.resolve(action, busy=self.busy)
             if result is not None and result.applied:
                 self._coming = self._approach(result)
-        self.ledger.events = []
+        self.episode_state.events = []
         self._written = False
         if self._coming is None:
             self._walker.step(action if isinstance(action, Move) else IDLE)
@@ -130,12 +130,12 @@ class Windows:
             self._open_window(self._coming)
         return result
 
-    def walk(self, moves: NDArray[np.float64]) -> Stretch:
+    def walk(self, moves: NDArray[np.float64]) -> Rollout:
         """One control step per row (n, 4), until a step brings events."""
         if not self._open:
-            self.ledger.events = []
+            self.episode_state.events = []
             self._written = self._written and not len(moves)
-            return self._walker.stretch(self._walker.rows(moves), self.ledger)
+            return self._walker.stretch(self._walker.rows(moves), self.episode_state)
         steps = iter(moves.tolist())
         physical = by_steps(self, (Move(*next(steps)) for _ in moves if self._open))
         rest = moves[len(physical) :]
@@ -143,7 +143,7 @@ class Windows:
             return physical
         return physical.then(self.walk(rest))
 
-    def finish(self) -> Stretch:
+    def finish(self) -> Rollout:
         """Idle until no pick or place is under way, or a step brings events."""
         return by_steps(self, iter(lambda: IDLE if self.busy else None, None))
 
@@ -151,7 +151,7 @@ class Windows:
         """The present state."""
         if self._open:
             return self._full.observation()
-        return self._walker.observation(self.ledger, busy=self.busy)
+        return self._walker.observation(self.episode_state, busy=self.busy)
 
     def state_hash(self) -> int:
         """64 bits that differ whenever the state differs (up to chance)."""
@@ -161,7 +161,7 @@ class Windows:
         """Everything from which `restore` goes on."""
         if self._open:
             return self._full.state()
-        memory = {"health": self._full.person.monitor.memory(), **self.ledger.memory()}
+        memory = {"health": self._full.person.monitor.memory(), **self.episode_state.memory()}
         return WorldState(self._walker.pack(), json.dumps(memory))
 
     def restore(self, state: WorldState) -> None:
@@ -178,7 +178,7 @@ class Windows:
                 return
             self._full.reset()
             self._walker.unpack(state.physics)
-            self.ledger.recall(memory)
+            self.episode_state.recall(memory)
             self._full.person.monitor.recall(memory["health"])
             self._written = False
         except (KeyError, TypeError, ValueError) as error:
@@ -193,7 +193,7 @@ class Windows:
         """How the person gets to where physics has to begin."""
         hand, item = self._full.hand_for(result)
         pitch = self._walker.pitch_target
-        script, length = self._choreographer.approach(result, hand, item)
+        script, length = self._motion_planner.approach(result, hand, item)
         return _Approach(script, length, result, hand, item, pitch)
 
     def _open_window(self, approach: _Approach) -> None:

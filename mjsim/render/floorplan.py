@@ -7,13 +7,13 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.catalogue import Catalogue
 from mjsim.errors import RenderError
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.scene import compile_house
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.stage import MAX_SIDE, TOP_DOWN_GROUPS, DirectionalLight, Stage, checked_size
-from mjsim.scene import compile_house
 
 _PAPER = 244  # grey level where there is no house
 # Above any house of one storey.

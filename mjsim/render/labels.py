@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.errors import RenderError
-from mjsim.scene import Scene
+from mjsim.model.scene import Scene
 
 BACKGROUND = -1
 HOUSE, PERSON, RECEPTACLE = "house", "person", "receptacle"

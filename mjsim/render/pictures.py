@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.catalogue import Catalogue
 from mjsim.errors import AssetError, RenderError
+from mjsim.model.catalogue import Catalogue
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile

@@ -85,7 +85,7 @@ class _Search:
         return here, left, tuple(sorted(j for j in carried if not (self._at_once and j == here)))
 
     def moves(self, state: State) -> list[tuple[int, State]]:
-        """Legs to every feasible next state."""
+        """LocomotionState to every feasible next state."""
         here, left, carried = state
         row = self._legs[here]
         found = []

@@ -1,0 +1,85 @@
+"""The glasses: render what the person sees, draw the HUD over it, and film it."""
+
+from dataclasses import dataclass
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.assistant import Assistant
+from experiments.house import House
+from experiments.video import VideoWriter
+from hud.compose import Compositor
+from hud.options.minimap import FLOORPLAN
+from hud.projection import CameraView
+from mjsim.model.scene import Scene
+from mjsim.observation import Observation
+from mjsim.render import Renderer, render_house_map, render_pictures
+from mjsim.world import World
+
+EYE = "avatar/eye"
+
+
+@dataclass(frozen=True)
+class FilmConfig:
+    """How frames are made: size in px, and the render profile."""
+
+    width: int = 640
+    height: int = 480
+    profile: str = "fast"
+
+
+class FirstPersonRenderer:
+    """Makes first-person frames with the HUD over them. Use as a context manager; leaving it frees the GL context.
+
+    Args:
+        scene: The scene to render.
+        house: The house, for the pictures of its objects and receptacles.
+        film: Frame size and render profile.
+
+    Raises:
+        RenderError: No off-screen GL context could be made, or the size or profile is unusable.
+    """
+
+    def __init__(self, scene: Scene, house: House, film: FilmConfig) -> None:
+        self._renderer = Renderer(scene.model, width=film.width, height=film.height, profile=film.profile)
+        self._house = house
+        self._pictures = render_pictures(house.catalogue)
+        self._compositor = Compositor(self._pictures)
+        self._size = (film.width, film.height)
+
+    def frame(self, world: World, observation: Observation, assistant: Assistant) -> NDArray[np.uint8]:
+        """What the person sees now, uint8 RGB of shape (height, width, 3)."""
+        pose = self._renderer.camera_view(world.data, EYE)
+        width, height = self._size
+        camera = CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
+        state = assistant.hud_state(observation, camera)
+        if state.minimap is not None and FLOORPLAN not in self._pictures:
+            self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
+            self._compositor = Compositor(self._pictures)
+        rgb = self._renderer.rgb(world.data, EYE, markers=state.markers)
+        return self._compositor.compose(rgb, state)
+
+    def close(self) -> None:
+        """Free the GL context."""
+        self._renderer.close()
+
+    def __enter__(self) -> "FirstPersonRenderer":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Filming:
+    """A viewer of a session that writes every frame to a video."""
+
+    def __init__(self, glasses: FirstPersonRenderer, video: VideoWriter) -> None:
+        self._glasses = glasses
+        self._video = video
+
+    def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
+        """Film one frame."""
+        self._video.write(self._glasses.frame(world, observation, assistant))

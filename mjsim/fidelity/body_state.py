@@ -1,0 +1,20 @@
+"""A body that walks without physics, as one array: what is at which index."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model import avatar
+
+X, Y, HEADING, PITCH = 0, 1, 2, 3  # m, m, rad (unwrapped), rad
+VX, VY, TURN_RATE, PITCH_RATE = 4, 5, 6, 7  # in the house frame, m/s, rad/s
+FORWARD, LEFT, TURN, LOOK = 8, 9, 10, 11  # commanded: m/s and rad/s in the body frame; pitch of the head, rad
+SERVO = 12  # first of four: what x, y, yaw and pitch were told last, in the house frame
+BODY_SIZE = 16
+
+
+def standing(x: float, y: float, heading: float, pitch: float = avatar.START_PITCH) -> NDArray[np.float64]:
+    """A body at rest, its commands at what it does; shape (BODY_SIZE,)."""
+    body = np.zeros(BODY_SIZE)
+    body[[X, Y, HEADING, PITCH]] = x, y, heading, pitch
+    body[LOOK] = body[SERVO + 3] = pitch
+    return body

@@ -1,0 +1,78 @@
+"""What is true of the household whatever moves it: who holds what, what is put away, and what just happened."""
+
+from typing import Any
+
+from mjsim.actions import EventKind, WorldEvent
+from mjsim.inventory import Inventory
+from mjsim.model.scene import Scene
+from mjsim.observation import ObjectStatus
+
+
+class EpisodeState:
+    """Bookkeeping of one running world.
+
+    Attributes:
+        inventory: The two hands.
+        held: Object in the left and the right hand, or None; always the same list.
+        status: Status per object.
+        events: What happened during the present control step.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._index, self._targets = scene.index, scene.episode.targets
+        self.held: list[int | None] = [None, None]
+        self.reset()
+
+    def reset(self) -> None:
+        """Empty hands, nothing put away."""
+        self._set(Inventory())
+        self.status = [ObjectStatus.LOOSE] * len(self._index.names)
+        self.events: list[WorldEvent] = []
+
+    def report(self, time: float, kind: EventKind, item: int, receptacle: str | None = None) -> None:
+        """Take note that something happened to object `item`."""
+        self.events.append(WorldEvent(time, kind, self._index.names[item], receptacle))
+
+    def picked(self, time: float, hand: int, item: int, success: bool) -> None:
+        """A pick has ended."""
+        if success:
+            self._set(self.inventory.take(hand, self._index.names[item]))
+            self.status[item] = ObjectStatus.CARRIED
+        self.report(time, EventKind.PICKED if success else EventKind.PICK_FAILED, item)
+
+    def placed(self, time: float, item: int, receptacle: str | None, success: bool) -> None:
+        """A place has ended."""
+        self._let_go(item)
+        self.status[item] = ObjectStatus.DELIVERED if success else ObjectStatus.LOOSE
+        self.report(time, EventKind.PLACED if success else EventKind.PLACE_FAILED, item, receptacle)
+
+    def lost(self, time: float, item: int) -> None:
+        """An object has slipped out of a hand."""
+        self._let_go(item)
+        self.status[item] = ObjectStatus.LOOSE
+        self.report(time, EventKind.GRIP_LOST, item)
+
+    def dislodged(self, time: float, item: int) -> None:
+        """A delivered object has left its receptacle."""
+        self.status[item] = ObjectStatus.LOOSE
+        self.report(time, EventKind.DISLODGED, item, self._targets[self._index.names[item]])
+
+    def memory(self) -> dict[str, Any]:
+        """Hands and statuses, JSON-ready."""
+        return {"hands": list(self.inventory.hands), "status": [status.value for status in self.status]}
+
+    def recall(self, memory: dict[str, Any]) -> None:
+        """Take over what `memory` gave."""
+        self._set(Inventory(*memory["hands"]))
+        self.status = [ObjectStatus(value) for value in memory["status"]]
+        self.events = []
+
+    def _let_go(self, item: int) -> None:
+        name = self._index.names[item]
+        if name in self.inventory.carried:
+            self._set(self.inventory.release(name))
+
+    def _set(self, inventory: Inventory) -> None:
+        self.inventory = inventory
+        position = self._index.position_of
+        self.held[:] = [None if name is None else position(name) for name in inventory.hands]

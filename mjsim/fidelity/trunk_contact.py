@@ -1,0 +1,182 @@
+"""The trunk against the house: a disc that slides along outlines and never enters them, as numba kernels."""
+
+import math
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from mjsim.fidelity.body_state import VX, VY, X, Y
+from mjsim.kernels import kernel
+from mjsim.model import avatar
+from mjsim.model.footprint import footprint
+
+_TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
+_LONGEST = 0.05  # m; a disc of 0.20 m cannot jump over a wall in strides of this length
+_CELL = 0.25  # m
+_KNOWN = 0.12  # m beyond the trunk that a cell of the grid knows of
+_ROUNDS = 12
+_TOUCHING = 1e-7  # m
+
+
+class Floor(NamedTuple):
+    """Outlines of what the trunk meets, with a grid that says which are near; for kernels.
+
+    Attributes:
+        edges: Edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, shape (e, 5).
+        first: Polygon p has the edges `first[p]` to `first[p + 1]`, shape (p + 1,).
+        boxes: Each polygon's least and largest x, and least and largest y, m, shape (p, 4).
+        near: Polygons that may touch the trunk, cell by cell.
+        near_first: Cell i, j has the entries of `near` from `near_first[i * columns + j]`, shape (cells + 1,).
+        origin_x, origin_y: Corner of cell 0, 0, m.
+        rows, columns: Cells along x and y.
+    """
+
+    edges: NDArray[np.float64]
+    first: NDArray[np.int64]
+    boxes: NDArray[np.float64]
+    near: NDArray[np.int64]
+    near_first: NDArray[np.int64]
+    origin_x: float
+    origin_y: float
+    rows: int
+    columns: int
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, radius: float = avatar.TRUNK_RADIUS) -> "Floor":
+        """Outlines of the static geoms at the heights of the trunk.
+
+        Raises:
+            AssetError: The house has no rooms, or a static geom's outline is not known.
+        """
+        low, high = _TRUNK_BAND
+        return cls.of_polygons(footprint(model, low=low, high=high).obstacles, radius)
+
+    @classmethod
+    def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
+        """Convex counter-clockwise polygons (k, 2), m, for a trunk of this radius, m."""
+        reach = radius + _KNOWN
+        boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
+        low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
+        high = boxes[:, 2:].max(axis=0, initial=-np.inf) + reach if len(polygons) else np.ones(2)
+        rows, columns = (int(n) for n in np.ceil((high - low) / _CELL))
+        i, j = (index.ravel() for index in np.mgrid[:rows, :columns])
+        x, y = low[0] + _CELL * i, low[1] + _CELL * j
+        cells = shapely.box(x, y, x + _CELL, y + _CELL)
+        tree = shapely.STRtree([shapely.Polygon(polygon) for polygon in polygons])
+        cell, near = tree.query(cells, predicate="dwithin", distance=reach)
+        order = np.lexsort((near, cell))
+        edges = [_edges(polygon) for polygon in polygons]
+        counts = np.bincount(cell, minlength=rows * columns)
+        return cls(
+            edges=np.concatenate([np.zeros((0, 5)), *edges]),
+            first=np.cumsum([0, *(len(sides) for sides in edges)], dtype=np.int64),
+            boxes=np.ascontiguousarray(boxes[:, [0, 2, 1, 3]]),
+            near=np.ascontiguousarray(near[order].astype(np.int64)),
+            near_first=np.concatenate(([0], np.cumsum(counts))).astype(np.int64),
+            origin_x=float(low[0]),
+            origin_y=float(low[1]),
+            rows=rows,
+            columns=columns,
+        )
+
+
+def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Start, direction and length of the sides of a polygon (k, 2), shape (k, 5); none of length 0."""
+    sides = np.roll(polygon, -1, axis=0) - polygon
+    lengths = np.hypot(sides[:, 0], sides[:, 1])
+    keep = lengths > 0.0
+    return np.column_stack((polygon[keep], sides[keep] / lengths[keep, None], lengths[keep]))
+
+
+@kernel
+def is_free(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
+    """Whether no outline comes within these distances along x and y."""
+    if max(reach_x, reach_y) > radius + _KNOWN:
+        return False  # farther than the grid knows
+    start, end = _near(x, y, floor)
+    for entry in range(start, end):
+        box = floor.boxes[floor.near[entry]]
+        if box[0] - reach_x < x < box[1] + reach_x and box[2] - reach_y < y < box[3] + reach_y:
+            return False
+    return True
+
+
+@kernel
+def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
+    """Which entries of `Floor.near` are those of a point's cell."""
+    i, j = math.floor((x - floor.origin_x) / _CELL), math.floor((y - floor.origin_y) / _CELL)
+    if not (0 <= i < floor.rows and 0 <= j < floor.columns):
+        return 0, 0
+    cell = i * floor.columns + j
+    return floor.near_first[cell], floor.near_first[cell + 1]
+
+
+@kernel
+def stride(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> None:
+    """Move the trunk by its velocity for `h` seconds, sliding along what it meets."""
+    length = h * math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
+    parts = 1 + int(length / _LONGEST)
+    for _ in range(parts):
+        x, y = body[X], body[Y]
+        body[X] += body[VX] * (h / parts)
+        body[Y] += body[VY] * (h / parts)
+        start, end = _near(x, y, floor)
+        if start < end and not _push_out(body, radius, floor, start, end):
+            # Wedged between walls: stay where it was.
+            body[X], body[Y], body[VX], body[VY] = x, y, 0.0, 0.0
+
+
+@kernel
+def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int, end: int) -> bool:
+    """Move the disc out of the polygons near[start:end], and turn its velocity along them; whether that is possible."""
+    for _ in range(_ROUNDS):
+        free = True
+        for entry in range(start, end):
+            polygon = floor.near[entry]
+            box = floor.boxes[polygon]
+            if not (
+                box[0] - radius < body[X] < box[1] + radius and box[2] - radius < body[Y] < box[3] + radius
+            ):
+                continue
+            gap, nx, ny = gap_to(
+                body[X], body[Y], floor.edges, floor.first[polygon], floor.first[polygon + 1]
+            )
+            if gap >= radius - _TOUCHING:
+                continue
+            free = False
+            body[X] += nx * (radius - gap)
+            body[Y] += ny * (radius - gap)
+            into = nx * body[VX] + ny * body[VY]
+            if into < 0.0:
+                body[VX] -= into * nx
+                body[VY] -= into * ny
+        if free:
+            return True
+    return False
+
+
+@kernel
+def gap_to(
+    x: float, y: float, edges: NDArray[np.float64], first: int, last: int
+) -> tuple[float, float, float]:
+    """Signed distance of a point to a convex polygon, m, and the direction away from it."""
+    nearest, near_x, near_y = math.inf, 0.0, 0.0
+    depth, out_x, out_y = -math.inf, 0.0, 0.0
+    for edge in range(first, last):
+        dx, dy = x - edges[edge, 0], y - edges[edge, 1]
+        ex, ey = edges[edge, 2], edges[edge, 3]
+        beside = dx * ey - dy * ex  # positive outside, to the right of the edge
+        if beside > depth:
+            depth, out_x, out_y = beside, ey, -ex
+        along = min(edges[edge, 4], max(0.0, dx * ex + dy * ey))
+        dx, dy = dx - along * ex, dy - along * ey
+        distance = dx * dx + dy * dy
+        if distance < nearest:
+            nearest, near_x, near_y = distance, dx, dy
+    nearest = math.sqrt(nearest)
+    if depth <= 0.0 or nearest < 1e-12:
+        return depth, out_x, out_y
+    return nearest, near_x / nearest, near_y / nearest

@@ -1,0 +1,1 @@
+"""What the physics is watched for: penetration, weld errors, ejections, tunnelling."""

@@ -1,0 +1,1 @@
+"""The house as data and as a compiled model: assets, catalogue, scene, sampling."""

@@ -1,0 +1,136 @@
+"""How far a point at carrying height is from walls and furniture: a signed distance field over the floor."""
+
+import math
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from mjsim.kernels import kernel
+from mjsim.model.footprint import footprint
+from mjsim.model.scene import Scene
+
+_BORDER = 0.4  # m of grid around the rooms
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceField:
+    """Signed distance to the static geoms of a band of heights, on a grid.
+
+    Attributes:
+        origin: Centre (x, y) of cell (0, 0), m.
+        resolution: Cell size, m.
+        distance: Distance of each cell's centre, m, positive outside, shape (nx, ny).
+        gradient: Direction of increasing distance, shape (nx, ny, 2).
+        frame: Origin x, y and resolution, m, for kernels, shape (3,).
+    """
+
+    origin: tuple[float, float]
+    resolution: float
+    distance: NDArray[np.float64]
+    gradient: NDArray[np.float64]
+    frame: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frame", np.array([*self.origin, self.resolution]))
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Distance, gradient and frame, for kernels."""
+        return self.distance, self.gradient, self.frame
+
+    @classmethod
+    def from_model(
+        cls, model: mujoco.MjModel, *, low: float, high: float, resolution: float = 0.04
+    ) -> "ClearanceField":
+        """Rasterise the static colliding geoms between two heights, m.
+
+        Raises:
+            AssetError: The house has no rooms.
+        """
+        plan = footprint(model, low=low, high=high)
+        xmin, ymin, xmax, ymax = plan.bounds
+        origin = np.array([xmin - _BORDER, ymin - _BORDER])
+        shape = np.ceil((np.array([xmax, ymax]) + _BORDER - origin) / resolution).astype(int) + 1
+        solid = np.zeros(tuple(shape), dtype=bool)
+        for polygon in plan.obstacles:
+            _fill(solid, (polygon - origin) / resolution)
+        outside = distance_transform_edt(~solid) if solid.any() else np.full(solid.shape, math.inf)
+        distance = np.minimum((outside - distance_transform_edt(solid)) * resolution, 9.0)
+        gradient = np.stack(np.gradient(distance, resolution), axis=-1)
+        size = np.linalg.norm(gradient, axis=-1, keepdims=True)
+        unit = np.divide(gradient, size, out=np.zeros_like(gradient), where=size > 1e-9)
+        return cls((float(origin[0]), float(origin[1])), resolution, distance, unit)
+
+    def at(self, x: float, y: float) -> tuple[float, float, float]:
+        """Distance at a point, m, interpolated, and the direction (x, y) away from the nearest geom."""
+        return clearance_at(x, y, self.distance, self.gradient, self.frame)
+
+
+@kernel
+def clearance_at(
+    x: float,
+    y: float,
+    distance: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    frame: NDArray[np.float64],
+) -> tuple[float, float, float]:
+    """What `ClearanceField.at` gives, from the field's arrays."""
+    u = (x - frame[0]) / frame[2]
+    v = (y - frame[1]) / frame[2]
+    i = min(max(int(u), 0), distance.shape[0] - 2)
+    j = min(max(int(v), 0), distance.shape[1] - 2)
+    a, b = min(max(u - i, 0.0), 1.0), min(max(v - j, 0.0), 1.0)
+    low = (1 - a) * distance[i, j] + a * distance[i + 1, j]
+    high = (1 - a) * distance[i, j + 1] + a * distance[i + 1, j + 1]
+    near_i, near_j = i + int(a > 0.5), j + int(b > 0.5)
+    return (1 - b) * low + b * high, gradient[near_i, near_j, 0], gradient[near_i, near_j, 1]
+
+
+CARRY_BAND = (0.93, 1.60)  # heights that carried things take up, m
+
+
+def carry_clearance(scene: Scene) -> ClearanceField:
+    """Clearance at the heights of what is carried; worked out once per house."""
+    low, high = CARRY_BAND
+    return scene.catalogue.library.once(
+        ("clearance", low, high), lambda: ClearanceField.from_model(scene.model, low=low, high=high)
+    )
+
+
+@kernel
+def way_is_clear(
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    frame: NDArray[np.float64],
+) -> bool:
+    """Whether nothing static can lie between two points (3,), m, by the field of `carry_clearance` alone."""
+    low, high = CARRY_BAND
+    if min(start[2], end[2]) < low or max(start[2], end[2]) > high:
+        return False
+    room, _, _ = clearance_at(start[0], start[1], distance, gradient, frame)
+    return bool(math.hypot(end[0] - start[0], end[1] - start[1]) < room - 2.0 * frame[2])
+
+
+def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:
+    """Mark the cells whose centre lies within half a cell of a convex polygon, given in cells, (k, 2)."""
+    low = np.maximum(np.floor(polygon.min(axis=0)).astype(int), 0)
+    high = np.minimum(np.ceil(polygon.max(axis=0)).astype(int) + 1, grid.shape)
+    if np.any(low >= high):
+        return
+    cells = np.stack(
+        np.meshgrid(*(np.arange(a, b) for a, b in zip(low, high, strict=True)), indexing="ij"), -1
+    )
+    inside = np.ones(cells.shape[:2], dtype=bool)
+    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        edge = end - start
+        length = float(np.hypot(*edge))
+        if length > 1e-9:  # counter-clockwise: the inside lies to the left of every edge
+            offset = cells - start
+            left_by = (edge[0] * offset[..., 1] - edge[1] * offset[..., 0]) / length
+            inside &= left_by >= -0.5
+    grid[low[0] : high[0], low[1] : high[1]] |= inside

@@ -1,0 +1,115 @@
+"""The floor plan of what a person cannot walk through: outlines of the compiled model's static geoms."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from mjsim.errors import AssetError
+from mjsim.model.rooms import RoomMap
+
+CIRCLE_SIDES = 32  # a circumscribed polygon covers 0.5 % of the radius too much, never too little
+
+_GEOM = mujoco.mjtGeom
+
+
+@dataclass(frozen=True, eq=False)
+class Footprint:
+    """Obstacles of a floor, seen from above.
+
+    Attributes:
+        obstacles: Convex polygons, counter-clockwise, m, each of shape (k, 2).
+        bounds: Extent of the rooms: (xmin, ymin, xmax, ymax), m.
+    """
+
+    obstacles: tuple[NDArray[np.float64], ...]
+    bounds: tuple[float, float, float, float]
+
+
+def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) -> Footprint:
+    """Project the static colliding geoms that reach into a band of heights.
+
+    Floors and rugs end below the band; lintels, lamps and wall cupboards begin above it. A geom that reaches
+    into the band counts with its whole outline. Objects and the person move, so they are left out.
+
+    Args:
+        model: Any compiled model that contains the house.
+        low: Lower end of the band, m.
+        high: Upper end of the band, m.
+
+    Raises:
+        AssetError: The house has no rooms, or a static geom is a height field or a zero-sized shape.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    static = model.body_weldid[model.geom_bodyid] == 0
+    colliding = (model.geom_contype | model.geom_conaffinity) != 0
+    obstacles = []
+    for geom in np.flatnonzero(static & colliding):
+        if model.geom_type[geom] == _GEOM.mjGEOM_PLANE:
+            continue
+        points = _outline_points(model, data, int(geom))
+        if points[:, 2].max() > low and points[:, 2].min() < high:
+            obstacles.append(_hull(model, int(geom), points[:, :2]))
+    return Footprint(tuple(obstacles), RoomMap.from_model(model).bounds)
+
+
+def _outline_points(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> NDArray[np.float64]:
+    """Points (k, 3) in the house frame whose projection's hull covers the geom's, with its extent in z."""
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    centre, rotation = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+    if kind == _GEOM.mjGEOM_BOX:
+        return np.asarray(_CORNERS * size @ rotation.T + centre)
+    if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF):
+        mesh = model.geom_dataid[geom]
+        first = model.mesh_vertadr[mesh]
+        vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(np.float64)
+        return np.asarray(vertices @ rotation.T + centre)
+    if kind in (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID):
+        radii = size[[0, 0, 0]] if kind == _GEOM.mjGEOM_SPHERE else size
+        return _ellipsoid(centre, rotation * radii)
+    axis = rotation[:, 2] * size[1]
+    if kind == _GEOM.mjGEOM_CAPSULE:
+        ball = np.eye(3) * size[0]
+        return np.vstack([_ellipsoid(centre - axis, ball), _ellipsoid(centre + axis, ball)])
+    if kind == _GEOM.mjGEOM_CYLINDER:
+        rim = _circle() @ (rotation[:, :2] * size[0]).T
+        return np.vstack([centre - axis + rim, centre + axis + rim])
+    raise AssetError(
+        f"static geom {_name(model, geom)} is of type {_GEOM(kind).name}, whose outline is not known; "
+        "build it from primitives or meshes"
+    )
+
+
+def _ellipsoid(centre: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Outline and top and bottom of the image of the unit ball under the columns of `axes`."""
+    # The shadow of a ball under a linear map to the plane is the ellipse that the map's SVD gives.
+    directions, lengths, _ = np.linalg.svd(axes[:2])
+    outline = np.zeros((CIRCLE_SIDES, 3))
+    outline[:, :2] = _circle() @ (directions * lengths).T
+    reach = np.array([[0.0, 0.0, np.linalg.norm(axes[2])]])
+    return np.asarray(np.vstack([outline, reach, -reach]) + centre)
+
+
+def _circle() -> NDArray[np.float64]:
+    """A polygon (k, 2) around the unit circle, touching it at the middles of its sides."""
+    angles = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES
+    radius = 1.0 / np.cos(np.pi / CIRCLE_SIDES)
+    return np.asarray(radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+
+def _hull(model: mujoco.MjModel, geom: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if extent[-1] < 1e-9:
+        raise AssetError(f"static geom {_name(model, geom)} has no area seen from above; give it a thickness")
+    return np.ascontiguousarray(points[ConvexHull(points).vertices])
+
+
+def _name(model: mujoco.MjModel, geom: int) -> str:
+    body = model.body(model.geom_bodyid[geom]).name
+    return repr(model.geom(geom).name or f"#{geom} of body {body}")
+
+
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])

@@ -1,0 +1,229 @@
+"""Sampling of disorganized houses, as in PAPER section 4.
+
+Every random choice has its own stream, keyed by the seed and its purpose, so that the points of a seed are
+the same at every level and a change in one choice leaves the others as they are.
+"""
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.errors import SamplingError
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.receptacles import receptacle_geometries
+from mjsim.model.scene import compile_house
+from mjsim.model.settling import settle
+
+POINTS = 40
+MIN_DISTANCE = 1.0  # m, between points, and from points to receptacles
+START_CLEARANCE = 0.5  # m, from the start to every object
+DROP = (0.01, 0.02)  # m above the floor
+PACKINGS, DRAWS = 20, 4000  # a jammed packing is given up as a whole, to keep the points uniform
+DROPS = 8
+RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
+
+
+class NavigablePoints(Protocol):
+    """What sampling needs to know of the floor; points are (x, y) in m."""
+
+    def sample(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """A point (2,) drawn uniformly from the part of the floor that a person can walk over."""
+
+    def is_navigable(self, point: ArrayLike) -> bool:
+        """Whether a person can stand at a point (2,)."""
+
+    def snap(self, point: ArrayLike, max_distance: float) -> NDArray[np.float64]:
+        """The nearest point (2,) that `sample` could draw: the point itself if it is one."""
+
+
+class _Purpose(enum.IntEnum):
+    """Keys of the random streams; their numbers are part of what a seed means."""
+
+    POINTS = 0
+    CATEGORIES = 1
+    MODELS = 2
+    DROP = 3
+    START = 4
+    HEADING = 5
+
+
+def sample_episode(
+    catalogue: Catalogue, navigable: NavigablePoints, *, objects: int, seed: int, points: int = POINTS
+) -> Episode:
+    """Sample a disorganized house.
+
+    Points and their categories follow from the seed alone, so that a level holds the easier ones. The object
+    model of a point is drawn anew at each level; none repeats before all of its category were used.
+
+    Args:
+        catalogue: What the house offers.
+        navigable: The navigable floor of the same house.
+        objects: How many objects: the level, 1 to `points`. Categories are equally frequent when it is a
+            multiple of their number.
+        seed: Not negative.
+        points: Size of the pool of points that the levels draw from.
+
+    Returns:
+        The episode, its objects at rest on the floor.
+
+    Raises:
+        SamplingError: An argument is out of range, or the house has no room for the points, the objects or
+            the start.
+        AssetError: A model of the catalogue is unusable.
+        PhysicsError: MuJoCo warned while the objects settled.
+    """
+    _check_arguments(objects, seed, points)
+    geometries = receptacle_geometries(compile_house(catalogue), catalogue.receptacles)
+    centers = np.array([g.center[:2] for g in geometries.values()])
+    pool = sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
+    categories = _point_categories(catalogue, points, _rng(seed, _Purpose.CATEGORIES))[:objects]
+    models = _point_models(catalogue, categories, _rng(seed, _Purpose.MODELS, objects))
+    placed = tuple(
+        PlacedObject(f"object_{i:02d}", category, model, (float(x), float(y)), (0, 0, 0), (1, 0, 0, 0))
+        for i, (category, model, (x, y)) in enumerate(zip(categories, models, pool[:objects], strict=True))
+    )
+    episode = Episode(
+        house=catalogue.name,
+        seed=int(seed),
+        start=StartPose(0.0, 0.0, float(_rng(seed, _Purpose.HEADING).uniform(-math.pi, math.pi))),
+        objects=placed,
+        receptacles=tuple(catalogue.receptacles),
+        targets={o.name: catalogue.categories[o.category].receptacle for o in placed},
+    )
+    episode = _drop(episode, catalogue, _rng(seed, _Purpose.DROP, objects))
+    return replace(episode, start=_start(episode, navigable, _rng(seed, _Purpose.START, objects)))
+
+
+def sample_points(
+    navigable: NavigablePoints,
+    keep_away: NDArray[np.float64],
+    *,
+    count: int,
+    rng: np.random.Generator,
+    min_distance: float = MIN_DISTANCE,
+) -> NDArray[np.float64]:
+    """Draw navigable points by rejection.
+
+    Args:
+        navigable: The navigable floor.
+        keep_away: Points (k, 2), m, to keep the distance from as well.
+        count: How many points.
+        rng: Random stream.
+        min_distance: Least distance between points, m.
+
+    Returns:
+        Points, m, shape (count, 2).
+
+    Raises:
+        SamplingError: They do not fit.
+    """
+    best = 0
+    for _ in range(PACKINGS):
+        taken = np.empty((len(keep_away) + count, 2))
+        taken[: len(keep_away)] = keep_away
+        filled = len(keep_away)
+        for _ in range(DRAWS):
+            point = navigable.sample(rng)
+            if (np.hypot(*(taken[:filled] - point).T) >= min_distance).all():
+                taken[filled] = point
+                filled += 1
+                if filled == len(taken):
+                    return taken[len(keep_away) :]
+        best = max(best, filled - len(keep_away))
+    raise SamplingError(
+        f"only {best} of {count} points fit at least {min_distance} m from each other and from "
+        f"{len(keep_away)} receptacles, after {PACKINGS * DRAWS - best} rejections; "
+        "ask for fewer points or use a larger house"
+    )
+
+
+def _check_arguments(objects: int, seed: int, points: int) -> None:
+    if points < 1:
+        raise SamplingError(f"points is {points}; the pool needs at least 1")
+    if not 1 <= objects <= points:
+        raise SamplingError(f"objects is {objects}; it must be 1 to {points}, the number of points")
+    if seed < 0:
+        raise SamplingError(f"seed is {seed}; it must not be negative")
+
+
+def _rng(seed: int, purpose: _Purpose, *level: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence([seed, int(purpose), *level]))
+
+
+def _point_categories(catalogue: Catalogue, count: int, rng: np.random.Generator) -> list[str]:
+    """Category per point: every block of as many points as categories is a permutation of them."""
+    keys = list(catalogue.categories)
+    blocks = -(-count // len(keys))
+    order = np.concatenate([rng.permutation(len(keys)) for _ in range(blocks)])
+    return [keys[i] for i in order[:count]]
+
+
+def _point_models(catalogue: Catalogue, categories: Sequence[str], rng: np.random.Generator) -> list[str]:
+    """Object model per point; a category's models are dealt like cards, reshuffled when all are out."""
+    decks: dict[str, list[str]] = {key: [] for key in catalogue.categories}
+    models = []
+    for category in categories:
+        if not decks[category]:
+            choices = catalogue.categories[category].objects
+            decks[category] = [choices[i] for i in rng.permutation(len(choices))]
+        models.append(decks[category].pop())
+    return models
+
+
+def _drop(episode: Episode, catalogue: Catalogue, rng: np.random.Generator) -> Episode:
+    """Drop the objects upright with a random yaw; those that roll away are dropped again."""
+    dropped = tuple(_held_up(o, rng) for o in episode.objects)
+    for _ in range(DROPS):
+        settled = settle(replace(episode, objects=dropped), catalogue)
+        if not settled.faults:
+            return replace(episode, objects=settled.objects)
+        dropped = tuple(_held_up(o, rng) if o.name in settled.faults else o for o in dropped)
+    name, fault = next(iter(settled.faults.items()))
+    model = next(o.model for o in episode.objects if o.name == name)
+    raise SamplingError(
+        f"{name}, a {model!r}, {fault} in each of {DROPS} drops at seed {episode.seed}; flatten the model, "
+        "give it rolling friction (condim 6), or take another seed"
+    )
+
+
+def _held_up(placed: PlacedObject, rng: np.random.Generator) -> PlacedObject:
+    yaw, height = rng.uniform(-math.pi, math.pi), rng.uniform(*DROP)
+    quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+    return replace(placed, position=(*placed.point, float(height)), quaternion=quaternion)
+
+
+def _start(episode: Episode, navigable: NavigablePoints, rng: np.random.Generator) -> StartPose:
+    """The objects' centroid, or else a random point in the smallest circle around it that has one."""
+    objects = np.array([o.position[:2] for o in episode.objects])
+    heading = episode.start.heading
+    centroid = objects.mean(axis=0)
+    if _can_start(centroid, objects, navigable):
+        return StartPose(float(centroid[0]), float(centroid[1]), heading)
+    for radius in RADIUS_STEP * np.arange(1, RADII + 1):
+        for _ in range(DRAWS_PER_RADIUS):
+            # The square root spreads the points evenly over the disc.
+            reach, angle = radius * math.sqrt(rng.random()), rng.uniform(-math.pi, math.pi)
+            point = centroid + reach * np.array([math.cos(angle), math.sin(angle)])
+            if _can_start(point, objects, navigable):
+                return StartPose(float(point[0]), float(point[1]), heading)
+    raise SamplingError(
+        f"no navigable start {START_CLEARANCE} m from every object within {RADIUS_STEP * RADII} m of "
+        f"their centroid {centroid.round(2).tolist()} after {RADII * DRAWS_PER_RADIUS} rejections; "
+        "take another seed"
+    )
+
+
+def _can_start(point: NDArray[np.float64], objects: NDArray[np.float64], navigable: NavigablePoints) -> bool:
+    clear = bool((np.hypot(*(objects - point).T) >= START_CLEARANCE).all())
+    # Snapping tells the floor that all objects are on from islands of it, such as the inside of a table.
+    return (
+        clear
+        and navigable.is_navigable(point)
+        and bool(np.allclose(navigable.snap(point, math.inf), point, rtol=0.0, atol=1e-9))
+    )

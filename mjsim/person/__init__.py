@@ -1,0 +1,1 @@
+"""The person's body, hands and motions in the physics."""

@@ -1,0 +1,134 @@
+"""Feasibility of pick and place: reach, sight, hands and targets (PAPER section 3.4)."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.actions import ActionResult, Pick, Place, Refusal
+from mjsim.inventory import Inventory
+from mjsim.model import avatar
+from mjsim.model.rays import first_hit, sees
+from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.observation import ObjectStatus
+from mjsim.person.person import Person
+
+_CHEST_HEIGHT = 1.2
+_RIM = 0.06  # m, from a receptacle's volume to the outside of its walls
+
+
+def resolve_pick(
+    person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus], *, busy: bool
+) -> ActionResult:
+    """Decide on a pick; reads the state only."""
+    names = person.scene.index.names
+    if busy:
+        return ActionResult(action, Refusal.BUSY, action.object)
+    if action.object is not None and action.object not in names:
+        return ActionResult(action, Refusal.UNKNOWN_OBJECT, action.object)
+    if action.object is None:
+        return _pick_nearest(person, action, inventory, status)
+    item = names.index(action.object)
+    target = person.scene.episode.targets[action.object]
+    answer = ActionResult(action, None, action.object, target)
+    if status[item] is ObjectStatus.CARRIED:
+        return replace(answer, refusal=Refusal.ALREADY_CARRIED)
+    if status[item] is ObjectStatus.DELIVERED:
+        return replace(answer, refusal=Refusal.ALREADY_DELIVERED)
+    if not inventory.free_hands:
+        return replace(answer, refusal=Refusal.HANDS_FULL)
+    if _object_distance(person, item) > person.options.pick_reach or not _object_in_sight(person, item):
+        return replace(answer, refusal=Refusal.OUT_OF_REACH)
+    return answer
+
+
+def _pick_nearest(
+    person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus]
+) -> ActionResult:
+    if not inventory.free_hands:
+        return ActionResult(action, Refusal.HANDS_FULL)
+    loose = [i for i, s in enumerate(status) if s is ObjectStatus.LOOSE]
+    near = sorted((d, i) for i in loose if (d := _object_distance(person, i)) <= person.options.pick_reach)
+    for _, item in near:
+        if _object_in_sight(person, item):
+            name = person.scene.index.names[item]
+            return ActionResult(action, None, name, person.scene.episode.targets[name])
+    return ActionResult(action, Refusal.NOTHING_IN_REACH)
+
+
+def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: bool) -> ActionResult:
+    """Decide on a place; reads the state only."""
+    scene = person.scene
+    if busy:
+        return ActionResult(action, Refusal.BUSY, action.object)
+    if action.object is not None and action.object not in scene.index.names:
+        return ActionResult(action, Refusal.UNKNOWN_OBJECT, action.object)
+    if not inventory.carried:
+        return ActionResult(action, Refusal.HANDS_EMPTY, action.object)
+    if action.object is not None and action.object not in inventory.carried:
+        return ActionResult(action, Refusal.NOT_CARRIED, action.object)
+    choices = inventory.carried if action.object is None else (action.object,)
+    targets = scene.episode.targets
+    reachable = reachable_receptacles(person)
+    name = min(choices, key=lambda n: (targets[n] not in reachable, _distance(person, targets[n])))
+    if targets[name] in reachable:
+        return ActionResult(action, None, name, targets[name])
+    if reachable:
+        nearest = min(reachable, key=lambda key: _distance(person, key))
+        return ActionResult(action, Refusal.NOT_THE_RECEPTACLE, name, nearest)
+    return ActionResult(action, Refusal.RECEPTACLE_OUT_OF_REACH, name, targets[name])
+
+
+def reachable_receptacles(person: Person) -> tuple[str, ...]:
+    """Receptacles within reach and in sight, in the episode's order."""
+    near = (k for k in person.scene.receptacles if _distance(person, k) <= person.options.place_reach)
+    return tuple(k for k in near if _receptacle_in_sight(person, k))
+
+
+def receptacle_distance(xy: NDArray[np.float64], receptacle: ReceptacleGeometry) -> float:
+    """Horizontal distance from a floor point (2,) to the nearest point of a receptacle's volume, m."""
+    local = receptacle.rotation.T @ np.array([*(xy - receptacle.center[:2]), 0.0])
+    outside = np.maximum(np.abs(local) - receptacle.half_size, 0.0)
+    return float(np.hypot(outside[0], outside[1]))
+
+
+def _distance(person: Person, key: str) -> float:
+    return receptacle_distance(person.rig.position, person.scene.receptacles[key])
+
+
+def _object_distance(person: Person, item: int) -> float:
+    return float(np.linalg.norm(person.center(item)[:2] - person.rig.position))
+
+
+def _lookouts(person: Person) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return person.rig.eye, np.array([*person.rig.position, _CHEST_HEIGHT])
+
+
+def _object_in_sight(person: Person, item: int) -> bool:
+    """Whether the centre or a grip shows to the eye or the chest; nothing is taken through a wall."""
+    points = [person.center(item), *(person.grips.point(item, grip) for grip in avatar.GRIPS)]
+    model, data = person.scene.model, person.data
+    return any(sees(model, data, eye, point) for eye in _lookouts(person) for point in points)
+
+
+def _receptacle_in_sight(person: Person, key: str) -> bool:
+    """Whether the volume's top shows, at its middle or the point nearest to the person.
+
+    Its own rim does not hide it: what the line of sight meets within the container's outline belongs to it.
+    """
+    receptacle = person.scene.receptacles[key]
+    eye = np.array([*person.rig.position, avatar.EYE_HEIGHT])
+    half = receptacle.half_size
+    nearest = np.clip(
+        (receptacle.rotation.T @ (eye - receptacle.center))[:2], -0.8 * half[:2], 0.8 * half[:2]
+    )
+    for at in (np.zeros(2), nearest):
+        towards = receptacle.center + receptacle.rotation @ np.array([*at, half[2]]) - eye
+        distance, _ = first_hit(person.scene.model, person.data, eye, towards, static_only=True)
+        if distance >= 1.0:
+            return True
+        local = receptacle.rotation.T @ (eye + distance * towards - receptacle.center)
+        if np.all(np.abs(local[:2]) <= half[:2] + _RIM):
+            return True
+    return False

@@ -1,0 +1,180 @@
+"""What every motion of the person uses: scene, state, servos, grips and simple body movements."""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.actions import Move
+from mjsim.health.monitor import HealthMonitor
+from mjsim.kernels import kernel
+from mjsim.model import avatar
+from mjsim.model.scene import Scene
+from mjsim.options import WorldOptions
+from mjsim.person.grips import Grips
+from mjsim.person.postures import move_hand
+from mjsim.person.rate_limits import slew_look, slew_turn, slew_walk
+from mjsim.person.receptacle_heights import ReceptacleHeights
+from mjsim.person.rig import Rig
+
+# A motion sets the servos, yields once per control step, and returns whether it succeeded.
+Motion = Generator[None, None, bool]
+Steps = Generator[None, None, None]
+
+TURN_GAIN = 6.0  # 1/s
+FACE_TIMEOUT = 3.0  # s
+
+
+@dataclass(eq=False)
+class Person:
+    """The body of the person in one running world.
+
+    Attributes:
+        held: Index of the object in the left and the right hand, or None.
+        hand_velocities: How fast the hands' targets move where no motion moves them, m/s, shape (2, 3).
+        moving_hand: Hand that a motion moves at present; the others keep their posture.
+        receptacle_heights: Tells how full receptacles are.
+    """
+
+    scene: Scene
+    options: WorldOptions
+    data: mujoco.MjData
+    rig: Rig
+    grips: Grips
+    monitor: HealthMonitor
+    held: list[int | None] = field(default_factory=lambda: [None, None])
+    hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
+    moving_hand: int | None = None
+    receptacle_heights: ReceptacleHeights = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.receptacle_heights = ReceptacleHeights(self.scene)
+        o = self.options
+        limits = (o.max_speed, o.acceleration, o.max_turn, o.turn_acceleration, o.max_look)
+        self._limits = np.array([*limits, *avatar.PITCH_RANGE, o.control_timestep])
+
+    @property
+    def dt(self) -> float:
+        """Control step, s."""
+        return self.options.control_timestep
+
+    def steps(self, seconds: float) -> int:
+        """Control steps in a duration, at least 1."""
+        return max(1, round(seconds / self.dt))
+
+    def carried_bodies(self) -> frozenset[int]:
+        """Body ids of the objects in the hands."""
+        return frozenset(int(self.scene.index.bodies[item]) for item in self.held if item is not None)
+
+    def move_hand(self, hand: int, goal: NDArray[np.float64]) -> None:
+        """Move a hand's target towards a position (3,) in the body frame, slower as it comes near."""
+        x, y, z = goal.tolist()
+        move_hand(self.rig.hand_targets, self.hand_velocities, hand, x, y, z, self.dt)
+
+    def retire(self, hand: int) -> None:
+        """Move an empty hand towards its rest."""
+        self.move_hand(hand, np.array(avatar.posture(hand, avatar.REST)))
+
+    def center(self, item: int) -> NDArray[np.float64]:
+        """Centre of mass of object `item`, m, shape (3,)."""
+        return np.array(self.data.xipos[self.scene.index.bodies[item]])
+
+    def speed(self, item: int) -> float:
+        """Linear speed of object `item`, m/s."""
+        dof = self.scene.index.dofs[item]
+        return float(np.linalg.norm(self.data.qvel[dof : dof + 3]))
+
+    def asleep(self, item: int) -> bool:
+        """Whether the engine has put object `item` to sleep."""
+        return not self.data.tree_awake[self.scene.index.trees[item]]
+
+    def walk(self, move: Move) -> None:
+        """Slew the body's velocity and the head towards what is asked, within the limits."""
+        forward, left, turn, look = float(move.forward), float(move.left), float(move.turn), float(move.look)
+        slew(self.rig.motion, forward, left, turn, look, self._limits)
+
+    def turn_at(self, rate: float) -> None:
+        """Slew the yaw rate towards `rate`, rad/s."""
+        o, rig = self.options, self.rig
+        change = _clip(rate, o.max_turn) - rig.turn
+        rig.turn += _clip(change, o.turn_acceleration * self.dt)
+
+    def brake(self) -> None:
+        """Slew the walk to a stand; turning and looking are left to the motion."""
+        o, rig = self.options, self.rig
+        size = math.hypot(rig.motion[0], rig.motion[1])
+        rig.motion[:2] *= max(0.0, size - o.acceleration * self.dt) / size if size else 0.0
+
+    def turn_towards(self, error: float) -> None:
+        """Slew the yaw rate so that a heading error, rad, decays without overshoot."""
+        self.turn_at(TURN_GAIN * error)
+
+    def glance(self, point: NDArray[np.float64]) -> None:
+        """Move the head's pitch towards a point of the house frame."""
+        x, y, z = (point - self.rig.eye).tolist()
+        wanted = math.atan2(z, math.hypot(x, y))
+        self.look_towards(wanted)
+
+    def look_towards(self, pitch: float) -> None:
+        """Move the head's pitch towards an angle, rad, at the pace of a glance."""
+        rig = self.rig
+        rig.look_at_pitch(rig.pitch_target + _clip(0.25 * (pitch - rig.pitch_target), 2.0 * self.dt))
+
+    def face(
+        self, point: NDArray[np.float64], heading: float | None = None, tolerance: float = 0.35
+    ) -> Steps:
+        """Stand still and turn to a point, or to an exact heading while glancing at the point."""
+        for _ in range(self.steps(FACE_TIMEOUT)):
+            error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
+            standing = self.rig.speed < 0.1
+            if abs(error) < tolerance and standing and abs(self.rig.turn_rate) < 0.5:
+                break
+            self.brake()
+            self.turn_towards(error if abs(error) > 0.5 * tolerance else 0.0)
+            self.glance(point)
+            yield
+        self.rig.motion[:3] = 0.0
+
+
+def wrap(angle: float) -> float:
+    """An angle in [-pi, pi), rad."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def minimum_jerk(phase: float) -> float:
+    """Progress 0..1 of the smoothest point-to-point movement at a phase (Flash and Hogan, 1985), clamped."""
+    s = min(1.0, max(0.0, phase))
+    return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+
+
+@kernel
+def slew(
+    motion: NDArray[np.float64],
+    forward: float,
+    left: float,
+    turn: float,
+    look: float,
+    limits: NDArray[np.float64],
+) -> None:
+    """What `Person.walk` does to `Rig.motion`.
+
+    Args:
+        motion: Commanded velocity (forward, left), yaw rate and pitch; changed.
+        forward: Wanted velocity forward, m/s.
+        left: Wanted velocity to the left, m/s.
+        turn: Wanted yaw rate, rad/s.
+        look: Wanted rate of the head's pitch, rad/s.
+        limits: Fastest walk, change of velocity, yaw rate, change of yaw rate, pitch rate, lowest and highest
+            pitch, and the control step; SI units, (8,).
+    """
+    max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
+    slew_walk(motion, forward, left, max_speed, acceleration * dt)
+    slew_turn(motion, turn, max_turn, turn_acceleration * dt)
+    slew_look(motion, look, max_look, lowest, highest, dt)
+
+
+def _clip(value: float, limit: float) -> float:
+    return min(limit, max(-limit, value))

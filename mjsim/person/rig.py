@@ -1,0 +1,229 @@
+"""The person as servos: where the body is, where it is told to go, and the physics steps in between."""
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.errors import AssetError
+from mjsim.kernels import kernel
+from mjsim.model import avatar
+from mjsim.model.scene import Scene
+
+Vector = NDArray[np.float64]
+
+# A position servo with damping lags a moving target by kv / kp seconds; the command leads by as much.
+_LEAD = avatar.HAND_KV / avatar.HAND_KP
+_SERVOS = 10
+
+
+class Rig:
+    """Reads and commands the avatar of one simulation.
+
+    Attributes:
+        model: The compiled scene, never modified.
+        data: Its state.
+        pose: x, y, yaw and pitch of the head, then both hands in the body frame; m and rad; a view of the state, (10,).
+        rates: Their velocities, likewise, (10,).
+        motion: Commanded velocity in the body frame (forward, left), m/s, yaw rate, rad/s, and pitch, rad, (4,).
+        hand_targets: Commanded hand positions in the body frame, m, shape (2, 3).
+    """
+
+    def __init__(self, scene: Scene, data: mujoco.MjData, control_timestep: float) -> None:
+        self.model, self.data = scene.model, data
+        model = scene.model
+        self._substeps = round(control_timestep / model.opt.timestep)
+        self._dt = control_timestep
+        joints = [avatar.PREFIX + n for n in ("x", "y", "yaw", "pitch")]
+        joints += [f"{avatar.PREFIX}{hand}/{axis}" for hand in avatar.HANDS for axis in "xyz"]
+        ids = [_find(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
+        actuators = np.array([_find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in joints])
+        self.pose = _run(data.qpos, model.jnt_qposadr[ids])
+        self.rates = _run(data.qvel, model.jnt_dofadr[ids])
+        self._commands = _run(data.act, model.actuator_actadr[actuators])
+        self._ramps = _run(data.ctrl, actuators)
+        self.motion = np.zeros(4)
+        self.hand_targets = np.zeros((2, 3))
+        self._hand_targets_before = np.zeros((2, 3))
+        self._command = np.zeros(_SERVOS)
+        self.grip_sites = tuple(
+            _find(model, mujoco.mjtObj.mjOBJ_SITE, f"{avatar.PREFIX}{hand}_grip") for hand in avatar.HANDS
+        )
+        self.trunk = _find(model, mujoco.mjtObj.mjOBJ_GEOM, avatar.TRUNK)
+        self.foot = _find(model, mujoco.mjtObj.mjOBJ_GEOM, avatar.FOOT)
+        self.body = _find(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BODY)
+        self.reset()
+
+    def reset(self) -> None:
+        """Take the commands from the present state: standing still."""
+        self.motion[:] = 0.0, 0.0, 0.0, self.pose[3]
+        self.hand_targets[:] = self.pose[4:].reshape(2, 3)
+        self._hand_targets_before[:] = self.hand_targets
+        self._command[:3] = 0.0
+        self._command[3:] = self.pose[3:]
+        self._commands[:] = self._command
+        self._ramps[:] = 0.0
+
+    def memory(self) -> dict[str, Any]:
+        """The commands, JSON-ready."""
+        return {
+            "motion": self.motion.tolist(),
+            "hand_targets": self.hand_targets.tolist(),
+            "hand_targets_before": self._hand_targets_before.tolist(),
+            "command": self._command.tolist(),
+        }
+
+    def recall(self, memory: dict[str, Any]) -> None:
+        """Take the commands from what `memory` gave."""
+        self.motion[:] = memory["motion"]
+        self.hand_targets[:] = memory["hand_targets"]
+        self._hand_targets_before[:] = memory["hand_targets_before"]
+        self._command[:] = memory["command"]
+
+    @property
+    def velocity(self) -> Vector:
+        """Commanded walking velocity in the body frame (forward, left), m/s, shape (2,)."""
+        return np.array(self.motion[:2])
+
+    @velocity.setter
+    def velocity(self, velocity: Vector) -> None:
+        self.motion[:2] = velocity
+
+    @property
+    def turn(self) -> float:
+        """Commanded yaw rate, rad/s."""
+        return float(self.motion[2])
+
+    @turn.setter
+    def turn(self, rate: float) -> None:
+        self.motion[2] = rate
+
+    @property
+    def pitch_target(self) -> float:
+        """Commanded pitch of the head, rad."""
+        return float(self.motion[3])
+
+    @property
+    def position(self) -> Vector:
+        """Body axis on the floor, m, shape (2,)."""
+        return np.array(self.pose[:2])
+
+    @property
+    def heading(self) -> float:
+        """Yaw, rad, unwrapped."""
+        return float(self.pose[2])
+
+    @property
+    def pitch(self) -> float:
+        """Pitch of the head, rad, positive upwards."""
+        return float(self.pose[3])
+
+    @property
+    def planar_velocity(self) -> Vector:
+        """Velocity in the house frame, m/s, shape (2,)."""
+        return np.array(self.rates[:2])
+
+    @property
+    def speed(self) -> float:
+        """How fast the body walks, m/s."""
+        return math.hypot(self.rates[0], self.rates[1])
+
+    @property
+    def turn_rate(self) -> float:
+        """Yaw rate, rad/s."""
+        return float(self.rates[2])
+
+    @property
+    def hands(self) -> Vector:
+        """Hand positions in the body frame, m, shape (2, 3)."""
+        return np.array(self.pose[4:].reshape(2, 3))
+
+    @property
+    def eye(self) -> Vector:
+        """Eye camera in the house frame, m, shape (3,)."""
+        return np.array(avatar.eye_position(*self.pose[:4].tolist()))
+
+    def look_at_pitch(self, pitch: float) -> None:
+        """Command a pitch of the head, rad, kept within what a neck can do."""
+        low, high = avatar.PITCH_RANGE
+        self.motion[3] = min(high, max(low, pitch))
+
+    def to_body(self, point: Vector) -> Vector:
+        """A point of the house frame, (3,) m, in the body frame."""
+        x, y, heading = self.pose[:3].tolist()
+        px, py, pz = point.tolist()
+        c, s = math.cos(heading), math.sin(heading)
+        return np.array([c * (px - x) + s * (py - y), c * (py - y) - s * (px - x), pz])
+
+    def bearing(self, point: Vector) -> float:
+        """Direction of a point relative to the heading, rad in [-pi, pi]."""
+        x, y, heading = self.pose[:3].tolist()
+        dx, dy = float(point[0]) - x, float(point[1]) - y
+        c, s = math.cos(heading), math.sin(heading)
+        return math.atan2(c * dy - s * dx, c * dx + s * dy)
+
+    def advance(self) -> None:
+        """Step the physics by one control step, ramping the servos from the last commands to the new ones."""
+        ramp_servos(
+            self.pose, self.motion, self.hand_targets, self._hand_targets_before, self._command,
+            self._commands, self._ramps, self._dt,
+        )  # fmt: skip
+        mujoco.mj_step(self.model, self.data, self._substeps)
+
+
+@kernel
+def ramp_servos(
+    pose: Vector, motion: Vector, targets: Vector, targets_before: Vector, command: Vector,
+    commands: Vector, ramps: Vector, dt: float,
+) -> None:  # fmt: skip
+    """Set where the servos' commands start and how fast they change, so that they arrive after one control step.
+
+    Hands are ramped from where they were told to be, with the lead in force from the first step on.
+
+    Args:
+        pose: `Rig.pose`.
+        motion: `Rig.motion`.
+        targets: `Rig.hand_targets`.
+        targets_before: What they were a control step ago, (2, 3); overwritten.
+        command: What the servos were told last, in the house frame, (10,); overwritten.
+        commands: What they are told now: the actuators' activations, (10,); overwritten.
+        ramps: How fast that changes: the actuators' controls, (10,); overwritten.
+        dt: Control step, s.
+    """
+    heading = pose[2] + 0.5 * motion[2] * dt
+    c, s = math.cos(heading), math.sin(heading)
+    end = np.empty(_SERVOS)
+    end[0] = c * motion[0] - s * motion[1]
+    end[1] = s * motion[0] + c * motion[1]
+    end[2], end[3] = motion[2], motion[3]
+    for hand in range(2):
+        for axis in range(3):
+            lead = (targets[hand, axis] - targets_before[hand, axis]) * (_LEAD / dt)
+            servo = 4 + 3 * hand + axis
+            end[servo] = targets[hand, axis] + lead
+            command[servo] = targets_before[hand, axis] + lead
+            targets_before[hand, axis] = targets[hand, axis]
+    for servo in range(_SERVOS):
+        commands[servo] = command[servo]
+        ramps[servo] = (end[servo] - command[servo]) / dt
+        command[servo] = end[servo]
+
+
+def _run(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
+    """A view of the values at consecutive addresses."""
+    first, count = int(addresses[0]), len(addresses)
+    if not np.array_equal(addresses, np.arange(first, first + count)):
+        raise AssetError(
+            f"the person's joints lie at {addresses.tolist()} in the state, expected one after another; "
+            "compose the scene with avatar=True"
+        )
+    return values[first : first + count]
+
+
+def _find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    found = int(mujoco.mj_name2id(model, kind, name))
+    if found < 0:
+        raise AssetError(f"the model has no {kind.name} {name!r}; compose the scene with avatar=True")
+    return found

@@ -1,0 +1,137 @@
+"""How full a receptacle is, and where in it the next object goes: heights sounded all over it, and the best slot."""
+
+import itertools
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.kernels import kernel
+from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.person.person import Person
+
+Vector = NDArray[np.float64]
+
+_WALL_GAP = 0.012
+_ELBOW_ROOM = 0.006  # m around an object on its way down
+_CELL = 0.02  # m between receptacle_heights at most
+_PROBE_ABOVE = 0.2
+_SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
+_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
+_SLOPE = 2.0  # cost of a metre that is missing below, in metres of fill
+_WORTH = 0.015  # m by which a place must be lower to be taken instead of a slot
+
+
+@dataclass(frozen=True, eq=False)
+class Footprint:
+    """Extent of a held object about the hand, in the receptacle's axes: lowest and highest corner, m, (3,)."""
+
+    low: Vector
+    high: Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Slot:
+    """Where the hand lets go.
+
+    Attributes:
+        hand: Horizontal position of the hand in the receptacle's axes, m, shape (2,).
+        fill: Height of what is below the object there, m above the centre of the receptacle's volume.
+        top: Height that everything in the receptacle stays below, likewise.
+    """
+
+    hand: Vector
+    fill: float
+    top: float
+
+
+def object_corners(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Vector:
+    """Points (k, 3) of an object's body frame, m, whose bounding box encloses its colliding geoms.
+
+    Mesh geoms give their vertices, others the corners of their bounding boxes.
+    """
+    points = []
+    for geom in geoms:
+        if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+            continue
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+        points.append(_geom_points(model, int(geom)) @ rotation.reshape(3, 3).T + model.geom_pos[geom])
+    return np.concatenate(points)
+
+
+def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[geom])
+        first = int(model.mesh_vertadr[mesh])
+        return np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], np.float64)
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    box = model.geom_aabb[geom]
+    return np.asarray(box[:3] + signs * box[3:])
+
+
+def held_footprint(
+    person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, corners: Vector
+) -> Footprint:
+    """Extent of an object, whose `corners` (k, 3) enclose it in its own frame, as `hand` holds it now."""
+    body = int(person.scene.index.bodies[item])
+    world = corners @ person.data.xmat[body].reshape(3, 3).T + person.data.xpos[body]
+    local = (world - person.data.site_xpos[person.rig.grip_sites[hand]]) @ receptacle.rotation
+    return Footprint(low=local.min(axis=0), high=local.max(axis=0))
+
+
+def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, footprint: Footprint) -> Slot:
+    """Where the object comes to lie lowest and most level.
+
+    The 2 x 2 slots come first; among equals, the one that is nearest to the person. Where another place is lower by
+    more than `_WORTH`, the object goes there. Slots and places are such that the object clears the walls where it can.
+    """
+    half = receptacle.half_size[:2]
+    middle = 0.5 * (footprint.low + footprint.high)[:2]
+    extent = 0.5 * (footprint.high - footprint.low)[:2]
+    room = np.maximum(half - extent - _WALL_GAP, 0.0)
+    points, heights = _sound(person, item, receptacle)
+    slots, places = np.clip(half * _SLOTS, -room, room), room * _PLACES
+    fills, costs = _below(np.concatenate((slots, places)), extent, points, heights)
+    me = (np.array([*person.rig.position, 0.0]) - receptacle.center) @ receptacle.rotation
+    far = np.hypot(*(slots - me[:2]).T)
+    count = len(slots)
+    best = int(np.lexsort((far, costs[:count].round(3)))[0])
+    other = count + int(costs[count:].round(3).argmin())
+    if costs[other] < costs[best] - _WORTH:
+        best = other
+    at = np.concatenate((slots, places))[best]
+    return Slot(hand=at - middle, fill=float(fills[best]), top=float(heights.max()))
+
+
+def _sound(person: Person, item: int, receptacle: ReceptacleGeometry) -> tuple[Vector, Vector]:
+    """Points (k, 2) all over the receptacle, in its axes, and the height of what lies there without `item`, m."""
+    half = receptacle.half_size
+    axes = [np.linspace(-h, h, 1 + 2 * int(np.ceil(h / _CELL))) for h in half[:2]]
+    local = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = receptacle.center[:2] + local @ receptacle.rotation[:2, :2].T
+    ignore = np.array([*person.carried_bodies(), person.scene.index.bodies[item]], np.int32)
+    top = float(receptacle.center[2] + half[2]) + _PROBE_ABOVE
+    heights = person.receptacle_heights.heights(person.data, receptacle, points, top, ignore)
+    return local, np.asarray(np.maximum(heights - receptacle.center[2], -half[2]))
+
+
+@kernel
+def _below(centres: Vector, extent: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
+    """Fill height under a footprint at each centre (k, 2), and its cost: on a slope things tip over.
+
+    What is missing below the highest point counts for more than what is filled.
+    """
+    fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
+    reach = np.maximum(extent + _ELBOW_ROOM, _CELL)  # at least one sounding
+    for k in range(len(centres)):
+        total, count = 0.0, 0
+        for p in range(len(points)):
+            dx, dy = abs(points[p, 0] - centres[k, 0]), abs(points[p, 1] - centres[k, 1])
+            if dx <= reach[0] and dy <= reach[1]:
+                fills[k] = max(fills[k], heights[p])
+                total += heights[p]
+                count += 1
+        costs[k] = fills[k] + _SLOPE * (fills[k] - total / count)
+    return fills, costs

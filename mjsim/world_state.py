@@ -1,0 +1,154 @@
+"""What makes a run repeatable: a hash of the state, checkpoints to go on from, and what the physics depends on.
+
+With sleep on, MuJoCo's state vector does not say which bodies sleep, so setting it on live data is not exact. Setting
+it after `mj_resetData` is. A run therefore passes through a checkpoint itself: it takes the state, resets, and sets
+it again. From then on it and a run that starts at the checkpoint are the same, bit for bit. Between checkpoints the
+physics is left alone. A pick or place under way is a generator, which no value can hold: checkpoints are only taken
+while the world is not busy.
+"""
+
+import functools
+import hashlib
+import platform
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.errors import StateError
+
+CHECKPOINT_PERIOD = 10.0  # s at least from one checkpoint to the next
+
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+_HASHED = int(
+    mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_EQ_ACTIVE
+)
+# Looks only: textures, colours, what the renderer needs of meshes and cameras. Names and paths decide nothing either.
+_LOOKS = (
+    "tex_",
+    "mat_",
+    "light_",
+    "cam_",
+    "skin_",
+    "mesh_normal",
+    "mesh_texcoord",
+    "mesh_facenormal",
+    "name_",
+)
+_LOOKS_ANYWHERE = ("rgba", "matid", "facetexcoord", "texcoord", "path", "names_map", "signature")
+_NO_PHYSICS = ("render", "environments")  # folders of this package that no state depends on
+
+
+@dataclass(frozen=True, eq=False)
+class WorldState:
+    """A world between two motions, complete: a world that is set to it goes on as the one that it was taken from.
+
+    Attributes:
+        physics: MuJoCo's integration state, shape (n,).
+        memory: What the world remembers beside the physics (commands, hands, statuses), as JSON, in which numbers
+            keep their full precision.
+    """
+
+    physics: NDArray[np.float64]
+    memory: str
+
+    @property
+    def hash(self) -> int:
+        """64 bits that differ whenever two states do (up to chance)."""
+        return hash64(self.physics.tobytes() + self.memory.encode())
+
+
+class StateHash:
+    """Hashes the state of one simulation: time, positions, velocities, activations, commands, active welds."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._buffer = np.zeros(mujoco.mj_stateSize(model, _HASHED))
+
+    def of(self, data: mujoco.MjData) -> int:
+        """64 bits that differ whenever the state differs (up to chance)."""
+        mujoco.mj_getState(self._model, data, self._buffer, _HASHED)
+        return hash64(self._buffer.data)
+
+
+def hash64(content: Any) -> int:
+    """The first 64 bits of the SHA-1 of some bytes; quick, and meant against mishap, not against malice."""
+    return int.from_bytes(hashlib.sha1(content, usedforsecurity=False).digest()[:8], "little")
+
+
+def take_physics(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
+    """MuJoCo's integration state, shape (n,)."""
+    physics = np.zeros(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, physics, _STATE)
+    return physics
+
+
+def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.float64]) -> None:
+    """Reset the data and set it to a state of `take_physics`; nothing of what it was before is left.
+
+    Raises:
+        StateError: The state is of another model, or not finite.
+    """
+    size = mujoco.mj_stateSize(model, _STATE)
+    if physics.shape != (size,) or not np.isfinite(physics).all():
+        raise StateError(
+            f"a state of {physics.size} numbers, {np.count_nonzero(~np.isfinite(physics))} of them not finite, does "
+            f"not fit this model, whose states have {size}; take it from a world of the same house and objects"
+        )
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_setState(model, data, physics, _STATE)
+    warmstart = data.qacc_warmstart.copy()
+    mujoco.mj_forward(model, data)
+    data.qacc_warmstart[:] = warmstart
+
+
+def model_fingerprint(model: mujoco.MjModel) -> str:
+    """16 hex digits over everything of a compiled model that moves something; looks are left out."""
+    digest = hashlib.sha256()
+    for part in (model, model.opt):
+        for name in sorted(n for n in dir(part) if not n.startswith("_") and not _is_looks(n)):
+            value = getattr(part, name)
+            if isinstance(value, np.ndarray):
+                digest.update(f"{name}{value.dtype}{value.shape}".encode())
+                digest.update(np.ascontiguousarray(value).data)
+            elif isinstance(value, bool | int | float):
+                digest.update(f"{name}{value!r}".encode())
+    return digest.hexdigest()[:16]
+
+
+def engine_versions() -> dict[str, str]:
+    """Versions of everything that decides how a state follows from the one before."""
+    return {
+        "mjsim": _own_version(),
+        "physics_code": _code_fingerprint(),
+        "mujoco": mujoco.__version__,
+        "numpy": np.__version__,
+        "machine": platform.machine(),
+    }
+
+
+def _is_looks(name: str) -> bool:
+    counts_looks = name.startswith(("ntex", "nmat", "nlight", "ncam", "nskin", "nname", "npath", "nbuffer"))
+    return counts_looks or name.startswith(_LOOKS) or any(part in name for part in _LOOKS_ANYWHERE)
+
+
+def _own_version() -> str:
+    try:
+        return version("mjsim")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+@functools.cache
+def _code_fingerprint() -> str:
+    """16 hex digits over the source of this package, since a version may span many changes."""
+    root = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        if path.relative_to(root).parts[0] not in _NO_PHYSICS:
+            digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,30 @@
+"""Regenerate the procedural textures and object meshes: ``python -m authoring [models folder]``."""
+
+import argparse
+import importlib
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from authoring.textures import build_textures
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write all generated assets and report how many there are; return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m authoring", description=__doc__)
+    default = Path(__file__).resolve().parents[2] / "models"
+    parser.add_argument("models", nargs="?", type=Path, default=default, help="models folder (%(default)s)")
+    models: Path = parser.parse_args(arguments).models
+    if not models.is_dir():
+        parser.error(f"{models} is not a folder; name the checkout's models folder")
+    textures = build_textures(models / "textures")
+    sys.stdout.write(f"{len(textures)} textures in {models / 'textures'}\n")
+    if importlib.util.find_spec("authoring.objects") is not None:
+        importlib.import_module("authoring.objects").build_meshes(models)
+        sys.stdout.write(f"object meshes in {models}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
