@@ -13,7 +13,7 @@ def models_root() -> Path:
     Raises:
         AssetError: Neither place has it.
     """
-    package = Path(__file__).resolve().parent
+    package = Path(__file__).resolve().parents[1]
     candidates = (package / "models", package.parent / "models")
     for candidate in candidates:
         if (candidate / "houses").is_dir():
