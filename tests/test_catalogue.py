@@ -122,14 +122,14 @@ def test_an_installed_package_prefers_the_models_it_carries(
     package = tmp_path / "mjsim"
     (tmp_path / "models" / "houses").mkdir(parents=True)
     (package / "models" / "houses").mkdir(parents=True)
-    monkeypatch.setattr(mjsim.model.assets, "__file__", str(package / "assets.py"))
+    monkeypatch.setattr(mjsim.model.assets, "__file__", str(package / "model" / "assets.py"))
     assert models_root() == (package / "models").resolve()
 
 
 def test_a_package_without_models_says_where_it_looked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mjsim.model.assets, "__file__", str(tmp_path / "mjsim" / "assets.py"))
+    monkeypatch.setattr(mjsim.model.assets, "__file__", str(tmp_path / "mjsim" / "model" / "assets.py"))
     with pytest.raises(AssetError) as caught:
         models_root()
     assert str(tmp_path.resolve() / "models") in str(caught.value)
