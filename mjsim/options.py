@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from mjsim.errors import ActionError
 
 FIDELITIES = ("full", "windows", "event")
+REST_STEPS = 4  # control steps in a row below `settle_speed`, after which an object is at rest
 
 
 @dataclass(frozen=True)

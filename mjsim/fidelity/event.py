@@ -138,7 +138,7 @@ class Event:
 
     def state(self) -> WorldState:
         """Everything from which `restore` goes on."""
-        memory = {"health": self._full.person.monitor.memory(), **self.episode_state.memory()}
+        memory = {"health": self._full.monitor.memory(), **self.episode_state.memory()}
         return WorldState(self._walker.pack(), json.dumps(memory))
 
     def restore(self, state: WorldState) -> None:
@@ -151,7 +151,7 @@ class Event:
         try:
             memory = json.loads(state.memory)
             self.episode_state.recall(memory)
-            self._full.person.monitor.recall(memory["health"])
+            self._full.monitor.recall(memory["health"])
         except (KeyError, TypeError, ValueError) as error:
             raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
         self._motion, self._written = None, False

@@ -11,8 +11,8 @@ from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import HOLDS
 from mjsim.fidelity.kinematic_world import Walker
 from mjsim.fidelity.transitions import enter
-from mjsim.health.anomalies import REST_STEPS
 from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.options import REST_STEPS
 
 _COMING_TO_REST = 1.0  # s, for what still moves when the object has been found at rest
 
@@ -42,7 +42,7 @@ def drop(full: Full, walker: Walker, hand: int, item: int, receptacle: Receptacl
     person = full.person
     options = person.options
     enter(full, walker)
-    person.monitor.check(person.held)  # it is in the hand, for the last time
+    full.monitor.check(person.held)  # it is in the hand, for the last time
     person.grips.open(hand)
     walker.live[HOLDS + hand] = -1
     held = [None if other == item else other for other in person.held]
@@ -69,5 +69,5 @@ def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, in
     """One control step, without physics if all sleeps that nobody holds; what happened."""
     if not full.calm(0.0):
         full.person.rig.advance()
-    happened = list(full.person.monitor.check(held))
+    happened = list(full.monitor.check(held))
     return happened + [(EventKind.DISLODGED, item) for item in full.dislodged()]

@@ -54,6 +54,7 @@ class Full:
         episode_state: Who holds what, what is put away, what happened in the latest control step.
         person: The body in this physics.
         carrying: How it keeps what it holds off the house.
+        monitor: Looks at the physics after every control step.
     """
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
@@ -62,8 +63,8 @@ class Full:
         self.episode_state = EpisodeState(scene)
         rig = Rig(scene, self.data, options.control_timestep)
         grips = Grips(scene, self.data, rig)
-        monitor = HealthMonitor(scene, options, rig, grips)
-        self.person = Person(scene, options, self.data, rig, grips, monitor, held=self.episode_state.held)
+        self.person = Person(scene, options, self.data, rig, grips, held=self.episode_state.held)
+        self.monitor = HealthMonitor(scene, options, rig, grips)
         self.carrying = Carrying(self.person)
         self._motion: _Motion | None = None
         self._hash = StateHash(scene.model)
@@ -81,12 +82,12 @@ class Full:
     @property
     def health(self) -> Health:
         """Extremes of the physics since the last reset."""
-        return self.person.monitor.snapshot()
+        return self.monitor.snapshot()
 
     @property
     def health_sample(self) -> HealthSample:
         """What the physics was like in the latest control step."""
-        return self.person.monitor.sample
+        return self.monitor.sample
 
     @property
     def locomotion(self) -> LocomotionState | None:
@@ -100,7 +101,7 @@ class Full:
         person = self.person
         person.rig.reset()
         person.grips.reset()
-        person.monitor.reset()
+        self.monitor.reset()
         self.carrying.reset()
         self._end_motion()
         self.episode_state.reset()
@@ -178,7 +179,7 @@ class Full:
             self._run_motion(self._motion)
         self.carrying.update(self._held_posture())
         self.person.rig.advance()
-        for kind, item in self.person.monitor.check(self.person.held):
+        for kind, item in self.monitor.check(self.person.held):
             self.episode_state.report(self.time, kind, item)
         self._watch_grips()
         for item in self.dislodged():
@@ -214,7 +215,7 @@ class Full:
             "rig": person.rig.memory(),
             "grips": person.grips.memory(),
             "carrying": self.carrying.memory(),
-            "health": person.monitor.memory(),
+            "health": self.monitor.memory(),
             "hand_velocities": person.hand_velocities.tolist(),
             **self.episode_state.memory(),
         }
@@ -231,7 +232,7 @@ class Full:
         self._end_motion()
         try:
             memory = json.loads(state.memory)
-            person.monitor.recall(memory["health"])
+            self.monitor.recall(memory["health"])
             person.rig.recall(memory["rig"])
             person.grips.recall(memory["grips"])
             person.hand_velocities = np.array(memory["hand_velocities"])

@@ -38,7 +38,7 @@ def enter(full: Full, walker: Walker) -> None:
     mujoco.mj_factorM(model, data)
     _put_to_sleep(data, walker)
     mujoco.mj_forward(model, data)
-    person.monitor.resume()
+    full.monitor.resume()
 
 
 def _set_velocity(

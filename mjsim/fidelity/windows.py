@@ -161,7 +161,7 @@ class Windows:
         """Everything from which `restore` goes on."""
         if self._open:
             return self._full.state()
-        memory = {"health": self._full.person.monitor.memory(), **self.episode_state.memory()}
+        memory = {"health": self._full.monitor.memory(), **self.episode_state.memory()}
         return WorldState(self._walker.pack(), json.dumps(memory))
 
     def restore(self, state: WorldState) -> None:
@@ -179,7 +179,7 @@ class Windows:
             self._full.reset()
             self._walker.unpack(state.physics)
             self.episode_state.recall(memory)
-            self._full.person.monitor.recall(memory["health"])
+            self._full.monitor.recall(memory["health"])
             self._written = False
         except (KeyError, TypeError, ValueError) as error:
             raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error

@@ -15,11 +15,11 @@ from mjsim.actions import EventKind
 from mjsim.health.scan import FAST, MOVED, OUTSIDE, PUSHED, SLOW
 from mjsim.model.rays import first_hit
 from mjsim.model.scene import Scene
+from mjsim.options import REST_STEPS
 
 MOVED_DISTANCE = 0.02  # m, from where an object was last looked at
 
 FLIGHT = 1.0  # m, horizontally
-REST_STEPS = 4  # control steps in a row
 _LOWEST, _HIGHEST = -0.05, 3.0  # m
 
 

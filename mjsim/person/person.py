@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import Move
-from mjsim.health.monitor import HealthMonitor
 from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
@@ -44,7 +43,6 @@ class Person:
     data: mujoco.MjData
     rig: Rig
     grips: Grips
-    monitor: HealthMonitor
     held: list[int | None] = field(default_factory=lambda: [None, None])
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     moving_hand: int | None = None

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.health.anomalies import REST_STEPS
 from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.options import REST_STEPS
 from mjsim.person.person import Motion, Person, Steps, minimum_jerk, wrap
 from mjsim.person.slots import Footprint, Slot, best_slot, held_footprint, object_corners
 
