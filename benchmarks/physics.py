@@ -1,9 +1,9 @@
-"""Simulated seconds per core-second of every fidelity, against the raw engine, over objects and over threads.
+"""Simulated seconds per core-second in each fidelity, and the overhead over the raw engine.
 
-What is simulated are errands: everything that a session asked of its world in a trial of the follower under optimal
-assistance, recorded and played again. The raw engine takes the same steps of the same model with the same controls.
-Both are timed in turns of a hundred calls; of each turn the best of some repetitions counts, in CPU time, so that the
-ratios hold on a busy machine as well. Threads are timed on the clock.
+The workload is recorded trials: every call that a session made to its world in a trial of the follower under optimal
+assistance. The raw engine takes the same steps of the same model with the same controls. Both are timed in chunks of
+a hundred calls. The best of several repetitions of each chunk counts, in CPU time, so that the ratios hold on a busy
+machine, too.
 """
 
 import ctypes
@@ -18,27 +18,22 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
 from experiments.house import House
-from experiments.recorded_trial import VisitTask, play, record_errand
-from mjsim.actions import Action, Move
+from experiments.recorded_trial import RecordedTrial, play, record_trial
+from mjsim.actions import Move
 from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES
 from mjsim.world import World
 from mjsim.world_state import set_physics, take_physics
-from mjsim.worlds import Worlds
 
 OBJECTS = (6, 12, 18, 24, 48)
-LEVEL = 24
-TURN = 100  # calls that are timed at once
+DEFAULT_OBJECTS = 24
+CHUNK = 100  # calls that are timed at once
 REPEATS = 3
-WALK = 60.0  # simulated s of which the profile is measured
-TOGETHER = 3.0  # simulated s of which the number of threads is measured
-WORLDS = 16  # per core: with few of them, threads wait for each other at the end of every step
+PROFILED = 60.0  # s of simulated time that the profile covers
 TARGETS = (("full", 120.0), ("windows", 500.0), ("event", 3000.0))  # simulated s per core-second
-MOST_OVERHEAD = 1.3  # times the raw engine
-MANY_THREADS = 1.8  # times one thread, on two
+MAX_OVERHEAD = 1.3  # times the raw engine
 
 
 def measure(*, quick: bool = False) -> dict[str, Any]:
@@ -47,15 +42,13 @@ def measure(*, quick: bool = False) -> dict[str, Any]:
     repeats = 2 if quick else REPEATS
     seeds = (3,) if quick else (3, 4, 5)
     tiers = [measure_tier(house, fidelity, seeds, repeats) for fidelity in FIDELITIES]
-    walked = record_errand(house, LEVEL, seeds[0], "full")
-    levels = (LEVEL,) if quick else OBJECTS
+    walked = record_trial(house, DEFAULT_OBJECTS, seeds[0], "full")
+    levels = (DEFAULT_OBJECTS,) if quick else OBJECTS
     return {
         "benchmark": "physics",
-        "objects": LEVEL,
-        "cores": len(os.sched_getaffinity(0)),
+        "objects": DEFAULT_OBJECTS,
         "tiers": tiers,
-        "overhead": [measure_overhead(record_errand(house, n, seeds[0], "full"), repeats) for n in levels],
-        "threads": measure_threads(walked, repeats),
+        "overhead": [measure_overhead(record_trial(house, n, seeds[0], "full"), repeats) for n in levels],
         "memory": measure_memory(walked.scene),
         "set_up": measure_set_up(house, 2 if quick else 5),
         "profile": measure_profile(walked),
@@ -64,7 +57,7 @@ def measure(*, quick: bool = False) -> dict[str, Any]:
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
     """The result for people."""
-    yield f"{result['objects']} objects, {result['cores']} cores; simulated seconds per core-second, Python included"
+    yield f"{result['objects']} objects; simulated seconds per core-second, Python included"
     targets = dict(TARGETS)
     full = next(row for row in result["tiers"] if row["fidelity"] == "full")
     for row in result["tiers"]:
@@ -79,18 +72,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
             f"{row['contacts']:10.1f}"
         )
     ratio = next(row["ratio"] for row in result["overhead"] if row["objects"] == result["objects"])
-    yield f"World.step over mj_step: {ratio:.2f} (<= {MOST_OVERHEAD:g}: {verdict(ratio <= MOST_OVERHEAD)})"
-    yield "speed over one thread:"
-    yield f"{'threads':>9}{'step':>8}{'stretches':>11}{'mj_step':>9}{'Batch':>8}"
-    for row in result["threads"]:
-        yield (
-            f"{row['threads']:9}{row['worlds']:8.2f}{row['stretches']:11.2f}{row['raw']:9.2f}{row['batch']:8.2f}"
-        )
-    for row in result["threads"]:
-        for kind in ("worlds", "stretches") if row["threads"] == 2 else ():
-            holds = verdict(row[kind] >= MANY_THREADS)
-            name = {"worlds": "step", "stretches": "stretches"}[kind]
-            yield f"two threads over one, {name}: {row[kind]:.2f} (>= {MANY_THREADS:g}: {holds})"
+    yield f"World.step over mj_step: {ratio:.2f} (<= {MAX_OVERHEAD:g}: {verdict(ratio <= MAX_OVERHEAD)})"
     memory = result["memory"]
     yield f"memory: {memory['world_mb']:.2f} MB per world, {memory['model_mb']:.1f} MB per scene"
     set_up = result["set_up"]
@@ -112,21 +94,21 @@ def measure_tier(house: House, fidelity: str, seeds: Sequence[int], repeats: int
     """Simulated seconds per core-second of a tier, over some trials."""
     simulated = spent = 0.0
     for seed in seeds:
-        errand = record_errand(house, LEVEL, seed, fidelity)
-        world = errand.world()
-        turns = [errand.calls[i : i + TURN] for i in range(0, len(errand.calls), TURN)]
-        best = np.full(len(turns), np.inf)
+        trial = record_trial(house, DEFAULT_OBJECTS, seed, fidelity)
+        world = trial.world()
+        chunks = [trial.calls[i : i + CHUNK] for i in range(0, len(trial.calls), CHUNK)]
+        best = np.full(len(chunks), np.inf)
         for _ in range(repeats):
             world.reset()
-            best = np.minimum(best, [play(world, turn) for turn in turns])
+            best = np.minimum(best, [play(world, chunk) for chunk in chunks])
         simulated += world.observation().time
         spent += float(best.sum())
     return {"fidelity": fidelity, "seeds": list(seeds), "simulated_s": simulated, "speed": simulated / spent}
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
-    """What drives the engine in a control step: activations, controls, welds, what wakes; or a state to go on from."""
+class EngineInput:
+    """Inputs of the engine in one control step (activations, controls, welds, sleep states), or a state to set."""
 
     act: Any = None
     ctrl: Any = None
@@ -135,134 +117,75 @@ class Drive:
     physics: Any = None
 
 
-def drives(errand: VisitTask) -> tuple[list[Drive], float, float]:
-    """What drove the engine in an errand, and how many trees were awake and contacts there were, on average."""
-    world, found, awake, contacts = errand.world(), [], 0, 0
+def engine_inputs(trial: RecordedTrial) -> tuple[list[EngineInput], float, float]:
+    """Inputs of every control step of a trial; mean number of awake trees; mean number of contacts."""
+    world, found, awake, contacts = trial.world(), [], 0, 0
     advance = mujoco.mj_step
 
-    def noted(model: Any, data: Any, nstep: int = 1) -> None:
+    def record(model: Any, data: Any, nstep: int = 1) -> None:
         nonlocal awake, contacts
         inputs = (data.act, data.ctrl, data.eq_active, data.tree_asleep)
-        found.append(Drive(*(array.copy() for array in inputs)))
+        found.append(EngineInput(*(array.copy() for array in inputs)))
         advance(model, data, nstep)
         awake, contacts = awake + data.ntree_awake, contacts + data.ncon
 
-    mujoco.mj_step = noted
+    mujoco.mj_step = record
     try:
-        for name, argument in errand.calls:
+        for name, argument in trial.calls:
             if name == "step":
                 world.step(argument)
             elif name == "restore":
                 world.restore(world.state())
-                found.append(Drive(physics=take_physics(world.model, world.data)))
+                found.append(EngineInput(physics=take_physics(world.model, world.data)))
     finally:
         mujoco.mj_step = advance
-    count = max(1, sum(drive.physics is None for drive in found))
+    count = max(1, sum(step.physics is None for step in found))
     return found, awake / count, contacts / count
 
 
-def drive_raw(model: Any, data: Any, turn: Sequence[Drive], substeps: int) -> float:
-    """Let the engine alone take some steps; CPU seconds of them."""
+def step_raw(model: Any, data: Any, chunk: Sequence[EngineInput], substeps: int) -> float:
+    """CPU seconds that the engine alone takes for some control steps."""
     act, ctrl, active, asleep = data.act, data.ctrl, data.eq_active, data.tree_asleep
     advance, clock, lost = mujoco.mj_step, time.process_time, 0.0
     start = clock()
-    for drive in turn:
-        if drive.physics is not None:
+    for step in chunk:
+        if step.physics is not None:
             began = clock()
-            set_physics(model, data, drive.physics)
+            set_physics(model, data, step.physics)
             lost += clock() - began
             continue
-        act[:], ctrl[:], active[:], asleep[:] = drive.act, drive.ctrl, drive.active, drive.asleep
+        act[:], ctrl[:], active[:], asleep[:] = step.act, step.ctrl, step.active, step.asleep
         advance(model, data, substeps)
     return clock() - start - lost
 
 
-def measure_overhead(errand: VisitTask, repeats: int) -> dict[str, Any]:
-    """Microseconds of `World.step` and of the raw engine for the same control steps, in turns."""
-    calls = [call for call in errand.calls if call[0] in ("step", "restore")]
-    found, awake, contacts = drives(errand)
-    world, model = errand.world(), errand.scene.model
+def measure_overhead(trial: RecordedTrial, repeats: int) -> dict[str, Any]:
+    """Microseconds of `World.step` and of the raw engine for the same control steps, in alternating chunks."""
+    calls = [call for call in trial.calls if call[0] in ("step", "restore")]
+    found, awake, contacts = engine_inputs(trial)
+    world, model = trial.world(), trial.scene.model
     data = mujoco.MjData(model)
     substeps = round(world.control_timestep / model.opt.timestep)
-    starts = range(0, len(calls), TURN)
+    starts = range(0, len(calls), CHUNK)
     mine, raw = (np.full(len(starts), np.inf) for _ in range(2))
     for _ in range(repeats):
         world.reset()
         mujoco.mj_resetData(model, data)
         mujoco.mj_forward(model, data)
-        for turn, i in enumerate(starts):
-            mine[turn] = min(mine[turn], play(world, calls[i : i + TURN]))
-            raw[turn] = min(raw[turn], drive_raw(model, data, found[i : i + TURN], substeps))
+        for chunk, i in enumerate(starts):
+            mine[chunk] = min(mine[chunk], play(world, calls[i : i + CHUNK]))
+            raw[chunk] = min(raw[chunk], step_raw(model, data, found[i : i + CHUNK], substeps))
         if not np.array_equal(world.data.qpos, data.qpos):
-            raise RuntimeError("the raw engine went another way than the world that it was compared with")
+            raise RuntimeError("the raw engine and the world reached different states from the same inputs")
     steps = sum(name == "step" for name, _ in calls)
     return {
-        "objects": len(errand.scene.index.names),
+        "objects": len(trial.scene.index.names),
         "step_us": 1e6 * float(mine.sum()) / steps,
         "raw_us": 1e6 * float(raw.sum()) / steps,
         "ratio": float(mine.sum() / raw.sum()),
         "awake": awake,
         "contacts": contacts,
     }
-
-
-def measure_threads(errand: VisitTask, repeats: int) -> list[dict[str, Any]]:
-    """Speed on 1, 2, .. threads relative to 1: of `Worlds`, of the raw engine on threads, and of MuJoCo's `Batch`.
-
-    Worlds are stepped together, all by one control step at a time, and for all steps in one call (stretches).
-    """
-    cores = len(os.sched_getaffinity(0))
-    counts = [n for n in (1, 2, 4, 8, 16, 32, 64) if n < cores] + [cores]
-    actions = errand.actions(TOGETHER)
-    worlds = [errand.world() for _ in range(WORLDS * cores)]
-    best = {kind: dict.fromkeys(counts, np.inf) for kind in ("worlds", "stretches", "raw", "batch")}
-    for _ in range(2 * repeats):
-        for count in counts:
-            best["worlds"][count] = min(best["worlds"][count], _step_worlds(worlds, actions, count))
-            best["stretches"][count] = min(best["stretches"][count], _step_apart(worlds, actions, count))
-            best["raw"][count] = min(best["raw"][count], _step_raw(worlds, len(actions), count))
-            best["batch"][count] = min(best["batch"][count], _step_batch(worlds, len(actions), count))
-    return [
-        {"threads": count, **{kind: times[1] / times[count] for kind, times in best.items()}}
-        for count in counts
-    ]
-
-
-def _step_worlds(worlds: Sequence[World], actions: Sequence[Action], threads: int) -> float:
-    with Worlds(worlds, threads=threads) as together:
-        together.reset()
-        start = time.perf_counter()
-        for action in actions:
-            together.step([action] * len(worlds))
-        return time.perf_counter() - start
-
-
-def _step_apart(worlds: Sequence[World], actions: Sequence[Action], threads: int) -> float:
-    with Worlds(worlds, threads=threads) as together:
-        together.reset()
-        start = time.perf_counter()
-        together.each(lambda world: play(world, [("step", action) for action in actions]))
-        return time.perf_counter() - start
-
-
-def _step_raw(worlds: Sequence[World], steps: int, threads: int) -> float:
-    """The worlds stand still; their engines step all the same."""
-    with Worlds(worlds, threads=threads) as together:
-        together.reset()
-        start = time.perf_counter()
-        for _ in range(steps):
-            together.each(lambda world: mujoco.mj_step(world.model, world.data, 10))
-        return time.perf_counter() - start
-
-
-def _step_batch(worlds: Sequence[World], steps: int, threads: int) -> float:
-    worlds[0].reset()
-    batch = Batch(worlds[0].model, len(worlds), threads, persistent=True)
-    batch.act[:] = worlds[0].data.act
-    start = time.perf_counter()
-    for _ in range(steps):
-        batch.step(nstep=10)
-    return time.perf_counter() - start
 
 
 def measure_memory(scene: Scene, count: int = 20) -> dict[str, Any]:
@@ -292,7 +215,7 @@ def measure_set_up(house: House, count: int) -> dict[str, float]:
     clock, rows = time.process_time, []
     for seed in range(count):
         times = [clock()]
-        episode = house.sample_episode(objects=LEVEL, seed=100 + seed)
+        episode = house.sample_episode(objects=DEFAULT_OBJECTS, seed=100 + seed)
         times.append(clock())
         scene = compose(episode, house.catalogue)
         times.append(clock())
@@ -303,18 +226,18 @@ def measure_set_up(house: House, count: int) -> dict[str, float]:
     return {"sample_ms": float(sample), "compose_ms": float(composed), "world_ms": float(world)}
 
 
-def measure_profile(errand: VisitTask) -> dict[str, float]:
+def measure_profile(trial: RecordedTrial) -> dict[str, float]:
     """Share of each part of a control step, by MuJoCo's own timers; empty where the system has no clock for them."""
     library = ctypes.util.find_library("gomp")
     if library is None:
         return {}
-    # A C function that returns seconds as a double: a clock in Python would take longer than what it measures.
+    # A C function that returns seconds as a double: a Python clock would cost more than the steps it times.
     clock = ctypes.CFUNCTYPE(ctypes.c_double)(("omp_get_wtime", ctypes.CDLL(library)))
-    world = errand.world()
+    world = trial.world()
     timer, kinds, total = world.data.timer, mujoco.mjtTimer, 0.0
     mujoco.set_mjcb_time(clock)
     try:
-        for action in errand.actions(WALK):
+        for action in trial.actions(PROFILED):
             start = time.perf_counter()
             world.step(action)
             total += time.perf_counter() - start

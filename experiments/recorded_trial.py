@@ -1,11 +1,11 @@
-"""Everything that a session asked of its world in a trial, to be asked of a world again: work of a real kind."""
+"""Every call that a session makes to its world in a trial, recorded to be played again: a realistic workload."""
 
-import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
+
+from numpy.typing import ArrayLike
 
 from experiments.house import House
 from experiments.records import EventLog
@@ -13,20 +13,55 @@ from experiments.trial import TrialConfig, prepare_session
 from mjsim.actions import Action
 from mjsim.model.sampling import POINTS, sample_episode
 from mjsim.model.scene import Scene, compose
+from mjsim.observation import Observation
 from mjsim.options import WorldOptions
-from mjsim.world import World
+from mjsim.rollout import Rollout
+from mjsim.world import StepResult, World
+from mjsim.world_state import WorldState
 
 Call = tuple[str, Any]  # method of the world and its argument
 
 
-@dataclass(frozen=True, eq=False)
-class VisitTask:
-    """A trial as its world saw it.
+class RecordingWorld(World):
+    """A world that records how it is called.
 
     Attributes:
-        scene: Where it took place.
+        calls: `step`, `walk`, `finish` and `restore` so far, each with its argument or None.
+    """
+
+    def __init__(self, scene: Scene, options: WorldOptions | None = None) -> None:
+        super().__init__(scene, options)
+        self.calls: list[Call] = []
+
+    def step(self, action: Action) -> StepResult:
+        """See `World.step`."""
+        self.calls.append(("step", action))
+        return super().step(action)
+
+    def walk(self, moves: ArrayLike) -> Rollout:
+        """See `World.walk`."""
+        self.calls.append(("walk", moves))
+        return super().walk(moves)
+
+    def finish(self) -> Rollout:
+        """See `World.finish`."""
+        self.calls.append(("finish", None))
+        return super().finish()
+
+    def restore(self, state: WorldState) -> Observation:
+        """See `World.restore`."""
+        self.calls.append(("restore", None))
+        return super().restore(state)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedTrial:
+    """The calls that a trial made to its world.
+
+    Attributes:
+        scene: The scene of the trial.
         fidelity: The tier.
-        calls: What was asked: `step`, `walk`, `finish`, and `restore` where a checkpoint was passed.
+        calls: `step`, `walk`, `finish`, and `restore` at every checkpoint.
     """
 
     scene: Scene
@@ -34,26 +69,26 @@ class VisitTask:
     calls: tuple[Call, ...]
 
     def world(self) -> World:
-        """A new world to play it in."""
+        """A new world to play the calls in."""
         return World(self.scene, WorldOptions(fidelity=self.fidelity))
 
     def actions(self, seconds: float) -> list[Action]:
-        """Its first single steps, of so much simulated time."""
+        """The first single steps, as many as take `seconds` of simulated time."""
         steps = [argument for name, argument in self.calls if name == "step"]
         return steps[: round(seconds / WorldOptions().control_timestep)]
 
 
-def record_errand(
+def record_trial(
     house: House, objects: int, seed: int, fidelity: str = "full", seconds: float | None = None
-) -> VisitTask:
-    """Run a trial of the follower under optimal assistance and keep what its session asked of the world.
+) -> RecordedTrial:
+    """Run a trial of the follower under optimal assistance and record the calls to its world.
 
     Args:
-        house: Where.
-        objects: How many there are; above 40 the points of the house are drawn anew.
-        seed: Of the house.
+        house: The house.
+        objects: Number of objects; above 40 the sampling points of the house are drawn anew.
+        seed: Seed of the episode.
         fidelity: The tier.
-        seconds: Simulated time after which it is cut off, s; None to let it end.
+        seconds: Simulated time after which the trial is cut off, s; None to run to the end.
 
     Raises:
         SamplingError: The house has no room for so many objects.
@@ -64,25 +99,14 @@ def record_errand(
     points = max(objects, POINTS)
     episode = sample_episode(house.catalogue, house.navmesh, objects=objects, seed=seed, points=points)
     scene = compose(episode, house.catalogue)
-    calls: list[Call] = []
-    with tempfile.TemporaryDirectory() as folder, EventLog(Path(folder) / "events.jsonl") as log:
-        session, world = prepare_session(config, house, scene, log)
-        for name in ("step", "walk", "finish", "restore"):
-            setattr(world, name, _noted(calls, name, getattr(world, name)))
-        session.run()
-    return VisitTask(scene, fidelity, tuple(calls))
-
-
-def _noted(calls: list[Call], name: str, method: Callable[..., Any]) -> Callable[..., Any]:
-    def noted(*arguments: Any) -> Any:
-        calls.append((name, arguments[0] if arguments else None))
-        return method(*arguments)
-
-    return noted
+    world = RecordingWorld(scene, WorldOptions(fidelity=fidelity))
+    session, _ = prepare_session(config, house, scene, EventLog(), world=world)
+    session.run()
+    return RecordedTrial(scene, fidelity, tuple(world.calls))
 
 
 def play(world: World, calls: Sequence[Call]) -> float:
-    """Ask the same of a world; returns the CPU time that it took, s, checkpoints left out."""
+    """Repeat calls on a world; returns the CPU time, s, without the checkpoints."""
     clock, checkpoints = time.process_time, 0.0
     start = clock()
     for name, argument in calls:

@@ -227,6 +227,7 @@ def prepare_session(
     replanner: Replanner | None = None,
     *,
     foresight: bool = True,
+    world: World | None = None,
 ) -> tuple[Session, World]:
     """Make the world, the assistant and the participant of a trial, ready to run.
 
@@ -238,6 +239,7 @@ def prepare_session(
         viewer: Sees every control step, or None.
         replanner: Plans for the assistant; None for one whose plans repeat.
         foresight: See `Session`.
+        world: A new world of the scene in the trial's fidelity; None to make one.
     """
     episode = scene.episode
     order_rng, user_rng = (
@@ -245,7 +247,7 @@ def prepare_session(
     )
     names = [o.name for o in episode.objects]
     order = [names[i] for i in order_rng.permutation(len(names))]
-    world = World(scene, WorldOptions(fidelity=config.fidelity))
+    world = world or World(scene, WorldOptions(fidelity=config.fidelity))
     log.append(
         0.0,
         "start",
