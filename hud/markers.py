@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hud.state import Marker, Rgba, Vec3
+from hud.state import HudState, Marker, Rgba, Shape, Vec2, Vec3
 
 CHEST_HEIGHT = 1.2  # m, of the breadcrumb line at the person's end
 BREADCRUMB_RADIUS = 0.04  # m; 7 px across at 5 m in a 480 px frame
@@ -12,8 +12,10 @@ BREADCRUMB_CLEARANCE = 0.5  # m of path in front of the person left empty, so th
 
 RIM = 1.3  # radius of the white rim, in radii of the breadcrumb
 
-RED: Rgba = (0.90, 0.10, 0.06, 1.0)
+FLAGPOLE = "flagpole"  # role of the parts of a flagpole
 POLE_BANDS = 4
+
+RED: Rgba = (0.90, 0.10, 0.06, 1.0)
 YELLOW: Rgba = (1.0, 0.86, 0.10, 1.0)
 NAVY: Rgba = (0.03, 0.06, 0.20, 1.0)
 WHITE: Rgba = (0.95, 0.95, 0.95, 1.0)
@@ -54,36 +56,51 @@ def rims(crumbs: tuple[Marker, ...]) -> tuple[Marker, ...]:
     )
 
 
-def flagpole(position: Vec3, *, low: bool = False, x_ray: bool = False) -> tuple[Marker, ...]:
-    """A pole with a flag over an object: 1.2 m tall, standing clear above the object.
+def flagpole(
+    position: Vec3, *, object: str | None = None, low: bool = False, x_ray: bool = False
+) -> tuple[Marker, ...]:
+    """A pole with a flag, clear above an object and 1.2 m tall.
 
     A low one has half the height and no flag: for objects so near that a flag would fill the view.
 
     Pole and flag are banded light and dark, so that they stand out from light walls and from dark floors, also for
-    people who see no hues.
+    people with colour-vision deficiencies.
+
+    Args:
+        position: Of the object, m.
+        object: Instance name of the object.
+        low: Half the height and no flag.
+        x_ray: Whether the pole also shows faintly through walls.
     """
     x, y, z = position
     foot, top = z + 0.25, z + (0.85 if low else 1.45)
     band = (top - foot) / POLE_BANDS
-    pole = tuple(
-        Marker(
-            "cylinder",
-            (x, y, foot + (i + 0.5) * band),
-            (0.013, band / 2, 0.0),
-            (NAVY, WHITE)[i % 2],
-            "flagpole",
-            x_ray,
-        )
+
+    def part(shape: Shape, centre: Vec3, size: Vec3, rgba: Rgba) -> Marker:
+        return Marker(shape, centre, size, rgba, FLAGPOLE, x_ray, object)
+
+    parts = [
+        part("cylinder", (x, y, foot + (i + 0.5) * band), (0.013, band / 2, 0.0), (NAVY, WHITE)[i % 2])
         for i in range(POLE_BANDS)
-    )
-    flag: tuple[Marker, ...] = ()
-    bands = () if low else ((top - 0.06, 0.06, YELLOW), (top - 0.15, 0.03, NAVY))
-    for height, half, colour in bands:
-        flag += (
-            Marker("box", (x, y + 0.11, height), (0.006, 0.11, half), colour, "flagpole", x_ray),
-            Marker("box", (x + 0.11, y, height), (0.11, 0.006, half), colour, "flagpole", x_ray),
-        )
-    return (*pole, *flag, Marker("sphere", (x, y, foot), (0.03, 0.0, 0.0), YELLOW, "flagpole", x_ray))
+    ]
+    for height, half, colour in () if low else ((top - 0.06, 0.06, YELLOW), (top - 0.15, 0.03, NAVY)):
+        parts.append(part("box", (x, y + 0.11, height), (0.006, 0.11, half), colour))
+        parts.append(part("box", (x + 0.11, y, height), (0.11, 0.006, half), colour))
+    return (*parts, part("sphere", (x, y, foot), (0.03, 0.0, 0.0), YELLOW))
+
+
+def flagpoles(state: HudState) -> dict[str, Vec2]:
+    """Which objects have a flagpole: instance name -> floor position of the pole, m, in the order shown.
+
+    A participant's percept is computed from this, so that it holds what the picture shows and no more.
+    """
+    return {
+        marker.object: marker.position[:2]
+        for marker in state.markers
+        if marker.role == FLAGPOLE
+        and marker.object is not None
+        and marker.shape != "box"  # flags stand beside
+    }
 
 
 def goal_pin(position: Vec3, *, x_ray: bool = False) -> tuple[Marker, ...]:

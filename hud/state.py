@@ -7,6 +7,7 @@ from typing import Literal
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
+Shape = Literal["sphere", "cylinder", "box"]
 
 
 @dataclass(frozen=True)
@@ -21,14 +22,16 @@ class Marker:
         rgba: Colour, components in 0..1.
         role: What it is for: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal`.
         x_ray: Whether it also shows faintly through walls.
+        object: Instance name of the object that it stands over, or None.
     """
 
-    shape: Literal["sphere", "cylinder", "box"]
+    shape: Shape
     position: Vec3
     size: Vec3
     rgba: Rgba
     role: str
     x_ray: bool = False
+    object: str | None = None
 
 
 class MessageKind(enum.Enum):

@@ -19,7 +19,7 @@ from experiments.conditions import TaskBoard
 from experiments.house import House
 from hud.compose import Compositor
 from hud.conditions import condition
-from hud.markers import breadcrumbs, flagpole
+from hud.markers import POLE_BANDS, breadcrumbs, flagpole, flagpoles
 from hud.messages import message
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView, in_view
@@ -149,6 +149,22 @@ def test_x_ray_flagpoles_show_faintly_through_walls(studio: Studio, golden_frame
     changed = np.abs(seen.astype(int) - bare).max(axis=2) > 0
     assert 20 < changed.sum() < 0.05 * changed.size
     golden_frame(seen, "flagpole_x_ray")
+
+
+def test_highlight_shows_every_flagpole_that_a_participant_is_told_of(studio: Studio) -> None:
+    """From a corner of the bedroom across the house: poles behind walls are dimmed, and none is missing."""
+    state = condition("highlight")(dataclasses.replace(studio.view, position=(0.8, 0.8)))
+    pose = eye_at((0.8, 0.8), (9.0, 7.0))
+    camera = CameraView(pose.position, pose.rotation, pose.fovy, 640, 480)
+    complete = studio.large.rgb(studio.data, pose, state.markers)
+    hidden = 0
+    for name in flagpoles(state):
+        pole = tuple(m for m in state.markers if m.object == name)
+        if in_view(camera, pole[POLE_BANDS - 1].position, margin=0.02):
+            others = tuple(m for m in state.markers if m.object != name)
+            assert not np.array_equal(studio.large.rgb(studio.data, pose, others), complete), name
+            hidden += not marker_pixels(studio, pose, pole).any()
+    assert hidden >= 5, "most of them stand behind walls"
 
 
 # --- what the comparison is worth -------------------------------------------------------------------------

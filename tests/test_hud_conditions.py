@@ -9,6 +9,7 @@ from hud import sample
 from hud.conditions import condition, condition_names
 from hud.errors import ConditionError, HudError, MessageError, TaskViewError
 from hud.lists import in_sentence
+from hud.markers import flagpoles
 from hud.messages import FADE, SHOWN, TEXTS, fade, message
 from hud.state import ChecklistItem, HudState, MessageKind
 from hud.task import Alternative, PlannedStep, TaskView
@@ -255,11 +256,26 @@ def test_rows_are_plain_values() -> None:
 def test_x_ray_changes_nothing_but_that_markers_show_through_walls(base: str) -> None:
     view = sample.task(12, steps=5)
     plain, x_ray = shown(base, view), shown(f"{base}-xray", view)
-    assert all(m.x_ray for m in x_ray.markers) and not any(m.x_ray for m in plain.markers)
-    assert (
-        dataclasses.replace(x_ray, markers=tuple(dataclasses.replace(m, x_ray=False) for m in x_ray.markers))
-        == plain
-    )
+    assert all(m.x_ray for m in x_ray.markers)
+    through = tuple(dataclasses.replace(m, x_ray=True) for m in plain.markers)
+    assert dataclasses.replace(plain, markers=through) == x_ray
+
+
+def test_highlight_shows_its_flagpoles_through_walls_and_optimal_hides_its_path_behind_them() -> None:
+    view = sample.task(12, steps=5)
+    assert all(m.x_ray for m in shown("highlight", view).markers)
+    assert shown("optimal", view).markers and not any(m.x_ray for m in shown("optimal", view).markers)
+
+
+@pytest.mark.parametrize("base", ["none", "highlight", "optimal"])
+def test_flagpoles_are_found_by_object_where_they_are_drawn(base: str) -> None:
+    view = sample.task(12, steps=6)
+    near = dataclasses.replace(
+        view, position=view.objects[7].position[:2]
+    )  # one has a low pole without a flag
+    for seen in (view, near):
+        loose = {o.name: o.position[:2] for o in seen.objects if o.status == "loose"}
+        assert flagpoles(shown(base, seen)) == (loose if base == "highlight" else {})
 
 
 @pytest.mark.parametrize("base", ["none", "highlight", "optimal"])

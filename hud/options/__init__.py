@@ -1,7 +1,7 @@
 """Options of assistance conditions. Every module here is one, named after its file.
 
 An option is a function from a task view and the state that the condition made of it to another state. It is asked for
-by name after the condition's, `highlight-xray-minimap`, and applied in that order.
+by name after the condition's, `optimal-xray-minimap`, and applied in that order.
 """
 
 import importlib

@@ -2,7 +2,8 @@
 
 import dataclasses
 
-from hud.state import HudState, Marker, MiniMap
+from hud.markers import flagpoles
+from hud.state import HudState, MiniMap, Vec2
 from hud.task import TaskView
 
 FLOORPLAN = "floorplan"  # key of the picture of the house from above
@@ -19,23 +20,12 @@ def apply(view: TaskView, state: HudState) -> HudState:
         position=view.position,
         heading=view.heading,
         way=_places(state, "breadcrumb"),
-        things=_places(state, "flagpole"),
+        things=tuple(flagpoles(state).values()),
         goal=goals[0] if goals else None,
     )
     return dataclasses.replace(state, minimap=minimap)
 
 
-def _places(state: HudState, role: str) -> tuple[tuple[float, float], ...]:
-    """Where markers of a role stand, each place once, in their order."""
-    return tuple(
-        dict.fromkeys(_foot(marker) for marker in state.markers if marker.role == role and _upright(marker))
-    )
-
-
-def _foot(marker: Marker) -> tuple[float, float]:
-    return marker.position[0], marker.position[1]
-
-
-def _upright(marker: Marker) -> bool:
-    """Not a flag, which stands beside its pole."""
-    return marker.shape != "box"
+def _places(state: HudState, role: str) -> tuple[Vec2, ...]:
+    """Floor positions of the markers of a role, each once, in their order, m."""
+    return tuple(dict.fromkeys(marker.position[:2] for marker in state.markers if marker.role == role))
