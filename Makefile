@@ -46,7 +46,5 @@ $(READY): pyproject.toml .ci/system-libraries
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --editable '.[dev]'
-	$(BIN)/python -m planner.warmup
-	$(BIN)/python -m mjsim.warmup
 	$(BIN)/python -m experiments.warmup
 	@touch $@

@@ -1,27 +1,87 @@
-"""Compiles the kernels of participants ahead of the first trial; numba keeps them on disk for every later process.
+"""Compiles all kernels ahead of their first use; later processes load them from disk.
 
-Run once after installing: `python -m experiments.warmup`.
+Run once after installing: `python -m experiments.warmup`. It takes a minute, and seconds where all is compiled.
 """
+
+import math
+
+import numpy as np
 
 from experiments.house import House
 from experiments.participants import DEFAULT_FOR_ASSISTANCE
 from experiments.records import EventLog
 from experiments.trial import TrialConfig, prepare_session
-from mjsim.model.scene import compose
+from mjsim.actions import Move, Pick, Place
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.model.scene import Scene, compose
+from mjsim.options import FIDELITIES, WorldOptions
+from mjsim.world import World
+from planner.exact.solver import ExactSolver
+from planner.exact.warm import Warm
+from planner.problem import RoutingProblem, Shipment
+from planner.regret import regrets
 
-STEPPED, FORESEEN = ("full", 2.0), ("event", 60.0)  # how far a trial is played, s
+TRIALS = (("full", 2.0), ("event", 60.0))  # fidelity, and how far a trial is played, s
 
 
 def compile_kernels(house: House | None = None) -> None:
-    """Play the beginning of a trial with every kind of participant, step by step and foreseen."""
+    """Plan, act and play a little: every kernel runs on arguments of the types that it meets later."""
     house = house or House.load()
+    plan()
+    act(house)
+    play(house)
+
+
+def plan() -> None:
+    """Plan a tour by the full table and by the search, with regrets, and again from what is known of it."""
+    places = np.random.default_rng(0).random((16, 2))
+    distances = np.linalg.norm(places[:, None] - places[None], axis=2)
+    tour = RoutingProblem(distances, 0, tuple(Shipment(4 + k, 1 + k % 3) for k in range(12)), (), 2)
+    for table_bytes in (ExactSolver.table_bytes, 0):  # the full table, and the search
+        ExactSolver(table_bytes=table_bytes).solve(tour)
+        regrets(tour, ExactSolver(table_bytes=table_bytes))
+    searching = ExactSolver(table_bytes=0)
+    first = next(searching.improve(tour))
+    if first.certificate is not None:
+        next(searching.improve(tour, warm=Warm(first.certificate, tuple(range(12)))))
+
+
+def act(house: House) -> None:
+    """Walk, pick and place in every tier."""
+    scene = _before_a_receptacle(house)
+    for tier in FIDELITIES:
+        world = World(scene, WorldOptions(fidelity=tier))
+        for action in (Move(0.2, 0.1, 0.3, 0.1), Pick(), Move(-0.2), Place()):
+            world.step(action)
+            world.finish()
+            world.walk([[0.1, 0.0, 0.1, 0.0]] * 3)
+
+
+def play(house: House) -> None:
+    """Play the beginning of a trial with every kind of participant."""
     scene = compose(house.sample_episode(objects=2, seed=0), house.catalogue)
     for assistance in DEFAULT_FOR_ASSISTANCE:
-        for fidelity, until in (STEPPED, FORESEEN):
+        for fidelity, until in TRIALS:
             config = TrialConfig(
                 objects=2, assistance=assistance, seed=0, fidelity=fidelity, time_limit=until, regret=False
             )
             prepare_session(config, house, scene, EventLog())[0].run()
+
+
+def _before_a_receptacle(house: House) -> Scene:
+    """A person who faces a receptacle, and an object for it half a metre behind them."""
+    key, receptacle = next(iter(house.receptacles.items()))
+    x, y = receptacle.approach.tolist()
+    heading = math.atan2(receptacle.center[1] - y, receptacle.center[0] - x)
+    category = next(c for c in house.catalogue.categories.values() if c.receptacle == key)
+    spot = (x - 0.5 * math.cos(heading), y - 0.5 * math.sin(heading))
+    placed = PlacedObject(
+        "object", category.key, category.objects[0], spot, (*spot, 0.01), (1.0, 0.0, 0.0, 0.0)
+    )
+    start, keys = StartPose(x, y, heading), tuple(house.receptacles)
+    return compose(
+        Episode(house.catalogue.name, 0, start, (placed,), keys, {placed.name: key}), house.catalogue
+    )
 
 
 if __name__ == "__main__":

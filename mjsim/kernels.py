@@ -1,48 +1,89 @@
-"""How numeric kernels are compiled: with numba, cached on disk where that is possible."""
+"""How numeric kernels are compiled: with numba, and kept on disk where that is possible.
+
+The planner and the experiments use this module too. It is the one thing that they share with mjsim below them.
+"""
 
 import hashlib
-from collections.abc import Callable
-from types import ModuleType
+import os
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from platformdirs import user_cache_path
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("mjsim", "planner", "experiments")
+MARK = b"@kernel\n"
+UNUSED = 30 * 24 * 3600  # s after which machine code that no process has asked for is deleted
+
+_IMPORT = re.compile(r"^from ((?:mjsim|planner|experiments)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+
 
 def kernel(function: F) -> F:
-    """Compile a function at its first call; a later process loads the machine code from the cache.
+    """Compile a function at its first call; a later process loads the machine code from disk.
 
-    numba refuses to decorate when no cache folder is writable (a read-only installation without a home). The
-    kernel then works all the same, compiled anew in each process.
+    Where no cache folder is writable (no home, a full disk), each process compiles anew.
     """
+    folder, chosen = cache_folder(), numba.config.CACHE_DIR
+    if folder is not None:
+        numba.config.CACHE_DIR = str(
+            folder
+        )  # read when decorating; other people's kernels keep their own folder
+        try:
+            return cast(F, numba.njit(cache=True, nogil=True)(function))
+        except RuntimeError:  # how numba says that it cannot cache, for a function without a file, say
+            pass
+        finally:
+            numba.config.CACHE_DIR = chosen
+    return cast(F, numba.njit(nogil=True)(function))
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Folder for the machine code of the present sources, None where none is writable.
+
+    It lies in `NUMBA_CACHE_DIR` where that is set, else in the user's cache folder. Its name holds a hash of all
+    sources with kernels: numba itself notices a change in a kernel's own file only, not in the kernels that it calls.
+    """
+    chosen = numba.config.CACHE_DIR
+    base = Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
+    digest = hashlib.sha256()
+    for path in sorted(set(_kernel_sources())):
+        digest.update(path.read_bytes())
+    folder = base / f"mjsim-kernels-{digest.hexdigest()[:16]}"
     try:
-        compiled = numba.njit(cache=True, nogil=True)(function)
-    except RuntimeError:
-        return cast(F, numba.njit(nogil=True)(function))
-    _heed_imports(compiled, function)
-    return cast(F, compiled)
+        if not folder.is_dir():
+            _delete_unused(base)
+            folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)  # in use; fails where the folder is not writable
+    except OSError:
+        return None
+    return folder
 
 
-def _heed_imports(compiled: Any, function: Callable[..., Any]) -> None:
-    """Let the cache of a kernel expire with the modules whose kernels are compiled into it.
-
-    numba looks at the kernel's own file alone, and would go on with what a kernel of another file was like before.
-    """
-    root, stamps = function.__module__.partition(".")[0], set()
-    for value in list(function.__globals__.values()):
-        inside = vars(value).values() if isinstance(value, ModuleType) and _is_of(value, root) else (value,)
-        stamps |= {repr(stamp) for stamp in map(_stamp_of, inside) if stamp is not None}
-    file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if file is not None and hasattr(file, "_source_stamp"):
-        file._source_stamp = (file._source_stamp, hashlib.sha1("".join(sorted(stamps)).encode()).hexdigest())
-
-
-def _is_of(module: ModuleType, root: str) -> bool:
-    return module.__name__.partition(".")[0] == root
+def _kernel_sources() -> Iterator[Path]:
+    """Modules with kernels, and those whose constants these import: numba compiles constants in."""
+    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+        source = path.read_bytes()
+        if MARK not in source:
+            continue
+        yield path
+        for module, imported in _IMPORT.findall(source.decode()):
+            folder, names = ROOT.joinpath(*module.split(".")), re.findall(r"\w+", imported)
+            used = [folder / f"{name}.py" for name in names]  # a module whose constants are used by its name
+            if any(name.isupper() for name in names):
+                used.append(folder.with_suffix(".py"))
+            yield from filter(Path.is_file, used)
 
 
-def _stamp_of(value: Any) -> Any:
-    """What numba's cache of a kernel is valid for; None for what is no kernel."""
-    file = getattr(getattr(value, "_cache", None), "_cache_file", None)
-    return getattr(file, "_source_stamp", None)
+def _delete_unused(base: Path) -> None:
+    for folder in base.glob("mjsim-kernels-*"):
+        if time.time() - folder.stat().st_mtime > UNUSED:
+            shutil.rmtree(folder, ignore_errors=True)

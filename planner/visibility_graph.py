@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from shapely.geometry.polygon import orient
 
-from planner.kernels import kernel
+from mjsim.kernels import kernel
 from planner.navmesh import TOLERANCE, NavMesh
 
 

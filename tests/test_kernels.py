@@ -1,28 +1,78 @@
-"""The cache of compiled kernels."""
+"""Machine code of kernels on disk."""
 
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
-import pytest
+from mjsim import kernels
 
-CALLEE = "from {room}.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
+CALLEE = "from mjsim.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
 CALLER = (
-    "from {room}.kernels import kernel\nfrom callee import factor\n\n\n"
-    "@kernel\ndef twice(x):\n    return 2 * factor() * x\n\n\nprint(twice(1))\n"
+    "from mjsim.kernels import kernel\nfrom planner.callee import factor\nfrom planner.limits import OFFSET\n\n\n"
+    "@kernel\ndef twice(x):\n    return 2 * factor() * x + OFFSET\n\n\n"
+    "print(twice(1), sum(twice.stats.cache_hits.values()))\n"
 )
 
 
-@pytest.mark.parametrize("room", ["mjsim", "planner"])
-def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path: Path, room: str) -> None:
+def _project(root: Path) -> None:
+    """A project of two packages with the real `mjsim.kernels` and two kernels."""
+    for package in ("mjsim", "planner"):
+        (root / package).mkdir()
+        (root / package / "__init__.py").touch()
+    (root / "mjsim/kernels.py").write_bytes(Path(kernels.__file__).read_bytes())
+    (root / "planner/caller.py").write_text(CALLER, encoding="utf-8")
+    _set(root, factor=1, offset=0)
+
+
+def _set(root: Path, factor: int, offset: int) -> None:
+    (root / "planner/callee.py").write_text(CALLEE.format(factor=factor), encoding="utf-8")
+    (root / "planner/limits.py").write_text(f"OFFSET = {offset}\n", encoding="utf-8")
+
+
+def _run(root: Path, cache: Path) -> str:
+    run = subprocess.run(
+        [sys.executable, "-c", "import planner.caller"],
+        cwd=root,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+    )
+    assert not run.stderr
+    return run.stdout.strip()
+
+
+def test_a_kernel_is_compiled_anew_when_one_that_it_calls_or_a_constant_has_changed(tmp_path: Path) -> None:
     """The caller's own file stays as it is."""
-    (tmp_path / "caller.py").write_text(CALLER.format(room=room), encoding="utf-8")
+    _project(tmp_path)
     printed = []
-    for factor in (1, 10, 10):
-        (tmp_path / "callee.py").write_text(CALLEE.format(room=room, factor=factor), encoding="utf-8")
-        run = subprocess.run(
-            [sys.executable, "-c", "import caller"], cwd=tmp_path, capture_output=True, text=True
-        )
-        assert not run.stderr
-        printed.append(run.stdout.strip())
-    assert printed == ["2", "20", "20"]
+    for factor, offset in ((1, 0), (10, 0), (10, 0), (10, 5)):
+        _set(tmp_path, factor, offset)
+        printed.append(_run(tmp_path, tmp_path / "cache"))
+    assert printed == ["2 0", "20 0", "20 1", "25 0"]  # the result, and whether it came from disk
+
+
+def test_an_unrelated_edit_recompiles_nothing_and_unused_machine_code_goes(tmp_path: Path) -> None:
+    _project(tmp_path)
+    cache = tmp_path / "cache"
+    _run(tmp_path, cache)
+    (tmp_path / "planner/other.py").write_text("x = 1\n", encoding="utf-8")
+    assert _run(tmp_path, cache) == "2 1"
+    (old,) = cache.iterdir()
+    (cache / "of-somebody-else").mkdir()
+    long_ago = time.time() - kernels.UNUSED - 1
+    for folder in cache.iterdir():
+        os.utime(folder, (long_ago, long_ago))
+    _set(tmp_path, factor=3, offset=0)
+    _run(tmp_path, cache)
+    assert not old.exists()
+    assert len(list(cache.iterdir())) == 2
+
+
+def test_kernels_work_where_nothing_can_be_cached(tmp_path: Path) -> None:
+    """Neither where no folder can be made, nor where numba refuses."""
+    _project(tmp_path)
+    assert _run(tmp_path, Path("/proc/self/nowhere")) == "2 0"
+    function = eval("lambda x: x + 1")  # it has no file
+    assert kernels.kernel(function)(2) == 3

@@ -8,7 +8,6 @@ import scipy.ndimage
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import planner.kernels
 from planner.errors import NavMeshError, NotNavigableError
 from planner.navmesh import NavMesh
 
@@ -158,15 +157,3 @@ def test_a_position_that_is_not_finite_is_refused():
     for ask in (mesh.is_navigable, mesh.snap):
         with pytest.raises(NotNavigableError, match="nan"):
             ask((math.nan, 0.0))
-
-
-def test_kernels_work_where_nothing_can_be_cached(monkeypatch):
-    real = planner.kernels.numba.njit
-
-    def refusing(*function, **options):
-        if options.get("cache"):
-            raise RuntimeError("cannot cache function: no locator available")
-        return real(*function, **options)
-
-    monkeypatch.setattr(planner.kernels.numba, "njit", refusing)
-    assert planner.kernels.kernel(lambda x: x + 1)(2) == 3

@@ -15,11 +15,11 @@ from mjsim.actions import Move
 from mjsim.model.catalogue import Catalogue
 from mjsim.episode import Episode
 from mjsim.model.scene import compose
-from mjsim.warmup import compile_kernels
+from experiments.warmup import compile_kernels
 from mjsim.world import World
 
 def compiled():
-    modules = [m for name, m in list(sys.modules.items()) if name.startswith("mjsim.")]
+    modules = [m for name, m in list(sys.modules.items()) if name.startswith(("mjsim.", "planner."))]
     kernels = {v for m in modules for v in vars(m).values() if isinstance(v, Dispatcher)}
     return {k.py_func.__module__ + "." + k.py_func.__name__: len(k.signatures) for k in kernels}
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.kernels import kernel
+from mjsim.kernels import kernel
 
 Path = NDArray[np.float64]
 

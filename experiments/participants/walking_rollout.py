@@ -15,7 +15,7 @@ from mjsim.fidelity.body_state import HEADING, X, Y
 from mjsim.fidelity.kinematics import Gait
 from mjsim.fidelity.kinematics import walk as walk_body
 from mjsim.fidelity.trunk_contact import Floor
-from planner.kernels import kernel
+from mjsim.kernels import kernel
 
 ARRIVED = 0.06  # m from the end of the way
 FACING = 0.25  # rad

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.kernels import kernel
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE
-from planner.kernels import kernel
 
 HOT, COLD = 0.5, 0.01  # temperature at both ends, in mean legs
 

@@ -6,12 +6,12 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.kernels import kernel
 from planner.exact.deadline import NEVER, Deadline
 from planner.exact.groups import numbered, together, with_one_alone
 from planner.exact.instance import Instance
 from planner.exact.relaxation import fill, walk
 from planner.exact.table import Table, new_table, rows_of
-from planner.kernels import kernel
 
 MEMORY = 0.97  # of a step in the record of what is picked too often or too rarely
 MOMENTUM = 0.8

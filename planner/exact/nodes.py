@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.kernels import kernel
 from planner.exact.table import INFINITE
-from planner.kernels import kernel
 
 NO_PARENT = -1
 

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.kernels import kernel
 from planner.exact.deadline import NEVER, Deadline
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE, Table
-from planner.kernels import kernel
 
 SLICE = 1 << 13  # rows that are filled between looks at the clock: some 5 ms
 

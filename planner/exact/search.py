@@ -8,11 +8,11 @@ is no state of its own: from there the way leads to one of two bins.
 
 from typing import NamedTuple
 
+from mjsim.kernels import kernel
 from planner.exact.deadline import Deadline
 from planner.exact.instance import Instance
 from planner.exact.nodes import NO_PARENT, Nodes, offer, with_room, with_room_among
 from planner.exact.table import INFINITE, Table
-from planner.kernels import kernel
 
 PLACE_BITS = 12
 SLICE = 1 << 12  # states that are expanded between looks at the clock: some 5 ms

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.kernels import kernel
 from planner.exact.deadline import Deadline
 from planner.exact.groups import alone
 from planner.exact.instance import Instance
@@ -11,7 +12,6 @@ from planner.exact.nodes import Nodes, new_nodes, slot_of
 from planner.exact.relaxation import after_pick, fill, row_without
 from planner.exact.search import PLACE_BITS, expand, offer_roots
 from planner.exact.table import INFINITE, Table, new_table
-from planner.kernels import kernel
 
 FIRST_ROOM = 1 << 12
 UNLIMITED = 1 << 40  # states of a layer
