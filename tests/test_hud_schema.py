@@ -17,10 +17,17 @@ from hud.schema import from_dict, json_schema, to_dict
 from hud.state import HudState
 
 
-def conforms(schema: dict[str, Any], value: Any) -> bool:
+def conforms(schema: dict[str, Any], value: Any, definitions: dict[str, Any] | None = None) -> bool:
     """A validator for the keywords in use, written from the JSON Schema specification."""
+    known_types = schema["$defs"] if definitions is None else definitions
+
+    def fits(part: dict[str, Any], value: Any) -> bool:
+        return conforms(part, value, known_types)
+
+    if "$ref" in schema:
+        return fits(known_types[schema["$ref"].removeprefix("#/$defs/")], value)
     if "anyOf" in schema:
-        return any(conforms(s, value) for s in schema["anyOf"])
+        return any(fits(part, value) for part in schema["anyOf"])
     if "enum" in schema:
         return value in schema["enum"]
     kind = schema["type"]
@@ -28,14 +35,14 @@ def conforms(schema: dict[str, Any], value: Any) -> bool:
         items = (
             schema.get("prefixItems") or [schema["items"]] * len(value) if isinstance(value, list) else None
         )
-        return items is not None and len(items) == len(value) and all(map(conforms, items, value))
+        return items is not None and len(items) == len(value) and all(map(fits, items, value))
     if kind == "object":
         known = schema["properties"]
         return (
             isinstance(value, dict)
             and set(schema["required"]) <= set(value)
             and (schema["additionalProperties"] or set(value) <= set(known))
-            and all(conforms(known[k], v) for k, v in value.items())
+            and all(fits(known[k], v) for k, v in value.items())
         )
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return {
@@ -73,8 +80,12 @@ DAMAGE: dict[str, tuple[tuple[Any, ...], Any, str]] = {
     "a number for text": (("checklist", 0, "text"), 3, r"\$\.checklist\[0\]\.text"),
     "text for a number": (("markers", 0, "position", 1), "x", r"\$\.markers\[0\]\.position\[1\]"),
     "a vector of two": (("markers", 0, "size"), [1.0, 2.0], r"\$\.markers\[0\]\.size"),
-    "an unknown shape": (("markers", 0, "shape"), "cone", "cone"),
-    "an unknown tone": (("message", "kind"), "shout", "shout"),
+    "an unknown shape": (
+        ("markers", 0, "shape"),
+        "cone",
+        r"'cone' - at `\$\.markers\[0\]\.shape`.*'box', 'cyl",
+    ),
+    "an unknown tone": (("message", "kind"), "shout", r"'shout' - at `\$\.message\.kind`.*'info', 'refusal'"),
     "no rows": (("checklist",), None, r"\$\.checklist"),
     "a truth for a count": (("total",), True, r"\$\.total"),
     "an extra field": (("extra",), 1, "extra"),
@@ -94,12 +105,22 @@ def test_damage_is_refused_with_its_place_and_does_not_fit_the_schema(what: str)
     assert not conforms(json_schema(), raw)
 
 
-def test_a_missing_field_is_refused() -> None:
+@pytest.mark.parametrize("path", [("bins",), ("clock",), ("markers", 0, "x_ray")])
+def test_a_missing_field_is_refused_even_if_it_has_a_default(path: tuple[Any, ...]) -> None:
     raw = a_state()
-    del raw["bins"]
-    with pytest.raises(SchemaError, match="bins"):
+    node: Any = raw
+    for key in path[:-1]:
+        node = node[key]
+    del node[path[-1]]
+    with pytest.raises(SchemaError, match=str(path[-1])):
         from_dict(raw)
     assert not conforms(json_schema(), raw)
+
+
+@pytest.mark.parametrize("raw", [None, 3, [], {1: 2}])
+def test_what_is_no_object_is_refused(raw: object) -> None:
+    with pytest.raises(SchemaError, match="json_schema"):
+        from_dict(raw)
 
 
 def test_the_schema_itself_is_json() -> None:
