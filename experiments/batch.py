@@ -18,15 +18,13 @@ from experiments import records
 from experiments.errors import ConfigError
 from experiments.files import read_json
 from experiments.house import House
-from experiments.lockstep import Play, drive_many, performer
 from experiments.table import write_tables
-from experiments.trial import TrialConfig, play_trial
+from experiments.trial import TrialConfig, run_trial
 
 TRIALS = "trials"
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
-GROUP = 4  # trials of a task for each of its worlds
 
-_Group = list[tuple[str, TrialConfig, Path]]
+_Job = tuple[str, TrialConfig, Path]
 
 
 @dataclass(frozen=True)
@@ -103,8 +101,6 @@ def run_batch(
     out: Path,
     *,
     workers: int,
-    worlds: int = 1,
-    threads: int = 1,
     on_progress: Callable[[BatchProgress], None] = lambda _: None,
 ) -> list[dict[str, Any]]:
     """Run every trial of the design that `out` does not hold yet, then write the tables.
@@ -113,21 +109,17 @@ def run_batch(
         batch: The design.
         out: Folder of the batch; an earlier batch there is added to.
         workers: Processes.
-        worlds: Trials that each of them runs side by side, a control step of all at a time. The records are the same,
-            to the last bit, however many.
-        threads: Threads of each process that step its worlds.
         on_progress: Called at the start and after every trial.
 
     Returns:
         The metrics of every trial of the design that succeeded, in the design's order.
 
     Raises:
-        ConfigError: `workers`, `worlds` or `threads` is not positive.
+        ConfigError: `workers` is not positive.
         RecordError: A table cannot be written.
     """
-    for what, count in (("worker", workers), ("world", worlds), ("thread", threads)):
-        if count < 1:
-            raise ConfigError(f"a batch needs at least one {what}, got {count}")
+    if workers < 1:
+        raise ConfigError(f"a batch needs at least one worker, got {workers}")
     trials = {trial_name(config): config for config in batch.trials()}
     folder = out / TRIALS
     folder.mkdir(parents=True, exist_ok=True)
@@ -141,8 +133,8 @@ def run_batch(
         workers, mp_context=multiprocessing.get_context("spawn"), initializer=_start_worker
     )
     try:
-        groups = _groups(missing, folder, group_size(len(missing), workers, worlds))
-        for failure in _results(pool, groups, workers, worlds, threads):
+        jobs = ((name, config, folder / name) for name, config in missing.items())
+        for failure in _results(pool, jobs, workers):
             if failure is None:
                 progress = dataclasses.replace(progress, done=progress.done + 1, failure=None)
             else:
@@ -160,36 +152,19 @@ def run_batch(
     return rows
 
 
-def group_size(trials: int, workers: int, worlds: int) -> int:
-    """Trials in one task of a worker: so many that one can take the place of another that is over, but few enough
-    that all workers have something to do."""
-    return max(worlds, min(GROUP * worlds, trials // workers)) if worlds > 1 else 1
-
-
-def _groups(trials: dict[str, TrialConfig], folder: Path, size: int) -> Iterator[_Group]:
-    jobs = iter([(name, config, folder / name) for name, config in trials.items()])
-    while group := list(itertools.islice(jobs, size)):
-        yield group
-
-
-def _results(
-    pool: ProcessPoolExecutor, groups: Iterator[_Group], workers: int, worlds: int, threads: int
-) -> Iterator[str | None]:
-    """Submit a few groups at a time; yield None for each trial that succeeds, else what went wrong."""
-    running: dict[Future[list[str | None]], _Group] = {}
+def _results(pool: ProcessPoolExecutor, jobs: Iterator[_Job], workers: int) -> Iterator[str | None]:
+    """Submit a few trials at a time; yield None for each one that succeeds, else what went wrong."""
+    running: dict[Future[str | None], str] = {}
     while True:
-        for group in itertools.islice(groups, workers * QUEUED_PER_WORKER - len(running)):
-            running[pool.submit(_run_group, group, worlds, threads)] = group
+        for name, config, out in itertools.islice(jobs, workers * QUEUED_PER_WORKER - len(running)):
+            running[pool.submit(_run, config, out)] = name
         if not running:
             return
         finished, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in finished:
-            group = running.pop(future)
-            error = future.exception()
-            if error is None:
-                yield from future.result()
-            else:
-                yield from (_failure(name, error) for name, _, _ in group)
+            name, error = running.pop(future), future.exception()
+            failure = future.result() if error is None else _failure(error)
+            yield None if failure is None else f"{name}: {failure}"
 
 
 @functools.cache
@@ -198,22 +173,17 @@ def _house(name: str) -> House:
     return House.load(name)
 
 
-def _run_group(group: _Group, worlds: int, threads: int) -> list[str | None]:
-    """Run trials, `worlds` of them side by side; None for each that succeeds, else what went wrong."""
-    plays = ((name, _play(config, out)) for name, config, out in group)
-    with performer(threads) as perform:
-        return [
-            _failure(name, result) if isinstance(result, Exception) else None
-            for name, result in drive_many(plays, worlds, perform)
-        ]
+def _run(config: TrialConfig, out: Path) -> str | None:
+    """Run a trial; None if it succeeds, else what went wrong, as text: not every exception survives pickling."""
+    try:
+        run_trial(config, out, topdown=False, house=_house(config.house))
+    except Exception as error:  # whatever goes wrong in one trial, the others go on
+        return _failure(error)
+    return None
 
 
-def _play(config: TrialConfig, out: Path) -> Play[dict[str, Any]]:
-    return (yield from play_trial(config, out, topdown=False, house=_house(config.house)))
-
-
-def _failure(name: str, error: BaseException) -> str:
-    return f"{name}: {type(error).__name__}: {error}"
+def _failure(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
 
 
 def _start_worker() -> None:

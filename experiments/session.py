@@ -1,25 +1,24 @@
 """The one loop: observe, show, let the user act, step the world. A script, a person and a replay all run in it."""
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, cast
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.assistant import OFF_THE_PATH, Assistant
 from experiments.errors import SessionError
-from experiments.lockstep import Finish, Outcome, Play, Request, Step, Walk, drive
 from experiments.participants.base import Foreseeing, Guidance, Outlook, Participant, Percept, Things
+from experiments.participants.visit_tasks import NO_MOVES
 from experiments.recording import Recording
 from experiments.records import EventLog, Trajectory
 from mjsim.actions import IDLE, Action, ActionResult, WorldEvent
 from mjsim.errors import PhysicsError
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.rollout import Rollout
 from mjsim.visibility import visible_objects
-from mjsim.world import StepResult, World
+from mjsim.world import World
 
 ALL_DELIVERED, TIME_LIMIT, INTERRUPTED, PHYSICS_ERROR = (
     "all delivered",
@@ -27,8 +26,8 @@ ALL_DELIVERED, TIME_LIMIT, INTERRUPTED, PHYSICS_ERROR = (
     "interrupted",
     "physics error",
 )
-AFTERGLOW = 1.6  # s the session goes on after the last delivery, so that the person sees that all is done
-LONGEST_MOTION = 30.0  # s; no pick or place takes as long
+FINAL_HOLD = 1.6  # s the session goes on after the last delivery, so that the person sees that all is done
+MAX_MOTION = 30.0  # s; no pick or place takes as long
 
 
 class Viewer(Protocol):
@@ -92,6 +91,7 @@ class Session:
         self._time_limit = time_limit
         self._viewer = viewer
         self._shown: frozenset[str] = frozenset()
+        self._answer: ActionResult | None = None
         self._recorded_until = 0.0
         self._foreseeing: Foreseeing | None = None
         if foresight and viewer is None and world.options.fidelity != "full":
@@ -107,22 +107,17 @@ class Session:
             SessionError: The participant needs guidance that the assistance condition does not show.
             PhysicsError: The physics failed; the log says when.
         """
-        return drive(self.play(on_progress))
-
-    def resume(self, observation: Observation, on_progress: OnProgress = lambda _: None) -> str:
-        """Run to the end from where the world and the assistant are now; returns and raises as `run` does."""
-        return drive(self._play_on(observation, on_progress))
-
-    def play(self, on_progress: OnProgress = lambda _: None) -> Play[str]:
-        """Run as a generator: yields what the world is to do and takes what came of it; returns as `run` does.
-
-        A `PhysicsError` or `KeyboardInterrupt` that comes of it is thrown in.
-        """
         observation = self._world.reset()
         self._assistant.begin(observation)
-        return (yield from self._play_on(observation, on_progress))
+        self.start(observation)
+        return self.finish(on_progress)
 
-    def _play_on(self, observation: Observation, on_progress: OnProgress) -> Play[str]:
+    def start(self, observation: Observation) -> None:
+        """Start from where the world and the assistant are now.
+
+        Raises:
+            SessionError: The participant needs guidance that the assistance condition does not show.
+        """
         self._now = observation
         self._shown = frozenset(m.role for m in self._assistant.hud_state(observation).markers)
         if not self._participant.needs <= self._shown:
@@ -130,8 +125,16 @@ class Session:
                 f"this participant needs {sorted(self._participant.needs)} markers but the assistance condition shows "
                 f"{sorted(self._shown) or 'none'}; choose another --user or --assistance"
             )
+
+    def finish(self, on_progress: OnProgress = lambda _: None) -> str:
+        """Go on to the end, once started; returns and raises as `run` does."""
         try:
-            reason = yield from self._until_done(on_progress)
+            reason = self._end_reason
+            while reason is None:
+                self.advance()
+                on_progress(self.progress)
+                reason = self._end_reason
+            self._end(reason)
         except KeyboardInterrupt:
             # What has been done so far is kept and measured, as it would be for a person who stops early.
             reason = INTERRUPTED
@@ -142,88 +145,98 @@ class Session:
         self._log.append(self._now.time, "end", reason=reason)
         return reason
 
-    def _until_done(self, on_progress: OnProgress) -> Play[str]:
-        answer: ActionResult | None = None
-        total = len(self._now.object_names)
-        delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
-        while self._now.time < self._time_limit - 1e-9:
-            self._now = self.recording.pass_checkpoint(self._now)
-            self._film()
-            percept = self._percept(answer)
-            foreseen = None if self._foreseeing is None else self._foresee(self._foreseeing, percept)
-            if foreseen is not None:
-                answer, events = None, (yield from self._stride(foreseen))
-            else:
-                answer, events = yield from self._step(self._participant.act(percept))
-            if events:
-                delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
-            on_progress(Progress(self._now.time, delivered, total))
-            if delivered == total:
-                self._assistant.say("finished", self._now.time)
-                self._record(IDLE)
-                yield from self._glow()
-                return ALL_DELIVERED
-        self._record(IDLE)
-        return TIME_LIMIT
+    @property
+    def progress(self) -> Progress:
+        """How far the session has got."""
+        delivered = sum(status is ObjectStatus.DELIVERED for status in self._now.object_status)
+        return Progress(self._now.time, delivered, len(self._now.object_names))
 
-    def _step(
-        self, action: Action
-    ) -> Generator[Request, Outcome, tuple[ActionResult | None, tuple[WorldEvent, ...]]]:
+    def advance(self) -> None:
+        """Let the participant decide once, and do that: one control step, or many that nobody has to see.
+
+        Raises:
+            PhysicsError: The physics failed.
+        """
+        self._now = self.recording.pass_checkpoint(self._now)
+        self._film()
+        percept = self._percept(self._answer)
+        moves = None if self._foreseeing is None else self._foresee(self._foreseeing, percept)
+        if moves is None:
+            self._step(self._participant.act(percept))
+        else:
+            self._answer = None
+            self._stride(moves)
+
+    @property
+    def _end_reason(self) -> str | None:
+        """Why the session is over, or None if it is not."""
+        progress = self.progress
+        if progress.delivered == progress.total:
+            return ALL_DELIVERED
+        return TIME_LIMIT if progress.time >= self._time_limit - 1e-9 else None
+
+    def _end(self, reason: str) -> None:
+        """Record the last state, and let the viewer see that all is done."""
+        if reason == ALL_DELIVERED:
+            self._assistant.say("finished", self._now.time)
+        self._record(IDLE)
+        if reason == ALL_DELIVERED:
+            self._hold_final_view()
+
+    def _step(self, action: Action) -> None:
         """One control step, observed by everybody."""
         self._record(action)
-        step = cast(StepResult, (yield Step(self._world, action)))
-        self._now = step.observation
+        step = self._world.step(action)
+        self._now, self._answer = step.observation, step.result
         if step.result is not None:
             self._note_attempt(self._now.time, step.result)
         self._take_note(step.events)
-        return step.result, step.events
 
-    def _foresee(self, participant: Foreseeing, percept: Percept) -> Walk | Finish | None:
-        """Many control steps at once, or None where each has to be observed."""
+    def _foresee(self, participant: Foreseeing, percept: Percept) -> NDArray[np.float64] | None:
+        """Moves of many control steps at once, none to wait for a pick or place; None where each has to be observed."""
         left = int((self._time_limit - percept.time) / self._world.control_timestep) - 1
         if self._assistant.expecting or (percept.answer is not None and not percept.answer.applied):
             return None
         if percept.busy:
-            in_time = left * self._world.control_timestep > LONGEST_MOTION
-            return Finish(self._world) if in_time and participant.waits() else None
+            in_time = left * self._world.control_timestep > MAX_MOTION
+            return NO_MOVES if in_time and participant.waits() else None
         limit = min(left, self.recording.steps_to_checkpoint)
         locomotion = self._world.locomotion
         if limit < 1 or locomotion is None:
             return None
         moves = participant.foresee(percept, Outlook(locomotion, limit, stray=OFF_THE_PATH))
-        return Walk(self._world, moves) if len(moves) else None
+        return moves if len(moves) else None
 
-    def _stride(self, request: Walk | Finish) -> Generator[Request, Outcome, tuple[WorldEvent, ...]]:
+    def _stride(self, moves: NDArray[np.float64]) -> None:
         """Many control steps, recorded as if they had been observed one by one."""
         self._recorded_until = self._now.time
         self.recording.append()
         health = self._world.health_sample
-        stretch = cast(Rollout, (yield request))
+        walks = len(moves) > 0
+        stretch = self._world.walk(moves) if walks else self._world.finish()
         count = len(stretch)
-        moves = request.moves[:count] if isinstance(request, Walk) else np.zeros((count, 4))
         self.recording.extend(stretch.state_hashes[:-1])
-        self.trajectory.extend(self._now, health, stretch, moves)
+        self.trajectory.extend(self._now, health, stretch, moves[:count] if walks else np.zeros((count, 4)))
         self._now = stretch.observation
-        if isinstance(request, Walk):
+        if walks:
             if self._foreseeing is not None:
                 self._foreseeing.went(count)
             quiet = count - 1 if stretch.events else count
             self._assistant.walked(stretch.positions[:quiet], self._now)
-        if stretch.events or isinstance(request, Finish):
+        if stretch.events or not walks:
             self._take_note(stretch.events)
-        return stretch.events
 
     def _record(self, action: Action) -> None:
         self._recorded_until = self._now.time
         self.recording.append()
         self.trajectory.append(self._now, action, self._world.health_sample)
 
-    def _glow(self) -> Generator[Request, Outcome, None]:
+    def _hold_final_view(self) -> None:
         """Let the viewer see the end for a moment; nothing of it is measured."""
         end = self._now
-        while self._viewer is not None and self._now.time < end.time + AFTERGLOW:
+        while self._viewer is not None and self._now.time < end.time + FINAL_HOLD:
             self._film()
-            self._now = cast(StepResult, (yield Step(self._world, IDLE))).observation
+            self._now = self._world.step(IDLE).observation
         self._now = end
 
     def _take_note(self, events: tuple[WorldEvent, ...]) -> None:

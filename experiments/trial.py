@@ -18,7 +18,6 @@ from experiments.files import save_arrays, write_json
 from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
 from experiments.health import summarise_health
 from experiments.house import House
-from experiments.lockstep import Play, drive
 from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
 from experiments.recording import provenance
@@ -116,25 +115,12 @@ def run_trial(
         ExperimentError, MjsimError, PlannerError, HudError: The configuration or the run directory is unusable.
         PhysicsError: The physics failed. What led there is kept beside `out`, and the message says where.
     """
-    return drive(play_trial(config, out, film=film, topdown=topdown, house=house, on_progress=on_progress))
-
-
-def play_trial(
-    config: TrialConfig,
-    out: Path,
-    *,
-    film: FilmConfig | None = None,
-    topdown: bool = True,
-    house: House | None = None,
-    on_progress: OnProgress = lambda _: None,
-) -> Play[dict[str, Any]]:
-    """A trial as a generator, as `Session.play`; takes, returns and raises what `run_trial` does."""
     started = time.perf_counter()
     house = house or House.load(config.house)
     episode = house.sample_episode(objects=config.objects, seed=config.seed)
     with run_directory(out) as folder:
         scene = compose(episode, house.catalogue)
-        ran = yield from _simulate(config, house, scene, folder, film, on_progress)
+        ran = _simulate(config, house, scene, folder, film, on_progress)
         arrays = ran.session.trajectory.arrays()
         episode.save(folder / records.EPISODE)
         save_arrays(folder / records.TRAJECTORY, arrays)
@@ -178,14 +164,14 @@ def _simulate(
     folder: Path,
     film: FilmConfig | None,
     on_progress: OnProgress,
-) -> Play[_Ran]:
+) -> _Ran:
     """Run the session of a trial; log and video are complete in `folder` afterwards."""
-    ran = yield from _simulate_once(config, house, scene, folder, film, on_progress, foresight=True)
+    ran = _simulate_once(config, house, scene, folder, film, on_progress, foresight=True)
     if isinstance(ran.ended, PhysicsError) and config.fidelity != "full":
         # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
         for path in folder.iterdir():
             path.unlink()
-        ran = yield from _simulate_once(config, house, scene, folder, film, on_progress, foresight=False)
+        ran = _simulate_once(config, house, scene, folder, film, on_progress, foresight=False)
     return ran
 
 
@@ -198,7 +184,7 @@ def _simulate_once(
     on_progress: OnProgress,
     *,
     foresight: bool,
-) -> Play[_Ran]:
+) -> _Ran:
     with ExitStack() as stack:
         log = stack.enter_context(EventLog(folder / records.EVENTS))
         video = viewer = None
@@ -212,7 +198,7 @@ def _simulate_once(
             replanner = stack.enter_context(LiveReplanner(house.geodesics, solver(config.planner)))
         session, _ = prepare_session(config, house, scene, log, viewer, replanner, foresight=foresight)
         try:
-            ended: str | PhysicsError = yield from session.play(on_progress)
+            ended: str | PhysicsError = session.run(on_progress)
         except PhysicsError as error:
             ended = error
     return _Ran(session, log, ended, video.frames_sha256 if video else None)

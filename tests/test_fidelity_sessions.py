@@ -1,6 +1,4 @@
-"""Trials outside of full physics: foreseen or stepped, alone or side by side, run or replayed, they are the same."""
-
-import json
+"""Trials outside of full physics: foreseen or stepped, run or replayed, they are the same."""
 
 import numpy as np
 import pytest
@@ -10,17 +8,14 @@ from experiments.agreement import run_in
 from experiments.errors import ReplayError
 from experiments.files import read_arrays, read_json
 from experiments.house import House
-from experiments.lockstep import Step, drive_many, performer
 from experiments.participants.base import Foreseeing
 from experiments.participants.follower import Follower
 from experiments.records import EventLog, read_events
 from experiments.replaying.replay import replay
-from experiments.trial import TrialConfig, play_trial, prepare_session, run_trial
+from experiments.trial import TrialConfig, prepare_session, run_trial
 from mjsim.errors import PhysicsError
 from mjsim.health.monitor import HealthMonitor
 from mjsim.model.scene import compose
-
-FILES = (records.EVENTS, records.EPISODE, records.TRAJECTORY, records.RECORDING, records.PLAN)
 
 
 @pytest.fixture(scope="module")
@@ -52,15 +47,16 @@ def played(house, config, *, foresight):
     """Arrays, log and state hashes of a trial, and how many single control steps its session asked for."""
     scene = compose(house.sample_episode(objects=config.objects, seed=config.seed), house.catalogue)
     log = EventLog()
-    session, _ = prepare_session(config, house, scene, log, foresight=foresight)
-    play, singles = session.play(), 0
-    try:
-        request = next(play)
-        while True:
-            singles += isinstance(request, Step)
-            request = play.send(request.perform())
-    except StopIteration as over:
-        assert over.value == "all delivered"
+    session, world = prepare_session(config, house, scene, log, foresight=foresight)
+    singles, step = 0, world.step
+
+    def counted(action):
+        nonlocal singles
+        singles += 1
+        return step(action)
+
+    world.step = counted
+    assert session.run() == "all delivered"
     arrays = {name: array.tobytes() for name, array in session.trajectory.arrays().items()}
     hashes = session.recording.state_hashes()
     return (
@@ -109,37 +105,6 @@ def test_the_fidelity_is_part_of_the_record(event_run):
     start = read_events(event_run / records.EVENTS)[0]
     assert start["fidelity"] == start["world"]["fidelity"] == "event"
     assert read_json(event_run / records.METRICS)["fidelity"] == "event"
-
-
-def test_side_by_side_is_as_one_by_one(house, tmp_path):
-    """Three trials of each fidelity, two at a time, one of which cannot even begin."""
-    configs = [
-        TrialConfig(objects=objects, assistance="optimal", seed=2, fidelity=fidelity, time_limit=12.0)
-        for fidelity in ("full", "windows", "event")
-        for objects in (2, 41, 3)
-    ]
-    names = [f"{config.fidelity}-{config.objects}" for config in configs]
-    for way, threads in (("alone", 0), ("together", 1), ("threads", 2)):
-        folder = tmp_path / way
-        plays = [
-            (name, play_trial(config, folder / name, topdown=False, house=house))
-            for name, config in zip(names, configs, strict=True)
-        ]
-        with performer(threads or 1) as perform:
-            results = dict(drive_many(plays, 1 if not threads else 4, perform))
-        assert {n for n, r in results.items() if isinstance(r, Exception)} == {
-            n for n in names if n.endswith("41")
-        }
-    for name in (n for n in names if not n.endswith("41")):
-        for file in FILES:
-            contents = {
-                (tmp_path / way / name / file).read_bytes() for way in ("alone", "together", "threads")
-            }
-            assert len(contents) == 1, (name, file)
-        metrics = [
-            read_json(tmp_path / way / name / records.METRICS) for way in ("alone", "together", "threads")
-        ]
-        assert len({json.dumps({**m, "wall_s": 0}) for m in metrics}) == 1
 
 
 def test_a_failure_of_the_physics_within_a_walk_leaves_every_step(house, tmp_path, monkeypatch):

@@ -32,8 +32,7 @@ Run every combination of --objects, --assistance and --seeds, without video, one
 directory under OUT/trials; OUT/trials.parquet and OUT/trials.csv hold a row per trial. Finished trials are not
 run again: after an interruption, or to enlarge the design, give the command once more.
 
-Records are the same to the last bit whatever --workers, --worlds and --threads are. Processes are the quickest way to
-use a computer's cores; worlds that take their steps together pay only where there are fewer processes than cores."""
+Records are the same to the last bit whatever --workers is."""
 
 
 def add_parser(commands: Any) -> None:
@@ -68,16 +67,6 @@ def add_parser(commands: Any) -> None:
     add_regret(parser)
     parser.add_argument(
         "--workers", type=int, default=os.cpu_count(), metavar="N", help="processes (one per core)"
-    )
-    parser.add_argument(
-        "--worlds",
-        type=int,
-        default=1,
-        metavar="K",
-        help="trials that each process runs side by side, a control step of all at a time (1)",
-    )
-    parser.add_argument(
-        "--threads", type=int, default=1, metavar="N", help="threads of each process that step its worlds (1)"
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the batch")
     parser.set_defaults(run=run)
@@ -123,8 +112,6 @@ def run(arguments: argparse.Namespace) -> int:
             batch,
             arguments.out,
             workers=arguments.workers,
-            worlds=arguments.worlds,
-            threads=arguments.threads,
             on_progress=show,
         )
     console.print(

@@ -154,7 +154,8 @@ class Replayer:
         )
         self._plans.clock = lambda: float(self._world.data.time)
         try:
-            reason = session.resume(self._observation, lambda _: on_progress(recording.step, record.steps))
+            session.start(self._observation)
+            reason = session.finish(lambda _: on_progress(recording.step, record.steps))
             if reason == INTERRUPTED:
                 raise KeyboardInterrupt
         except _EndOfReplay:
