@@ -14,8 +14,7 @@ from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.scene import Scene, compose
 from mjsim.observation import ObjectStatus
 from mjsim.person.feasibility import receptacle_distance
-from mjsim.person.person import minimum_jerk
-from mjsim.person.picking import lead_blend
+from mjsim.person.hand_path import ACROSS_FIRST, UP_FIRST, minimum_jerk, point_between
 from mjsim.person.slots import object_corners
 from mjsim.world import World
 
@@ -225,8 +224,8 @@ def test_minimum_jerk_starts_and_ends_at_rest() -> None:
 
 def test_a_lift_goes_up_before_it_goes_across() -> None:
     start, goal = np.zeros(3), np.array([1.0, 1.0, 1.0])
-    up = [lead_blend(start, goal, p, leading="up") for p in np.linspace(0, 1, 21)]
-    down = [lead_blend(start, goal, p, leading="across") for p in np.linspace(0, 1, 21)]
+    up = [point_between(start, goal, p, UP_FIRST, 0.2) for p in np.linspace(0, 1, 21)]
+    down = [point_between(start, goal, p, ACROSS_FIRST, 0.2) for p in np.linspace(0, 1, 21)]
     assert up[0] == pytest.approx(start) and up[-1] == pytest.approx(goal)
     assert all(p[2] >= p[0] == p[1] for p in up) and up[8][2] > 2 * up[8][0]
     assert all(p[2] <= p[0] == p[1] for p in down)

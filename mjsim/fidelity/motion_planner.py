@@ -1,4 +1,4 @@
-"""Picks and places worked out without physics, with the constants of `mjsim.person.picking` and `placing`.
+"""Picks and places worked out without physics, with the times and speeds of `mjsim.person.motion_parameters`.
 
 Only the fall of what is let go is physics. It decides on success by the same test as placing does.
 """
@@ -17,19 +17,11 @@ from mjsim.fidelity.fall import drop
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import BODY, HANDS
 from mjsim.fidelity.kinematic_world import Walker
-from mjsim.fidelity.motion_primitives import ACROSS_FIRST, STRAIGHT, UP_FIRST, Script
+from mjsim.fidelity.motion_primitives import Script
 from mjsim.model import avatar
 from mjsim.model.receptacles import ReceptacleGeometry
-from mjsim.person.person import FACE_TIMEOUT
-from mjsim.person.picking import ALIGN_TIME, LIFT_TIME, REACH_TIME
-from mjsim.person.placing import (
-    DESCENT_SPEED,
-    HAND_SPEED,
-    RELEASE_GAP,
-    STILL_TIME,
-    hover_height,
-    square_heading,
-)
+from mjsim.person.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
+from mjsim.person.placing import hover_height, square_heading
 from mjsim.person.slots import Footprint, Slot, best_slot, object_corners
 
 Vector = NDArray[np.float64]
@@ -37,8 +29,6 @@ Vector = NDArray[np.float64]
 _MOST = 400  # control steps of a motion
 _APPROACH = 2  # control steps that a hand lags behind at the end of a reach
 _SEATING = 1  # control step in which a load is drawn into a hand that closes firmly
-_FACING, _SQUARE = 0.35, 0.04  # rad
-_LIFTS, _LIFT = 4, 0.035  # control steps and m of each, of a hand that withdraws
 _ANYWHERE = math.nan
 
 
@@ -91,10 +81,12 @@ class MotionPlanner:
         pitch = walker.pitch_target
         row, grip = self._reach(script, hand, item)
         walker.hold(hand, item, grip)
-        row = self._wait(script, row, hand, person.steps(ALIGN_TIME))
+        row = self._wait(script, row, hand, person.steps(person.motion.align_time))
         goal = walker.place_for(hand, item)
         ahead = np.array([math.nan, math.nan, pitch])
-        row = self._swing(script, row, hand, goal, person.steps(LIFT_TIME), UP_FIRST, ahead, False)
+        row = self._swing(
+            script, row, hand, goal, person.steps(person.motion.lift_time), UP_FIRST, ahead, False
+        )
         row = self._wait(script, row, hand, _SEATING)
         row = motion_primitives.end(walker.live, walker.poses, script, row, walker.carry_posture, house)
         walker.live[:], walker.poses[:] = before
@@ -107,17 +99,17 @@ class MotionPlanner:
         script = Script.empty(_MOST, len(walker.poses))
         pitch = walker.pitch_target
         row, slot, low = self._bring_over(script, hand, item, receptacle)
-        row = self._wait(script, row, hand, person.steps(STILL_TIME))
+        row = self._wait(script, row, hand, person.steps(person.motion.hover_time))
         row = self._descend(
             script,
             row,
             hand,
             receptacle,
-            _over(slot.hand, slot.fill + RELEASE_GAP - low),
+            _over(slot.hand, slot.fill + person.motion.release_gap - low),
         )
         fall = drop(self._full, walker, hand, item, receptacle)
         row = motion_primitives.let_go(
-            walker.live, walker.poses, script, row, hand, fall.poses, _LIFTS, _LIFT, pitch, self._aside, walker.house
+            walker.live, walker.poses, script, row, hand, fall.poses, pitch, self._aside, person.motion, walker.house
         )  # fmt: skip
         walker.poses[:] = fall.rest
         released = row - len(fall.poses)
@@ -132,11 +124,13 @@ class MotionPlanner:
         """Turn to an object and reach for it; the next row, and the grip that is nearest then."""
         person = self._full.person
         center = person.center(item)
-        row = self._face(script, center, _ANYWHERE, _FACING)
+        row = self._face(script, center, _ANYWHERE, person.motion.object_tolerance)
         heading = float(self._walker.live[BODY + HEADING])
         grip = person.grips.grip_along(item, np.array([math.cos(heading), math.sin(heading), 0.0]))
         point = person.grips.point(item, grip)
-        row = self._swing(script, row, hand, point, person.steps(REACH_TIME), ACROSS_FIRST, center, True)
+        row = self._swing(
+            script, row, hand, point, person.steps(person.motion.reach_time), ACROSS_FIRST, center, True
+        )
         return self._wait(script, row, hand, _APPROACH), grip
 
     def _bring_over(
@@ -144,15 +138,17 @@ class MotionPlanner:
     ) -> tuple[int, Slot, float]:
         """Turn to a receptacle and bring what is held over it; the next row, the slot, and how far it hangs down, m."""
         person = self._full.person
-        row = self._face(script, receptacle.center, square_heading(person, receptacle), _SQUARE)
+        tolerance = person.motion.receptacle_tolerance
+        row = self._face(script, receptacle.center, square_heading(person, receptacle), tolerance)
         footprint = self._footprint(hand, receptacle)
         low = float(footprint.low[2])
         slot = best_slot(person, item, receptacle, footprint)
-        hover = _over(slot.hand, hover_height(receptacle, slot) - low)
+        hover = _over(slot.hand, hover_height(person, receptacle, slot) - low)
         return self._travel(script, row, hand, receptacle, hover), slot, low
 
     def _face(self, script: Script, point: Vector, heading: float, tolerance: float) -> int:
-        walker, most = self._walker, self._full.person.steps(FACE_TIMEOUT)
+        walker, person = self._walker, self._full.person
+        most = person.steps(person.motion.turn_timeout)
         x, y, z = point.tolist()
         return motion_primitives.face(
             walker.live,
@@ -166,6 +162,7 @@ class MotionPlanner:
             tolerance,
             most,
             self._tucked,
+            person.motion,
             walker.house,
         )
 
@@ -174,7 +171,8 @@ class MotionPlanner:
     ) -> int:  # fmt: skip
         walker = self._walker
         return motion_primitives.swing(
-            walker.live, walker.poses, script, row, hand, goal, in_house, count, manner, look, self._aside, walker.house
+            walker.live, walker.poses, script, row, hand, goal, in_house, count, manner, look, self._aside,
+            self._full.person.motion, walker.house,
         )  # fmt: skip
 
     def _wait(self, script: Script, row: int, hand: int, count: int) -> int:
@@ -193,7 +191,7 @@ class MotionPlanner:
             if up_first:
                 there = np.array([start[0], start[1], max(start[2], there[2])])
             distance = float(np.linalg.norm(there - start))
-            count = 0 if distance < 0.005 else person.steps(0.12 + distance / HAND_SPEED)
+            count = person.travel_steps(distance)
             towards, in_house = (there, False) if up_first else (goal, True)
             row = self._swing(script, row, hand, towards, count, STRAIGHT, receptacle.center, in_house)
         return row
@@ -202,7 +200,7 @@ class MotionPlanner:
         self, script: Script, row: int, hand: int, receptacle: ReceptacleGeometry, at: Vector
     ) -> int:
         start, goal = self._hand(hand), self._in_body(receptacle.center + receptacle.rotation @ at)
-        count = self._full.person.steps(0.12 + abs(float(goal[2] - start[2])) / DESCENT_SPEED)
+        count = self._full.person.descent_steps(abs(float(goal[2] - start[2])))
         ahead = np.array([math.nan, math.nan, self._walker.live[BODY + LOOK]])
         row = self._swing(script, row, hand, goal, count, STRAIGHT, ahead, False)
         return self._wait(script, row, hand, 1)  # to see that it touches nothing

@@ -21,15 +21,12 @@ from mjsim.fidelity.kinematic_steps import (
 from mjsim.fidelity.kinematics import Gait
 from mjsim.kernels import kernel
 from mjsim.model.avatar import EYE_FORWARD, EYE_HEIGHT
-from mjsim.person.person import TURN_GAIN
+from mjsim.person.hand_path import progress
+from mjsim.person.motion_parameters import MotionParameters
 
 Floats = NDArray[np.float64]
 
-STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # how a hand gets from one place to another
 _SPEEDS = HAND_SPEEDS - HANDS
-_SHIFT = 0.2  # share of a movement by which height follows or leads, as in `picking.lead_blend`
-_STANDING = 0.1  # m/s
-_STEADY = 0.5  # rad/s
 
 
 class Script(NamedTuple):
@@ -51,8 +48,9 @@ class Script(NamedTuple):
 
 @kernel
 def turn_step(
-    body: Floats, x: float, y: float, z: float, heading: float, tolerance: float, gait: Gait
-) -> bool:
+    body: Floats, x: float, y: float, z: float, heading: float, tolerance: float, motion: MotionParameters,
+    gait: Gait,
+) -> bool:  # fmt: skip
     """One decision of `Person.face`: whether the person stands and faces (x, y, z), or the heading unless NaN.
 
     If not, the commands are set for the next control step; if so, they are those of standing.
@@ -61,41 +59,45 @@ def turn_step(
     error = towards - body[HEADING]
     error = (error + math.pi) % (2.0 * math.pi) - math.pi
     speed = math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
-    if abs(error) < tolerance and speed < _STANDING and abs(body[TURN_RATE]) < _STEADY:
+    if (
+        abs(error) < tolerance
+        and speed < motion.standing_speed
+        and abs(body[TURN_RATE]) < motion.standing_turn_rate
+    ):
         body[FORWARD] = body[LEFT] = body[TURN] = 0.0
         return True
-    kinematics.brake(body, TURN_GAIN * error if abs(error) > 0.5 * tolerance else 0.0, gait)
-    glance(body, x, y, z, gait)
+    kinematics.brake(body, motion.turn_gain * error if abs(error) > 0.5 * tolerance else 0.0, gait)
+    glance(body, x, y, z, motion, gait)
     return False
 
 
 @kernel
-def glance(body: Floats, x: float, y: float, z: float, gait: Gait) -> None:
+def glance(body: Floats, x: float, y: float, z: float, motion: MotionParameters, gait: Gait) -> None:
     """Move the head's pitch towards a point of the house."""
     out = EYE_FORWARD * math.cos(body[PITCH])
     dx = x - body[X] - out * math.cos(body[HEADING])
     dy = y - body[Y] - out * math.sin(body[HEADING])
     dz = z - EYE_HEIGHT - EYE_FORWARD * math.sin(body[PITCH])
-    look_towards(body, math.atan2(dz, math.sqrt(dx * dx + dy * dy)), gait)
+    look_towards(body, math.atan2(dz, math.sqrt(dx * dx + dy * dy)), motion, gait)
 
 
 @kernel
-def look_towards(body: Floats, pitch: float, gait: Gait) -> None:
+def look_towards(body: Floats, pitch: float, motion: MotionParameters, gait: Gait) -> None:
     """Move the head's pitch towards an angle, at the pace of a glance."""
-    most = 2.0 * gait.dt
-    change = min(most, max(-most, 0.25 * (pitch - body[LOOK])))
+    most = motion.look_speed * gait.dt
+    change = min(most, max(-most, motion.look_gain * (pitch - body[LOOK])))
     kinematics.look_at(body, body[LOOK] + change, gait)
 
 
 @kernel
 def face(
     live: Floats, poses: Floats, script: Script, row: int, x: float, y: float, z: float, heading: float,
-    tolerance: float, most: int, posture: Floats, house: KinematicModel,
+    tolerance: float, most: int, posture: Floats, motion: MotionParameters, house: KinematicModel,
 ) -> int:  # fmt: skip
     """Stand still and turn, as `Person.face`; returns the next free row of the script."""
     body = live[BODY:HANDS]
     for _ in range(most):
-        if turn_step(body, x, y, z, heading, tolerance, house.gait):
+        if turn_step(body, x, y, z, heading, tolerance, motion, house.gait):
             return row
         tick(live, poses, posture, -1, house)
         row = _note(live, poses, script, row)
@@ -106,7 +108,7 @@ def face(
 @kernel
 def swing(
     live: Floats, poses: Floats, script: Script, row: int, hand: int, goal: Floats, in_house: bool, count: int,
-    manner: int, look: Floats, posture: Floats, house: KinematicModel,
+    manner: int, look: Floats, posture: Floats, motion: MotionParameters, house: KinematicModel,
 ) -> int:  # fmt: skip
     """Move a hand in `count` control steps to a goal in the frame of the house or of the body, (3,) m.
 
@@ -122,14 +124,14 @@ def swing(
             c, s = math.cos(body[HEADING]), math.sin(body[HEADING])
             dx, dy = goal[0] - body[X], goal[1] - body[Y]
             goal_f, goal_l = c * dx + s * dy, c * dy - s * dx
-        across, up = _shares(k / count, manner)
+        across, up = progress(k / count, manner, motion.lead)
         live[first] = start_f + across * (goal_f - start_f)
         live[first + 1] = start_l + across * (goal_l - start_l)
         live[first + 2] = start_u + up * (goal_u - start_u)
         if math.isnan(look[0]):
-            look_towards(body, look[2], house.gait)
+            look_towards(body, look[2], motion, house.gait)
         else:
-            glance(body, look[0], look[1], look[2], house.gait)
+            glance(body, look[0], look[1], look[2], motion, house.gait)
         tick(live, poses, posture, hand, house)
         row = _note(live, poses, script, row)
     return row
@@ -137,18 +139,18 @@ def swing(
 
 @kernel
 def let_go(
-    live: Floats, poses: Floats, script: Script, row: int, hand: int, fall: Floats, lifts: int, lift: float,
-    pitch: float, posture: Floats, house: KinematicModel,
+    live: Floats, poses: Floats, script: Script, row: int, hand: int, fall: Floats, pitch: float,
+    posture: Floats, motion: MotionParameters, house: KinematicModel,
 ) -> int:  # fmt: skip
     """Withdraw a hand upwards, then to its rest, while objects fall: their poses are `fall`, (k, n, 7)."""
     first = HANDS + 3 * hand
     for k in range(len(fall)):
         goal = live[first : first + 3].copy()
-        if k < lifts:
-            goal[2] += lift
+        if k < motion.withdraw_steps:
+            goal[2] += motion.withdraw_step
         poses[:] = fall[k]
-        look_towards(live[BODY:HANDS], pitch, house.gait)
-        if k < lifts:
+        look_towards(live[BODY:HANDS], pitch, motion, house.gait)
+        if k < motion.withdraw_steps:
             live[first : first + 3] = goal
             tick(live, poses, posture, hand, house)
         else:
@@ -179,19 +181,3 @@ def _note(live: Floats, poses: Floats, script: Script, row: int) -> int:
     script.live[row] = live
     script.poses[row] = poses
     return row + 1
-
-
-@kernel
-def _shares(phase: float, manner: int) -> tuple[float, float]:
-    """How far a hand has come across and up at a phase of its movement."""
-    if manner == STRAIGHT:
-        share = _minimum_jerk(phase)
-        return share, share
-    early, late = _minimum_jerk(phase / (1.0 - _SHIFT)), _minimum_jerk((phase - _SHIFT) / (1.0 - _SHIFT))
-    return (early, late) if manner == ACROSS_FIRST else (late, early)
-
-
-@kernel
-def _minimum_jerk(phase: float) -> float:
-    s = min(1.0, max(0.0, phase))
-    return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)

@@ -1,7 +1,7 @@
 """What every motion of the person uses: scene, state, servos, grips and simple body movements."""
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field
 
 import mujoco
@@ -14,6 +14,8 @@ from mjsim.model import avatar
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person.grips import Grips
+from mjsim.person.hand_path import point_between
+from mjsim.person.motion_parameters import MOTION, MotionParameters
 from mjsim.person.postures import move_hand
 from mjsim.person.rate_limits import slew_look, slew_turn, slew_walk
 from mjsim.person.receptacle_heights import ReceptacleHeights
@@ -22,9 +24,6 @@ from mjsim.person.rig import Rig
 # A motion sets the servos, yields once per control step, and returns whether it succeeded.
 Motion = Generator[None, None, bool]
 Steps = Generator[None, None, None]
-
-TURN_GAIN = 6.0  # 1/s
-FACE_TIMEOUT = 3.0  # s
 
 
 @dataclass(eq=False)
@@ -36,6 +35,7 @@ class Person:
         hand_velocities: How fast the hands' targets move where no motion moves them, m/s, shape (2, 3).
         moving_hand: Hand that a motion moves at present; the others keep their posture.
         receptacle_heights: Tells how full receptacles are.
+        motion: Times and speeds of picking and placing.
     """
 
     scene: Scene
@@ -47,6 +47,7 @@ class Person:
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     moving_hand: int | None = None
     receptacle_heights: ReceptacleHeights = field(init=False)
+    motion: MotionParameters = field(default_factory=lambda: MOTION)
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
@@ -62,6 +63,17 @@ class Person:
     def steps(self, seconds: float) -> int:
         """Control steps in a duration, at least 1."""
         return max(1, round(seconds / self.dt))
+
+    def travel_steps(self, distance: float) -> int:
+        """Control steps in which a hand with a load travels a distance, m; 0 if it need not."""
+        motion = self.motion
+        if distance < motion.least_travel:
+            return 0
+        return self.steps(motion.start_time + distance / motion.travel_speed)
+
+    def descent_steps(self, height: float) -> int:
+        """Control steps in which a hand lowers a load by a height, m."""
+        return self.steps(self.motion.start_time + height / self.motion.descent_speed)
 
     def carried_bodies(self) -> frozenset[int]:
         """Body ids of the objects in the hands."""
@@ -108,7 +120,7 @@ class Person:
 
     def turn_towards(self, error: float) -> None:
         """Slew the yaw rate so that a heading error, rad, decays without overshoot."""
-        self.turn_at(TURN_GAIN * error)
+        self.turn_at(self.motion.turn_gain * error)
 
     def glance(self, point: NDArray[np.float64]) -> None:
         """Move the head's pitch towards a point of the house frame."""
@@ -118,17 +130,19 @@ class Person:
 
     def look_towards(self, pitch: float) -> None:
         """Move the head's pitch towards an angle, rad, at the pace of a glance."""
-        rig = self.rig
-        rig.look_at_pitch(rig.pitch_target + _clip(0.25 * (pitch - rig.pitch_target), 2.0 * self.dt))
+        rig, motion = self.rig, self.motion
+        change = motion.look_gain * (pitch - rig.pitch_target)
+        rig.look_at_pitch(rig.pitch_target + _clip(change, motion.look_speed * self.dt))
 
-    def face(
-        self, point: NDArray[np.float64], heading: float | None = None, tolerance: float = 0.35
-    ) -> Steps:
-        """Stand still and turn to a point, or to an exact heading while glancing at the point."""
-        for _ in range(self.steps(FACE_TIMEOUT)):
+    def face(self, point: NDArray[np.float64], tolerance: float, heading: float | None = None) -> Steps:
+        """Stand still and turn to a point, or to a heading while glancing at the point; the tolerance is in rad."""
+        motion = self.motion
+        for _ in range(self.steps(motion.turn_timeout)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
-            standing = self.rig.speed < 0.1
-            if abs(error) < tolerance and standing and abs(self.rig.turn_rate) < 0.5:
+            standing = (
+                self.rig.speed < motion.standing_speed and abs(self.rig.turn_rate) < motion.standing_turn_rate
+            )
+            if abs(error) < tolerance and standing:
                 break
             self.brake()
             self.turn_towards(error if abs(error) > 0.5 * tolerance else 0.0)
@@ -136,16 +150,19 @@ class Person:
             yield
         self.rig.motion[:3] = 0.0
 
+    def swing(
+        self, hand: int, goal: Callable[[], NDArray[np.float64]], steps: int, order: int
+    ) -> Iterator[None]:
+        """Set a hand's target once per control step on its way to a goal (3,) m, which may change meanwhile."""
+        start = self.rig.hand_targets[hand].copy()
+        for k in range(1, steps + 1):
+            self.rig.hand_targets[hand] = point_between(start, goal(), k / steps, order, self.motion.lead)
+            yield
+
 
 def wrap(angle: float) -> float:
     """An angle in [-pi, pi), rad."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
-
-
-def minimum_jerk(phase: float) -> float:
-    """Progress 0..1 of the smoothest point-to-point movement at a phase (Flash and Hogan, 1985), clamped."""
-    s = min(1.0, max(0.0, phase))
-    return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 
 
 @kernel

@@ -7,19 +7,16 @@ from numpy.typing import NDArray
 
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.options import REST_STEPS
-from mjsim.person.person import Motion, Person, Steps, minimum_jerk, wrap
-from mjsim.person.slots import Footprint, Slot, best_slot, held_footprint, object_corners
+from mjsim.person.hand_path import STRAIGHT
+from mjsim.person.person import Motion, Person, Steps, wrap
+from mjsim.person.slots import Slot, best_slot, held_footprint, object_corners
 
 Vector = NDArray[np.float64]
 
-HOVER_GAP = 0.03
-RELEASE_GAP = 0.002
-STILL_TIME = 0.08  # s over the slot before the way down
-HAND_SPEED = 0.9
-DESCENT_SPEED = 0.65
-_TOUCH = 0.0005
-_OVERLAP = 0.001
-_RAISE = 0.003
+_TOUCH = 0.0005  # m of overlap at which the descent ends
+_OVERLAP = 0.001  # m of overlap below which the hand opens
+_RAISE = 0.003  # m per control step, until it is
+_RAISE_TIMEOUT = 0.6  # s
 
 
 def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
@@ -28,15 +25,16 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
     Returns:
         Whether the object's centre rests inside the receptacle's volume.
     """
-    yield from person.face(receptacle.center, heading=square_heading(person, receptacle), tolerance=0.04)
+    heading = square_heading(person, receptacle)
+    yield from person.face(receptacle.center, person.motion.receptacle_tolerance, heading)
     person.moving_hand = hand
     corners = object_corners(person.scene.model, person.scene.index.geoms(person.scene.index.names[item]))
     footprint = held_footprint(person, hand, item, receptacle, corners)
     slot = best_slot(person, item, receptacle, footprint)
-    hover = hover_height(receptacle, slot) - footprint.low[2]
+    hover = hover_height(person, receptacle, slot) - footprint.low[2]
     yield from _travel(person, hand, receptacle, np.array([*slot.hand, hover]))
-    footprint = held_footprint(person, hand, item, receptacle, corners)
-    yield from _descend(person, hand, item, receptacle, slot, footprint)
+    low = float(held_footprint(person, hand, item, receptacle, corners).low[2])
+    yield from _descend(person, hand, item, receptacle, slot, low)
     person.grips.open(hand)
     success = yield from _settle(person, hand, item, receptacle, pitch)
     return success
@@ -51,9 +49,9 @@ def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
     return rig.heading + wrap(side + quarter * round(wrap(towards - side) / quarter) - rig.heading)
 
 
-def hover_height(receptacle: ReceptacleGeometry, slot: Slot) -> float:
+def hover_height(person: Person, receptacle: ReceptacleGeometry, slot: Slot) -> float:
     """How high an object's lowest point crosses the receptacle, m above the centre of its volume."""
-    return max(float(receptacle.half_size[2]), slot.top) + HOVER_GAP
+    return max(float(receptacle.half_size[2]), slot.top) + person.motion.hover_gap
 
 
 def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector) -> Vector:
@@ -62,46 +60,38 @@ def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector)
 
 def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Vector) -> Steps:
     """Up to the hover height, then across to the hover position (3,) in the receptacle's axes."""
-    rig = person.rig
-    for up_first in (True, False):
-        start = rig.hand_targets[hand].copy()
-        goal = _hand_in_body(person, receptacle, hover)
-        if up_first:
-            goal = np.array([start[0], start[1], max(start[2], goal[2])])
-        distance = float(np.linalg.norm(goal - start))
-        count = 0 if distance < 0.005 else person.steps(0.12 + distance / HAND_SPEED)
-        for k in range(1, count + 1):
-            if not up_first:
-                goal = _hand_in_body(person, receptacle, hover)
-            rig.hand_targets[hand] = start + minimum_jerk(k / count) * (goal - start)
+    target = person.rig.hand_targets[hand]
+
+    def above() -> Vector:
+        return _hand_in_body(person, receptacle, hover)
+
+    up = np.array([target[0], target[1], max(target[2], above()[2])])
+    for goal in (lambda: up, above):
+        steps = person.travel_steps(float(np.linalg.norm(goal() - target)))
+        for _ in person.swing(hand, goal, steps, STRAIGHT):
             person.glance(receptacle.center)
             yield
-    for _ in range(person.steps(STILL_TIME)):
+    for _ in range(person.steps(person.motion.hover_time)):
         yield
 
 
 def _descend(
-    person: Person,
-    hand: int,
-    item: int,
-    receptacle: ReceptacleGeometry,
-    slot: Slot,
-    footprint: Footprint,
+    person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, slot: Slot, low: float
 ) -> Steps:
-    """Down to just above the fill; on touching anything, stop and raise until the overlap is small."""
+    """Down until the object's lowest point, `low` m from the hand, is just above the fill.
+
+    On touching anything, stop and raise until the overlap is small.
+    """
     rig = person.rig
-    start = rig.hand_targets[hand].copy()
-    goal = _hand_in_body(
-        person, receptacle, np.array([*slot.hand, slot.fill + RELEASE_GAP - footprint.low[2]])
-    )
-    count = person.steps(0.12 + abs(goal[2] - start[2]) / DESCENT_SPEED)
-    for k in range(1, count + 1):
-        rig.hand_targets[hand] = start + minimum_jerk(k / count) * (goal - start)
+    release = slot.fill + person.motion.release_gap - low
+    goal = _hand_in_body(person, receptacle, np.array([*slot.hand, release]))
+    steps = person.descent_steps(abs(goal[2] - rig.hand_targets[hand, 2]))
+    for _ in person.swing(hand, lambda: goal, steps, STRAIGHT):
         yield
         if overlap(person, item) > _TOUCH:
             rig.hand_targets[hand] = rig.hands[hand]
             break
-    for _ in range(person.steps(0.6)):
+    for _ in range(person.steps(_RAISE_TIMEOUT)):
         yield
         if overlap(person, item) < _OVERLAP:
             break
@@ -120,12 +110,11 @@ def overlap(person: Person, item: int) -> float:
 
 def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
     """Withdraw the hand upwards and wait until the object rests."""
-    rig, options = person.rig, person.options
-    still, lifted = 0, 0
-    for _ in range(person.steps(options.settle_time)):
-        if lifted < 4:
-            rig.hand_targets[hand, 2] += 0.035
-            lifted += 1
+    options, motion = person.options, person.motion
+    still = 0
+    for step in range(person.steps(options.settle_time)):
+        if step < motion.withdraw_steps:
+            person.rig.hand_targets[hand, 2] += motion.withdraw_step
         else:
             person.retire(hand)
         person.look_towards(pitch)
