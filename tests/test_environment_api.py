@@ -162,7 +162,7 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[FakeViewer]:
         opened.append(FakeViewer())
         return opened[-1]
 
-    monkeypatch.setattr(gymnasium_environment, "open_viewer", open_fake)
+    monkeypatch.setattr(gymnasium_environment, "InteractiveViewer", open_fake)
     return opened
 
 
@@ -210,7 +210,7 @@ def test_a_missing_display_is_named(easy: dict[str, Any], monkeypatch: pytest.Mo
 def test_a_window_needs_its_own_backend(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "egl")
     with pytest.raises(ViewerError, match="MUJOCO_GL=glfw"):
-        viewer.open_viewer()
+        viewer.InteractiveViewer()
 
 
 def test_reset_with_a_seed_repeats_the_episode_bit_for_bit() -> None:

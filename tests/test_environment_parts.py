@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.metadata import EntryPoint
 from typing import Any
 
@@ -16,9 +17,8 @@ from mjsim.actions import IDLE, Move, Pick, Place
 from mjsim.environments import navigable
 from mjsim.environments.control import MOVES, Continuous, Discrete
 from mjsim.environments.core import Rearrangement
-from mjsim.environments.episodes import EpisodeSource
+from mjsim.environments.episodes import EpisodeCache, sample
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.environments.layout import HouseKit
 from mjsim.environments.navigable import installed_builder
 from mjsim.environments.options import EnvironmentOptions, build
 from mjsim.environments.rewards import TimeReward, potential
@@ -225,40 +225,40 @@ def test_a_reward_of_your_own(open_floor: Episode) -> None:
 
 
 @pytest.fixture(scope="module")
-def kit(catalogue: Catalogue, navmesh: NavMesh) -> HouseKit:
-    """The apartment with its navmesh."""
-    return HouseKit.load(catalogue.name, builder=lambda *_: navmesh)
+def draw(catalogue: Catalogue, navmesh: NavMesh) -> Callable[[int], Episode]:
+    """Seed -> episode of one object in the apartment."""
+    return partial(sample, catalogue, navmesh, (1, 1))
 
 
-def source(kit: HouseKit, **options: Any) -> EpisodeSource:
-    given = {"objects": (1, 1), "episodes": None, "options": WorldOptions(), "keep": 2, **options}
-    return EpisodeSource(kit, **given)
+def cache(catalogue: Catalogue, draw: Callable[[int], Episode], count: int | None = None) -> EpisodeCache:
+    return EpisodeCache(catalogue, draw, count=count, options=WorldOptions(), size=2)
 
 
-def test_compiled_episodes_are_reused_and_let_go(kit: HouseKit) -> None:
-    """The least recently used one is let go; what comes back is the same episode."""
-    episodes = source(kit)
-    first, second = episodes.stage(1), episodes.stage(2)
-    assert episodes.stage(1) is first
-    third = episodes.stage(3)
-    assert episodes.stage(1) is first and episodes.stage(3) is third
-    again = episodes.stage(2)
+def test_compiled_episodes_are_reused_and_freed(catalogue: Catalogue, draw: Callable[[int], Episode]) -> None:
+    """The least recently used one is freed; compiled again, it is the same episode."""
+    episodes = cache(catalogue, draw)
+    first, second = episodes.get(1), episodes.get(2)
+    assert episodes.get(1) is first
+    third = episodes.get(3)
+    assert episodes.get(1) is first and episodes.get(3) is third
+    again = episodes.get(2)
     assert again is not second
     assert again.world.scene.episode == second.world.scene.episode
 
 
-def test_a_number_of_episodes_come_again_and_again(kit: HouseKit) -> None:
-    episodes = source(kit, episodes=3)
-    assert [episodes.episode(s).seed for s in (0, 1, 2, 3, 7)] == [0, 1, 2, 0, 1]
-    assert episodes.stage(1) is episodes.stage(4)
+def test_a_number_of_episodes_come_again_and_again(
+    catalogue: Catalogue, draw: Callable[[int], Episode]
+) -> None:
+    episodes = cache(catalogue, draw, count=3)
+    assert [episodes.get(s).world.scene.episode.seed for s in (0, 1, 2, 3, 7)] == [0, 1, 2, 0, 1]
+    assert episodes.get(1) is episodes.get(4)
 
 
-def test_the_level_is_drawn_by_the_seed(kit: HouseKit) -> None:
-    """Every level between the least and the most occurs, and a seed has one level only."""
-    episodes = source(kit, objects=(1, 3))
-    levels = [len(episodes.episode(seed).objects) for seed in range(12)]
-    assert set(levels) == {1, 2, 3}
-    assert levels == [len(source(kit, objects=(1, 3)).episode(seed).objects) for seed in range(12)]
+def test_the_number_of_objects_is_drawn_by_the_seed(catalogue: Catalogue, navmesh: NavMesh) -> None:
+    """Every number from the smallest to the largest occurs, and equal seeds give equal numbers."""
+    counts = [len(sample(catalogue, navmesh, (1, 3), seed).objects) for seed in range(12)]
+    assert set(counts) == {1, 2, 3}
+    assert counts == [len(sample(catalogue, navmesh, (1, 3), seed).objects) for seed in range(12)]
 
 
 def test_given_episodes_need_no_navigable_floor(open_floor: Episode, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -269,19 +269,19 @@ def test_given_episodes_need_no_navigable_floor(open_floor: Episode, monkeypatch
     assert core.layout.slots == 1
 
 
-def test_a_jammed_house_is_drawn_anew(kit: HouseKit, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_jammed_house_is_drawn_anew(navmesh: NavMesh, monkeypatch: pytest.MonkeyPatch) -> None:
     """A drawn seed that cannot be sampled gives way to the next; a seed that was asked for does not."""
-    core = build(EnvironmentOptions(objects=1, navigable=lambda *_: kit.navigable))
-    stage, refused = EpisodeSource.stage, []
+    core = build(EnvironmentOptions(objects=1, navigable=lambda *_: navmesh))
+    get, refused = EpisodeCache.get, []
 
-    def refuse_the_first(self: EpisodeSource, seed: int) -> Any:
+    def refuse_the_first(self: EpisodeCache, seed: int) -> Any:
         if not refused:
             refused.append(seed)
             raise SamplingError("as if jammed")
-        return stage(self, seed)
+        return get(self, seed)
 
-    monkeypatch.setattr(EpisodeSource, "stage", refuse_the_first)
-    _, info = core.reset_drawn(np.random.default_rng(0))
+    monkeypatch.setattr(EpisodeCache, "get", refuse_the_first)
+    _, info = core.reset_random(np.random.default_rng(0))
     assert refused and info["episode_seed"] not in refused
     refused.clear()
     with pytest.raises(SamplingError):

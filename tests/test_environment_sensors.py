@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 import mjsim
 from mjsim.environments.core import Rearrangement
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.environments.layout import CameraOptions
-from mjsim.environments.sensors import SENSORS, Moment, Sensor, resolve_sensors, unit_spec
+from mjsim.environments.observation_layout import CameraOptions
+from mjsim.environments.sensors import SENSORS, Sensor, SensorInput, resolve_sensors, unit_spec
 from mjsim.environments.sensors.house import MAP_SIZE, RANGE, RAYS
 from mjsim.environments.sensors.sight import visible_pixels
 from mjsim.episode import Episode, PlacedObject, StartPose
@@ -133,7 +133,7 @@ def test_motion_is_in_the_body_frame(core: Rearrangement) -> None:
     core.reset(0)
     speeds: list[NDArray[np.float32]] = []
     core.on_control_step = lambda _: speeds.append(
-        next(s for s in core.sensors if s.name == "motion").read(core._moment(core.state))
+        next(s for s in core.sensors if s.name == "motion").read(core._sensor_input(core.state))
     )
     core.step(0)
     core.on_control_step = None
@@ -219,8 +219,8 @@ def test_rangefinder_agrees_with_shapely(navmesh: NavMesh) -> None:
     env.close()
 
 
-def _at(core: Rearrangement, position: NDArray[np.float64], heading: float) -> Moment:
-    return core._moment(dataclasses.replace(core.state, position=position, heading=heading))
+def _at(core: Rearrangement, position: NDArray[np.float64], heading: float) -> SensorInput:
+    return core._sensor_input(dataclasses.replace(core.state, position=position, heading=heading))
 
 
 def test_map_agrees_with_shapely() -> None:
@@ -281,8 +281,8 @@ def test_pixel_counts_are_those_of_the_segmentation(
     counts = [int((seen["segmentation"] == 4 + slot).sum()) for slot in range(5)]
     assert seen["visible_pixels"].tolist() == counts
     assert counts[0] == counts[2] == 0 < counts[1]
-    moment = core._moment(core.state)
-    assert visible_pixels(moment) == {"object_01": counts[1]} == core.reset(0)[1]["visible"]
+    inputs = core._sensor_input(core.state)
+    assert visible_pixels(inputs) == {"object_01": counts[1]} == core.reset(0)[1]["visible"]
 
 
 def test_depth_is_metric(core: Rearrangement, seen: dict[str, NDArray[Any]]) -> None:
@@ -306,7 +306,7 @@ def test_in_view_needs_no_pixels(seen: dict[str, NDArray[Any]]) -> None:
 def test_a_sensor_of_your_own_joins_in(small_episode: Episode) -> None:
     """One declaration and one function make a sensor."""
     clock = Sensor(
-        "clock", lambda _: unit_spec(1, low=0.0), lambda m: np.array([m.observation.time / 9], np.float32)
+        "clock", lambda _: unit_spec(1, low=0.0), lambda m: np.array([m.state.time / 9], np.float32)
     )
     env = mjsim.make(house=small_episode.house, episodes=[small_episode], observations=("gps", clock))
     env.reset()

@@ -79,7 +79,7 @@ def worlds(small_catalogue: Catalogue) -> tuple[World, World]:
 
 def test_a_world_is_loaded_once_and_drawn_every_time(parts: Parts, worlds: tuple[World, World]) -> None:
     """The next episode takes the place of the last, whose resources are freed first."""
-    window = viewer.open_viewer(realtime=False)
+    window = viewer.InteractiveViewer(realtime=False)
     first, second = worlds
     window.show(first)
     window.show(first)
@@ -106,7 +106,7 @@ def test_the_window_keeps_pace_with_the_simulation(
         clock[0] += seconds
 
     monkeypatch.setattr(viewer, "time", SimpleNamespace(monotonic=lambda: clock[0], sleep=sleep))
-    window, world = viewer.open_viewer(), worlds[0]
+    window, world = viewer.InteractiveViewer(), worlds[0]
     world.reset()
     window.show(world)
     world.data.time, clock[0] = 0.04, clock[0] + 0.01
@@ -127,4 +127,4 @@ def test_a_window_that_cannot_be_made_is_named(parts: Parts, monkeypatch: pytest
     modules[0].RenderWindow = refuse
     monkeypatch.setattr(viewer, "_load", lambda: modules)
     with pytest.raises(ViewerError, match="Failed to create window"):
-        viewer.open_viewer()
+        viewer.InteractiveViewer()

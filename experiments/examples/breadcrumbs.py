@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse, Point
 from experiments.participants.walking import path_length, point_along
-from mjsim.environments.sensors import Moment, Sensor, unit_spec
+from mjsim.environments.sensors import Sensor, SensorInput, unit_spec
 from mjsim.observation import ObjectStatus
 
 AHEAD = 1.0  # m along the way; about as far as a walker looks
@@ -21,21 +21,21 @@ def breadcrumb_sensor(house: KnownHouse) -> Sensor:
         house: Knows the ways.
     """
 
-    def read(moment: Moment) -> NDArray[np.float32]:
-        here = moment.observation.position
-        ways = [house.path(here, goal) for goal in _goals(house, moment)]
+    def read(inputs: SensorInput) -> NDArray[np.float32]:
+        here = inputs.state.position
+        ways = [house.path(here, goal) for goal in _goals(house, inputs)]
         if not ways:
             return np.zeros(3, np.float32)
         way = min(ways, key=path_length)
-        forward, left = moment.to_body(np.array([point_along(way, AHEAD)]))[0] / AHEAD
-        length = path_length(way) / moment.layout.scale
+        forward, left = inputs.to_body(np.array([point_along(way, AHEAD)]))[0] / AHEAD
+        length = path_length(way) / inputs.layout.scale
         return np.array([forward, left, length], np.float32).clip(-1.0, 1.0)
 
     return Sensor("breadcrumbs", lambda _: unit_spec(3), read)
 
 
-def _goals(house: KnownHouse, moment: Moment) -> list[Point]:
-    seen, targets = moment.observation, moment.world.scene.episode.targets
+def _goals(house: KnownHouse, inputs: SensorInput) -> list[Point]:
+    seen, targets = inputs.state, inputs.world.scene.episode.targets
     if seen.carried:
         return [house.approaches[targets[name]] for name in seen.carried]
     places = dict(zip(seen.object_names, seen.object_positions, strict=True))

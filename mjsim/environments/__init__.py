@@ -4,5 +4,5 @@
     control ─┼─> Rearrangement (core) ─> RearrangeDmEnvironment   mjsim.make(...)
     reward  ─┘                        └> RearrangeEnv             gymnasium.make("mjsim/Rearrange-v0", ...)
 
-Modules are imported where they are needed; importing this package alone costs nothing.
+This package itself imports nothing; import the modules that you need.
 """

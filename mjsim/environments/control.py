@@ -1,7 +1,7 @@
-"""What an agent may do: velocities with a trigger, or a few discrete moves.
+"""What an agent can do: velocities with a trigger, or a few discrete actions.
 
-A control turns one action of the agent into actions of the world, one per control step, and sees what each
-brought. It is a generator, so that it can go on for as long as its action takes.
+A control turns one action of the agent into actions of the world, one for each control step. It is a generator that
+receives the result of each control step, so that an action can last until it has had its effect.
 """
 
 import math
@@ -23,19 +23,19 @@ Steps = Generator[Action, StepResult, None]
 
 
 class Control(Protocol):
-    """How an agent's actions become actions of the world."""
+    """Turns actions of the agent into actions of the world."""
 
     def spec(self) -> specs.BoundedArray:
-        """What an action is."""
+        """Spec of an action of the agent."""
         ...
 
     def steps(self, action: Any, observation: Observation, options: WorldOptions) -> Steps:
-        """The world's actions of one action.
+        """Yield the actions of the world for one action of the agent, at least one.
 
         Args:
             action: Conforms to `spec`.
-            observation: The state before it.
-            options: Limits of the world.
+            observation: State before the action.
+            options: Limits of walking, reach and grip.
 
         Raises:
             ActionError: The action does not conform.
@@ -45,13 +45,16 @@ class Control(Protocol):
 
 @dataclass(frozen=True)
 class Continuous:
-    """Velocities and a trigger: (forward, left, turn, trigger), each -1 to 1; clipped to that.
+    """Velocities and a trigger: (forward, left, turn, trigger), each clipped to [-1, 1].
 
     Velocities are shares of the world's limits. A trigger above 0.5 picks the nearest object in reach, below -0.5
-    places what is carried; an attempt stands still for its first control step.
+    places a carried object; the first control step of such an action does not walk.
 
     Attributes:
-        repeat: Control steps that one action lasts.
+        repeat: Control steps that an action lasts.
+
+    Raises:
+        EnvironmentConfigError: `repeat` is below 1.
     """
 
     repeat: int = 1
@@ -61,26 +64,21 @@ class Continuous:
             raise EnvironmentConfigError(f"repeat must be at least 1 control step, got {self.repeat}")
 
     def spec(self) -> specs.BoundedArray:
-        """Float32, shape (4,), -1 to 1."""
+        """Float32, shape (4,), from -1 to 1."""
         return specs.BoundedArray((4,), np.float32, -1.0, 1.0, name="action")
 
     def steps(self, action: Any, observation: Observation, options: WorldOptions) -> Steps:  # noqa: ARG002
-        """`repeat` control steps."""
-        forward, left, turn, trigger = self._checked(action)
-        move = Move(options.max_speed * forward, options.max_speed * left, options.max_turn * turn)
-        first: Action = Pick() if trigger > 0.5 else Place() if trigger < -0.5 else move
-        yield first
-        for _ in range(self.repeat - 1):
-            yield move
-
-    def _checked(self, action: Any) -> list[float]:
+        """Yield `repeat` actions of the world."""
         values = np.asarray(action, dtype=np.float64)
         if values.shape != (4,) or not np.isfinite(values).all():
             raise ActionError(
                 f"an action is (forward, left, turn, trigger), four finite numbers; got {action!r}"
             )
-        clipped: list[float] = np.clip(values, -1.0, 1.0).tolist()
-        return clipped
+        forward, left, turn, trigger = np.clip(values, -1.0, 1.0).tolist()
+        move = Move(options.max_speed * forward, options.max_speed * left, options.max_turn * turn)
+        yield Pick() if trigger > 0.5 else Place() if trigger < -0.5 else move
+        for _ in range(self.repeat - 1):
+            yield move
 
 
 MOVES = ("forward", "turn_left", "turn_right", "pick", "place")
@@ -88,11 +86,14 @@ MOVES = ("forward", "turn_left", "turn_right", "pick", "place")
 
 @dataclass(frozen=True)
 class Discrete:
-    """Five actions, by their position in `MOVES`; each lasts until it is done or nothing moves any more.
+    """Five actions, numbered as in `MOVES`; each lasts until it is done or blocked.
 
     Attributes:
-        stride: How far `forward` walks, m.
-        angle: How far a turn turns, rad.
+        stride: Distance that `forward` walks, m.
+        angle: Angle of a turn, rad.
+
+    Raises:
+        EnvironmentConfigError: A size is not positive.
     """
 
     stride: float = 0.25
@@ -105,77 +106,67 @@ class Discrete:
             )
 
     def spec(self) -> specs.BoundedArray:
-        """An integer, the position of the action in `MOVES`."""
+        """An integer: the index of the action in `MOVES`."""
         return specs.DiscreteArray(len(MOVES), dtype=np.int64, name="action")
 
     def steps(self, action: Any, observation: Observation, options: WorldOptions) -> Steps:
-        """As many control steps as the action takes."""
-        try:
-            move = MOVES[_index(action)]
-        except (IndexError, TypeError, ValueError):
-            raise ActionError(f"an action is a whole number below {len(MOVES)}, got {action!r}") from None
+        """Yield as many actions of the world as the action takes."""
+        index = np.asarray(action)
+        if index.ndim or not np.issubdtype(index.dtype, np.integer) or not 0 <= index < len(MOVES):
+            raise ActionError(f"an action is a whole number below {len(MOVES)}, got {action!r}")
+        move = MOVES[int(index)]
         if move == "forward":
             return _walk(observation, self.stride, options)
         if move in ("turn_left", "turn_right"):
             return _turn(observation, self.angle if move == "turn_left" else -self.angle, options)
-        return _attempt(Pick() if move == "pick" else Place())
+        return _pick_or_place(Pick() if move == "pick" else Place())
 
 
-def _index(action: Any) -> int:
-    value = np.asarray(action)
-    if value.ndim or not np.issubdtype(value.dtype, np.integer) or value < 0:
-        raise ValueError
-    return int(value)
-
-
-_GAIN = 8.0  # 1/s, for the last bit of a walk or a turn
+_GAIN = 8.0  # 1/s, of the controller that ends a walk or a turn
 _BRAKING = 2.0  # m/s^2 planned for; the body can do 3
-_NEAR = 0.002  # m
-_NEAR_ANGLE = math.radians(0.1)
-_STILL = 0.01  # m/s
-_PATIENCE = 4  # control steps without headway before a walk counts as blocked
-_LONGEST = 2.0  # s for a walk that slides along something
+_DISTANCE_TOLERANCE = 0.002  # m
+_ANGLE_TOLERANCE = math.radians(0.1)
+_STANDING = 0.01  # m/s
+_MIN_PROGRESS = 0.0005  # m per control step
+_MAX_BLOCKED_STEPS = 4  # control steps without progress after which a walk ends
+_MAX_EXTRA_TIME = 2.0  # s for a walk that slides along an obstacle
 
 
 def _walk(observation: Observation, stride: float, options: WorldOptions) -> Steps:
-    """Walk straight ahead until the stride is made or something is in the way, and stand."""
+    """Walk straight ahead until the distance is covered or the way is blocked, then stand still."""
     start, heading = observation.position, observation.heading
-    ahead = np.array([math.cos(heading), math.sin(heading)])
-    walked, waited = 0.0, 0
-    for _ in range(math.ceil((_LONGEST + stride) / options.control_timestep)):
-        if waited == _PATIENCE or stride - walked <= _NEAR:
+    direction = np.array([math.cos(heading), math.sin(heading)])
+    walked, blocked = 0.0, 0
+    for _ in range(math.ceil((_MAX_EXTRA_TIME + stride) / options.control_timestep)):
+        if blocked == _MAX_BLOCKED_STEPS or stride - walked <= _DISTANCE_TOLERANCE:
             break
         left = stride - walked
-        late = _BRAKING * options.control_timestep / 2  # braking begins a step late, and acts in steps
-        pace = min(options.max_speed, math.sqrt(2 * _BRAKING * left + late**2) - late, _GAIN * left)
-        step = yield Move(forward=pace)
-        now = float((step.observation.position - start) @ ahead)
-        waited = waited + 1 if now - walked < 0.0005 else 0
+        delay = _BRAKING * options.control_timestep / 2  # braking begins a step late, and acts in steps
+        speed = min(options.max_speed, math.sqrt(2 * _BRAKING * left + delay**2) - delay, _GAIN * left)
+        step = yield Move(forward=speed)
+        now = float((step.observation.position - start) @ direction)
+        blocked = blocked + 1 if now - walked < _MIN_PROGRESS else 0
         walked = now
-    yield from _stand(options)
-
-
-def _stand(options: WorldOptions) -> Steps:
     for _ in range(math.ceil(options.max_speed / (options.acceleration * options.control_timestep)) + 1):
         step = yield IDLE
-        if float(np.linalg.norm(step.observation.velocity)) < _STILL:
+        if float(np.linalg.norm(step.observation.velocity)) < _STANDING:
             return
 
 
 def _turn(observation: Observation, angle: float, options: WorldOptions) -> Steps:
     """Turn on the spot."""
     goal, error = observation.heading + angle, angle
-    longest = abs(angle) / options.max_turn + 1.0
-    for _ in range(math.ceil(longest / options.control_timestep)):
+    max_time = abs(angle) / options.max_turn + 1.0
+    for _ in range(math.ceil(max_time / options.control_timestep)):
         step = yield Move(turn=_GAIN * error)
         error = goal - step.observation.heading
-        if abs(error) < _NEAR_ANGLE:
+        if abs(error) < _ANGLE_TOLERANCE:
             break
     yield IDLE
 
 
-def _attempt(action: Pick | Place) -> Steps:
-    """Pick or place, and wait until the hands are done."""
+def _pick_or_place(action: Pick | Place) -> Steps:
+    """Pick or place, and stand until the hands are done."""
     step = yield action
     while step.observation.busy:
         step = yield IDLE
@@ -185,7 +176,7 @@ CONTROLS = {"continuous": Continuous, "discrete": Discrete}
 
 
 def resolve_control(actions: str | Control) -> Control:
-    """The control itself, or the one of that name: `continuous` or `discrete`.
+    """The control itself, or the one with that name: `continuous` or `discrete`.
 
     Raises:
         EnvironmentConfigError: No control has that name.

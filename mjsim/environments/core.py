@@ -1,4 +1,4 @@
-"""The task as one small machine: reset, step, observe. Both public interfaces are thin views of it."""
+"""The task itself: reset, step, observe. The dm_env and the Gymnasium environment are thin adapters of it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,35 +8,34 @@ import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
 
-from mjsim.actions import EventKind, WorldEvent
+from mjsim.actions import EventKind
 from mjsim.environments.control import Control
-from mjsim.environments.episodes import EpisodeSource, Stage
+from mjsim.environments.episodes import CompiledEpisode, EpisodeCache
 from mjsim.environments.errors import EnvironmentStateError
-from mjsim.environments.layout import Layout
+from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.rewards import RewardFunction
-from mjsim.environments.sensors import Moment, Sensor
+from mjsim.environments.sensors import Sensor, SensorInput
 from mjsim.environments.sensors.sight import visible_pixels
 from mjsim.errors import PhysicsError, SamplingError
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.render import Frame
 from mjsim.world import StepResult, World
 
 ObservationDict = dict[str, NDArray[Any]]
 MAX_SEED = 2**31 - 1
-DRAWS = 10  # of another seed when a house has no room for the first
+MAX_DRAWS = 10  # seeds tried by `reset_random` where the house has no room for the objects
 
 
 @dataclass(frozen=True, eq=False)
 class Transition:
-    """What one step of the environment brought.
+    """Outcome of one step of the environment.
 
     Attributes:
         observation: Sensor name -> array.
-        reward: Of this step.
+        reward: Reward of this step.
         terminated: Whether everything is delivered.
-        truncated: Whether the time is up, with something left to do.
-        info: For people and statistics; no part of the task.
-        steps: What each control step of the action brought.
+        truncated: Whether the episode was cut off by the time limit or by an error of the physics.
+        info: For logging and statistics; not part of the task.
+        steps: Result of each control step that the action took.
     """
 
     observation: ObservationDict
@@ -48,83 +47,87 @@ class Transition:
 
 
 class Rearrangement:
-    """Tidying up as a task with observations, actions and rewards.
+    """The rearrangement task with observations, actions and rewards.
 
     Args:
-        episodes: Where the episodes come from.
-        layout: Sizes and scales of the arrays.
-        sensors: What is observed.
-        control: What can be done.
-        reward: What it is worth.
-        forgiving: Whether a failure of the physics cuts the episode off instead of being raised.
+        episodes: Seed -> compiled episode.
+        layout: Sizes and scales of the observation arrays.
+        sensors: Arrays of an observation.
+        control: How actions of the agent become actions of the world.
+        reward: Reward function.
+        truncate_on_physics_error: Truncate the episode where the physics fails, instead of raising.
+
+    Attributes:
+        layout, sensors, control: As above.
+        on_control_step: Called with the world after every control step, or None.
     """
 
     def __init__(
         self,
-        episodes: EpisodeSource,
-        layout: Layout,
+        episodes: EpisodeCache,
+        layout: ObservationLayout,
         *,
         sensors: Sequence[Sensor],
         control: Control,
         reward: RewardFunction,
-        forgiving: bool = False,
+        truncate_on_physics_error: bool = False,
     ) -> None:
         self.layout = layout
         self.sensors = tuple(sensors)
         self.control = control
+        self.on_control_step: Callable[[World], None] | None = None
         self._episodes = episodes
         self._reward = reward
-        self._forgiving = forgiving
+        self._truncate_on_error = truncate_on_physics_error
         self._images = frozenset[str]().union(*(s.images for s in sensors))
-        self._stage: Stage | None = None
+        self._episode: CompiledEpisode | None = None
         self._seed = 0
-        self._over = True
-        self._seen: ObservationDict = {}
-        self.on_control_step: Callable[[World], None] | None = None
+        self._is_over = True
+        self._last_observation: ObservationDict = {}
 
     @property
     def observation_spec(self) -> dict[str, specs.Array]:
-        """Sensor name -> what it gives."""
+        """Sensor name -> spec of its array."""
         return {s.name: s.spec(self.layout) for s in self.sensors}
 
     @property
     def action_spec(self) -> specs.BoundedArray:
-        """What an action is."""
+        """Spec of an action."""
         return self.control.spec()
 
     @property
-    def begun(self) -> bool:
-        """Whether there is an episode to look at."""
-        return self._stage is not None
+    def has_episode(self) -> bool:
+        """Whether `prepare` or `reset` was called since the last `close`."""
+        return self._episode is not None
 
     @property
-    def stage(self) -> Stage:
-        """The compiled episode that runs.
+    def episode(self) -> CompiledEpisode:
+        """The compiled episode.
 
         Raises:
             EnvironmentStateError: Before the first reset.
         """
-        if self._stage is None:
+        if self._episode is None:
             raise EnvironmentStateError("there is no episode yet; call reset first")
-        return self._stage
+        return self._episode
 
     @property
     def world(self) -> World:
-        """The running episode; read only. Raises `EnvironmentStateError` before the first reset."""
-        return self.stage.world
+        """The simulation; treat it as read-only. Raises `EnvironmentStateError` before the first reset."""
+        return self.episode.world
 
     @property
     def state(self) -> Observation:
-        """Everything about the present moment; raises `EnvironmentStateError` before the first reset."""
+        """The full state now; raises `EnvironmentStateError` before the first reset."""
         return self.world.observation()
 
     def prepare(self, seed: int) -> None:
-        """Compile the episode of a seed ahead of its reset.
+        """Compile the episode of a seed before it is reset.
 
         Raises:
             SamplingError, AssetError: As for `reset`.
         """
-        self._stage, self._over = self._episodes.stage(seed), True
+        self._episode, self._is_over = self._episodes.get(seed), True
 
     def reset(self, seed: int) -> tuple[ObservationDict, dict[str, Any]]:
         """Begin the episode of a seed.
@@ -134,20 +137,21 @@ class Rearrangement:
 
         Raises:
             SamplingError: The house has no room for this seed's objects.
-            AssetError, RenderError: A model is malformed; images were asked for and cannot be drawn.
+            AssetError: A model is malformed.
+            RenderError: Images were asked for and cannot be drawn.
         """
         self.prepare(seed)
-        self._seed, self._over = seed, False
-        moment = self._moment(self.world.reset())
-        return self._observe(moment), self._info(moment, ())
+        self._seed, self._is_over = seed, False
+        inputs = self._sensor_input(self.world.reset())
+        return self._observe(inputs), self._info(inputs, ())
 
-    def reset_drawn(self, rng: np.random.Generator) -> tuple[ObservationDict, dict[str, Any]]:
-        """Begin the episode of a drawn seed; of another one if the house has no room for the first.
+    def reset_random(self, rng: np.random.Generator) -> tuple[ObservationDict, dict[str, Any]]:
+        """Begin the episode of a random seed; draws again where the house has no room for the objects.
 
         Raises:
-            SamplingError: There was no room in any of several draws.
+            SamplingError: There was no room in `MAX_DRAWS` draws.
         """
-        for _ in range(DRAWS - 1):
+        for _ in range(MAX_DRAWS - 1):
             try:
                 return self.reset(int(rng.integers(MAX_SEED)))
             except SamplingError:
@@ -155,65 +159,64 @@ class Rearrangement:
         return self.reset(int(rng.integers(MAX_SEED)))
 
     def step(self, action: Any) -> Transition:
-        """Carry out one action, for as many control steps as it takes or until the episode ends.
+        """Carry out one action: as many control steps as it takes, or until the episode ends.
 
         Raises:
-            EnvironmentStateError: The episode is over, or none was begun.
+            EnvironmentStateError: The episode is over, or there is none.
             ActionError: The action does not conform to its spec.
-            PhysicsError: MuJoCo warned and that is not forgiven; the episode is over.
+            PhysicsError: MuJoCo warned, and such errors are not set to truncate; the episode is over.
         """
         world = self.world
-        if self._over:
+        if self._is_over:
             raise EnvironmentStateError("the episode is over; call reset before the next step")
         before = world.observation()
-        steps, failure = self._run(world, action, before)
+        steps, error = self._run(world, action, before)
         after = steps[-1].observation if steps else before
-        terminated, truncated = self._ends(after)
-        self._over = terminated or truncated or failure is not None
-        moment = self._moment(after)
-        # A state that the physics failed in cannot be read; what was last seen has to do.
-        observation = self._observe(moment) if failure is None else self._seen_again()
+        terminated, timed_out = self._end(after)
+        self._is_over = terminated or timed_out or error is not None
+        inputs = self._sensor_input(after)
         return Transition(
-            observation=observation,
+            # The state in which the physics failed cannot be observed: repeat the last observation.
+            observation=self._observe(inputs) if error is None else _copied(self._last_observation),
             reward=float(self._reward(world.scene, before, after)),
             terminated=terminated,
-            truncated=self._over and not terminated,
-            info=self._info(moment, steps, failure),
+            truncated=self._is_over and not terminated,
+            info=self._info(inputs, steps, error),
             steps=steps,
         )
 
     def rgb(self, width: int, height: int, profile: str) -> NDArray[np.uint8]:
-        """What the eye sees now, uint8, shape (height, width, 3).
+        """The first-person view now, uint8, shape (height, width, 3).
 
         Raises:
             EnvironmentStateError: Before the first reset.
             RenderError: No OpenGL context could be made.
         """
-        return self.stage.renderer(width, height, profile).rgb(self.world.data)
+        return self.episode.renderer(width, height, profile).rgb(self.world.data)
 
     def close(self) -> None:
-        """Free what was compiled; a later reset makes it anew."""
-        self._stage, self._over = None, True
+        """Free all compiled episodes; a later reset compiles them again."""
+        self._episode, self._is_over = None, True
         self._episodes.close()
 
     def _run(
         self, world: World, action: Any, before: Observation
     ) -> tuple[tuple[StepResult, ...], PhysicsError | None]:
-        """The control steps of one action, up to its end, the episode's, or a failure that is forgiven."""
+        """The control steps of one action, until it or the episode ends, or the physics fails."""
         commands = self.control.steps(action, before, world.options)
         results: list[StepResult] = []
         command = next(commands)
         while True:
             try:
                 results.append(world.step(command))
-            except PhysicsError as failure:
-                self._over = True
-                if not self._forgiving:
+            except PhysicsError as error:
+                self._is_over = True
+                if not self._truncate_on_error:
                     raise
-                return tuple(results), failure
+                return tuple(results), error
             if self.on_control_step is not None:
                 self.on_control_step(world)
-            if any(self._ends(results[-1].observation)):
+            if any(self._end(results[-1].observation)):
                 commands.close()
                 return tuple(results), None
             try:
@@ -221,63 +224,43 @@ class Rearrangement:
             except StopIteration:
                 return tuple(results), None
 
-    def _ends(self, observation: Observation) -> tuple[bool, bool]:
-        """Whether the episode is terminated, and whether it is truncated."""
+    def _end(self, observation: Observation) -> tuple[bool, bool]:
+        """Whether everything is delivered, and if not, whether the time is up."""
         done = all(s is ObjectStatus.DELIVERED for s in observation.object_status)
         return done, not done and observation.time >= self.layout.time_limit - 1e-9
 
-    def _moment(self, observation: Observation) -> Moment:
-        drawn: list[Frame] = []
+    def _sensor_input(self, state: Observation) -> SensorInput:
+        return SensorInput(self.layout, self.episode, state, self._images)
 
-        def frame() -> Frame:
-            if not drawn:
-                drawn.append(self._draw())
-            return drawn[0]
-
-        return Moment(self.layout, self.world, observation, frame, lambda: self.stage.labels)
-
-    def _draw(self) -> Frame:
-        camera = self.layout.camera
-        renderer = self.stage.renderer(camera.width, camera.height, camera.profile)
-        return renderer.frame(
-            self.world.data,
-            rgb="rgb" in self._images,
-            depth="depth" in self._images,
-            segmentation="segmentation" in self._images,
-        )
-
-    def _observe(self, moment: Moment) -> ObservationDict:
-        seen = {s.name: s.read(moment) for s in self.sensors}
-        if self._forgiving:
-            self._seen = {name: array.copy() for name, array in seen.items()}
-        return seen
-
-    def _seen_again(self) -> ObservationDict:
-        return {name: array.copy() for name, array in self._seen.items()}
+    def _observe(self, inputs: SensorInput) -> ObservationDict:
+        arrays = {s.name: s.read(inputs) for s in self.sensors}
+        if self._truncate_on_error:
+            self._last_observation = _copied(arrays)
+        return arrays
 
     def _info(
-        self, moment: Moment, steps: Sequence[StepResult], failure: PhysicsError | None = None
+        self, inputs: SensorInput, steps: Sequence[StepResult], error: PhysicsError | None = None
     ) -> dict[str, Any]:
-        seen = moment.observation
-        delivered = len(seen.names_with(ObjectStatus.DELIVERED))
-        events = [e for step in steps for e in step.events]
+        state = inputs.state
+        delivered = len(state.names_with(ObjectStatus.DELIVERED))
+        kinds = [event.kind for step in steps for event in step.events]
         refusals = [s.result.refusal for s in steps if s.result is not None and s.result.refusal is not None]
         info: dict[str, Any] = {
             "episode_seed": self._seed,
-            "time": seen.time,
-            "objects": len(seen.object_names),
+            "time": state.time,
+            "objects": len(state.object_names),
             "delivered": delivered,
-            "is_success": delivered == len(seen.object_names),
-            "picked": _count(events, EventKind.PICKED),
-            "placed": _count(events, EventKind.PLACED),
+            "is_success": delivered == len(state.object_names),
+            "picked": kinds.count(EventKind.PICKED),
+            "placed": kinds.count(EventKind.PLACED),
             "refusal": refusals[0].value if refusals else "",
         }
-        if failure is not None:
-            info["physics_error"] = str(failure)
+        if error is not None:
+            info["physics_error"] = str(error)
         elif "segmentation" in self._images:
-            info["visible"] = visible_pixels(moment)
+            info["visible"] = visible_pixels(inputs)
         return info
 
 
-def _count(events: Sequence[WorldEvent], kind: EventKind) -> int:
-    return sum(e.kind is kind for e in events)
+def _copied(observation: ObservationDict) -> ObservationDict:
+    return {name: array.copy() for name, array in observation.items()}

@@ -16,7 +16,7 @@ def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment"
         env = mjsim.make(objects=6, seed=0, observations=("state", "rgb"), actions="discrete")
 
     Args:
-        seed: Seed of the first episode and of the draws of all later ones; None for one that differs every time.
+        seed: Seed of the first episode, and of the generator of all later seeds; None for a random one.
         **options: Fields of `mjsim.environments.options.EnvironmentOptions`.
 
     Raises:
@@ -29,67 +29,66 @@ def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment"
 class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_env has no types
     """The task behind dm_env's interface.
 
-    An episode that ends because everything is delivered has discount 0 in its last step; one that the time limit
-    cuts off has discount 1, so that what would have followed still counts.
+    The last step has discount 0 where everything is delivered, and 1 where the time limit truncates the episode, so
+    that a critic still bootstraps.
 
     Args:
         core: The task.
-        seed: Seed of the first episode and of the draws of all later ones.
+        seed: Seed of the first episode, and of the generator of all later seeds; None for a random one.
     """
 
     def __init__(self, core: Rearrangement, *, seed: int | None = None) -> None:
         self.core = core
         self._next_seed = seed
         self._rng = np.random.default_rng(seed)
-        self._running = False
+        self._is_running = False
 
     @property
     def physics(self) -> Any:
-        """The running episode as a `dm_control.mujoco.Physics` that shares its state.
+        """The state as a `dm_control.mujoco.Physics`; before the first reset, that of the first episode.
 
-        With it, `dm_control.viewer.launch(env)` shows the environment. Before the first reset it is that of the
-        episode to come.
+        With it, `dm_control.viewer.launch(env)` shows the environment.
         """
-        if not self.core.begun:
+        if not self.core.has_episode:
             if self._next_seed is None:
                 self._next_seed = int(self._rng.integers(MAX_SEED))
             self.core.prepare(self._next_seed)
-        return self.core.stage.physics
+        return self.core.episode.physics
 
     def reset(self) -> dm_env.TimeStep:
         """Begin the next episode."""
         seed, self._next_seed = self._next_seed, None
-        observation, _ = self.core.reset_drawn(self._rng) if seed is None else self.core.reset(seed)
-        self._running = True
+        observation, _ = self.core.reset_random(self._rng) if seed is None else self.core.reset(seed)
+        self._is_running = True
         return dm_env.restart(observation)
 
     def step(self, action: Any) -> dm_env.TimeStep:
-        """Carry out an action; after a last step, or before the first reset, begin the next episode instead.
+        """Carry out an action. After a last step and before the first reset, begin the next episode instead.
 
         Raises:
             ActionError: The action does not conform to its spec.
             PhysicsError: MuJoCo warned; the episode is over.
         """
-        if not self._running:
+        if not self._is_running:
             return self.reset()
-        self._running = False  # stays so if the physics fails
+        self._is_running = False  # stays so if the physics fails
         taken = self.core.step(action)
-        self._running = not (taken.terminated or taken.truncated)
         if taken.terminated:
             return dm_env.termination(taken.reward, taken.observation)
         if taken.truncated:
             return dm_env.truncation(taken.reward, taken.observation)
+        self._is_running = True
         return dm_env.transition(taken.reward, taken.observation)
 
     def observation_spec(self) -> dict[str, specs.Array]:
-        """Sensor name -> what it gives."""
+        """Sensor name -> spec of its array."""
         return self.core.observation_spec
 
     def action_spec(self) -> specs.BoundedArray:
-        """What an action is."""
+        """Spec of an action."""
         return self.core.action_spec
 
     def close(self) -> None:
-        """Free what was compiled."""
-        self._running = False
+        """Free all compiled episodes."""
+        self._is_running = False
         self.core.close()

@@ -1,30 +1,28 @@
-"""Where an environment's episodes come from, compiled once and kept while they may be needed again."""
+"""Episodes of an environment: sampled or given, compiled once, and cached."""
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mjsim.environments.dm_physics import physics_of
-from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.environments.layout import HouseKit
 from mjsim.episode import Episode
-from mjsim.model.sampling import sample_episode
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.sampling import NavigablePoints, sample_episode
 from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
 from mjsim.render import Labels, Renderer
 from mjsim.world import World
 
-_LEVEL = 41  # keeps the choice of a level apart from what the seed decides in the house
+_COUNT_STREAM = 41  # draws the number of objects independently of what the seed decides in the house
 
 
-class Stage:
-    """A compiled episode with the renderers that drew it.
+class CompiledEpisode:
+    """A compiled episode and its renderers.
 
     Attributes:
-        world: The running episode.
+        world: The simulation of the episode.
     """
 
     def __init__(self, world: World) -> None:
@@ -32,7 +30,7 @@ class Stage:
         self._renderers: dict[tuple[int, int, str], Renderer] = {}
 
     def renderer(self, width: int, height: int, profile: str) -> Renderer:
-        """A renderer of this size, made on first use.
+        """The renderer of this size, px, and profile; made on first use.
 
         Raises:
             RenderError: No OpenGL context could be made.
@@ -44,82 +42,80 @@ class Stage:
 
     @cached_property
     def labels(self) -> Labels:
-        """What the episode's geoms belong to."""
+        """Which instance and category each geom belongs to."""
         return Labels.of(self.world.scene)
 
     @cached_property
     def physics(self) -> Any:
         """The same state as a `dm_control.mujoco.Physics`, for dm_control's tools."""
-        return physics_of(self.world)
+        return dm_control_physics(self.world)
 
     def close(self) -> None:
-        """Free the GL resources; again does nothing."""
+        """Free the GL resources; may be called again."""
         while self._renderers:
             self._renderers.popitem()[1].close()
 
 
-class EpisodeSource:
-    """Seed -> running episode; the same seed gives the same episode, whatever came before.
+def dm_control_physics(world: World) -> Any:
+    """A `dm_control.mujoco.Physics` that shares the state of a world; treat it as read-only."""
+    # Importing dm_control fixes the OpenGL backend of the process, so do it only on demand.
+    from dm_control import mujoco as dm_mujoco
+
+    return dm_mujoco.Physics(dm_mujoco.wrapper.MjData(world.data))
+
+
+def sample(catalogue: Catalogue, navigable: NavigablePoints, objects: tuple[int, int], seed: int) -> Episode:
+    """The episode of a seed, with a number of objects drawn from `objects`, both ends included.
+
+    Raises:
+        SamplingError: The house has no room for this seed's objects.
+    """
+    low, high = objects
+    count = int(np.random.default_rng([seed, _COUNT_STREAM]).integers(low, high + 1))
+    return sample_episode(catalogue, navigable, objects=count, seed=seed)
+
+
+class EpisodeCache:
+    """Seed -> compiled episode. Equal seeds give equal episodes, whatever was asked for before.
 
     Args:
-        kit: The house.
-        objects: How many objects, or the least and the most.
-        episodes: None for a new house per seed; a number for that many houses, seeds counted modulo it; or
-            episodes sampled before, chosen by the seed modulo their number.
-        options: Rules of the world.
-        keep: How many compiled episodes are kept, about 20 MB each.
+        catalogue: The house.
+        make: Seed -> episode.
+        count: Number of different episodes; seeds are taken modulo it. None for no limit.
+        options: Limits of walking, reach and grip.
+        size: How many compiled episodes are kept, about 20 MB each.
     """
 
     def __init__(
         self,
-        kit: HouseKit,
+        catalogue: Catalogue,
+        make: Callable[[int], Episode],
         *,
-        objects: tuple[int, int],
-        episodes: int | Sequence[Episode] | None,
+        count: int | None,
         options: WorldOptions,
-        keep: int,
+        size: int,
     ) -> None:
-        self._kit = kit
-        self._objects = objects
-        self._given = None if episodes is None or isinstance(episodes, int) else tuple(episodes)
-        self._count = episodes if isinstance(episodes, int) else len(self._given) if self._given else None
-        self._options = options
-        self._keep = keep
-        self._stages: OrderedDict[int, Stage] = OrderedDict()
+        self._catalogue, self._make, self._count = catalogue, make, count
+        self._options, self._size = options, size
+        self._compiled: OrderedDict[int, CompiledEpisode] = OrderedDict()
 
-    def stage(self, seed: int) -> Stage:
-        """The episode of a seed, not yet reset.
+    def get(self, seed: int) -> CompiledEpisode:
+        """The compiled episode of a seed, not yet reset.
 
         Raises:
             SamplingError: The house has no room for this seed's objects.
             AssetError: A model is malformed.
         """
         key = seed if self._count is None else seed % self._count
-        if key not in self._stages:
-            while len(self._stages) >= self._keep:
-                self._stages.popitem(last=False)[1].close()
-            self._stages[key] = Stage(World(compose(self.episode(seed), self._kit.catalogue), self._options))
-        self._stages.move_to_end(key)
-        return self._stages[key]
-
-    def episode(self, seed: int) -> Episode:
-        """The episode that a seed stands for.
-
-        Raises:
-            SamplingError: The house has no room for this seed's objects.
-        """
-        key = seed if self._count is None else seed % self._count
-        if self._given is not None:
-            return self._given[key]
-        if self._kit.navigable is None:
-            raise EnvironmentConfigError(
-                "this house was loaded without a navigable floor; load it with sampling=True"
-            )
-        low, high = self._objects
-        level = int(np.random.default_rng([key, _LEVEL]).integers(low, high + 1))
-        return sample_episode(self._kit.catalogue, self._kit.navigable, objects=level, seed=key)
+        if key not in self._compiled:
+            while len(self._compiled) >= self._size:
+                self._compiled.popitem(last=False)[1].close()
+            scene = compose(self._make(key), self._catalogue)
+            self._compiled[key] = CompiledEpisode(World(scene, self._options))
+        self._compiled.move_to_end(key)
+        return self._compiled[key]
 
     def close(self) -> None:
-        """Let go of all compiled episodes; they are made anew when asked for."""
-        while self._stages:
-            self._stages.popitem()[1].close()
+        """Free all compiled episodes; `get` compiles them again."""
+        while self._compiled:
+            self._compiled.popitem()[1].close()

@@ -1,14 +1,14 @@
-"""Errors of the environments, below the base of all of mjsim's errors."""
+"""Errors of the environments."""
 
 from mjsim.errors import MjsimError
 
 
 class EnvironmentConfigError(MjsimError):
-    """An environment was asked for something that it cannot be made of."""
+    """An option of the environment is unknown or unusable."""
 
 
 class EnvironmentStateError(MjsimError):
-    """A call came at the wrong moment, such as a step before the first reset."""
+    """A call is not possible now, such as a step before the first reset."""
 
 
 class ViewerError(MjsimError):

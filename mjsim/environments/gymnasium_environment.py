@@ -12,19 +12,19 @@ from mjsim.environments.control import Continuous
 from mjsim.environments.core import ObservationDict
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.options import build, parse_options
-from mjsim.environments.viewer import Viewer, open_viewer
+from mjsim.environments.viewer import InteractiveViewer
 
-RENDER_SIZE = (640, 480)
+RENDER_SIZE = (640, 480)  # px
 
 
 class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
     """The task behind Gymnasium's interface; `gymnasium.make("mjsim/Rearrange-v0", objects=6, ...)`.
 
-    `reset(seed=s)` begins the episode of seed s, the house that `mjsim house --seed s` writes; later resets draw
-    their seeds from it.
+    `reset(seed=s)` begins the episode of seed s, the house that `mjsim house --seed s` writes, and seeds the
+    generator of later episodes.
 
     Args:
-        render_mode: None, `rgb_array` for what the eye sees, or `human` for dm_control's viewer.
+        render_mode: None, `rgb_array` for the first-person view, or `human` for dm_control's viewer.
         **options: Fields of `mjsim.environments.options.EnvironmentOptions`.
 
     Raises:
@@ -43,14 +43,12 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         self.core = build(parsed)
         self.render_mode = render_mode
         repeat = self.core.control.repeat if isinstance(self.core.control, Continuous) else 1
-        self.metadata = {
-            **self.metadata,
-            "render_fps": max(1, round(1 / (parsed.world.control_timestep * repeat))),
-        }
-        arrays = {k: to_space(s) for k, s in self.core.observation_spec.items()}
+        fps = max(1, round(1 / (parsed.world.control_timestep * repeat)))
+        self.metadata = {**self.metadata, "render_fps": fps}
+        arrays = {name: to_space(spec) for name, spec in self.core.observation_spec.items()}
         self.observation_space = cast("spaces.Space[ObservationDict]", spaces.Dict(arrays))
         self.action_space = to_space(self.core.action_spec)
-        self._viewer: Viewer | None = open_viewer() if render_mode == "human" else None
+        self._viewer = InteractiveViewer() if render_mode == "human" else None
         if self._viewer is not None:
             self.core.on_control_step = self._viewer.show
 
@@ -60,26 +58,26 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         """Begin an episode.
 
         Args:
-            seed: The episode's, and that of the draws of later ones; None to draw one.
-            options: None are known.
+            seed: Seed of the episode and of the generator of later ones; None for a random one.
+            options: Must be empty.
 
         Raises:
             EnvironmentConfigError: `options` is not empty.
-            ViewerError: The window was closed by `close`.
+            ViewerError: The viewer is closed.
         """
         super().reset(seed=seed)
         if options:
             raise EnvironmentConfigError(f"reset has no option {sorted(options)[0]!r}; it has none")
-        began = self.core.reset_drawn(self.np_random) if seed is None else self.core.reset(seed)
+        first = self.core.reset_random(self.np_random) if seed is None else self.core.reset(seed)
         if self._viewer is not None:
             self._viewer.show(self.core.world)
-        return began
+        return first
 
     def step(self, action: Any) -> tuple[ObservationDict, float, bool, bool, dict[str, Any]]:
         """Carry out an action.
 
         Raises:
-            EnvironmentStateError: The episode is over, or none was begun.
+            EnvironmentStateError: The episode is over, or there is none.
             ActionError: The action does not conform to its space.
             PhysicsError: MuJoCo warned; the episode is over.
         """
@@ -87,11 +85,11 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         return taken.observation, taken.reward, taken.terminated, taken.truncated, taken.info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """What the eye sees, (480, 640, 3) uint8, in mode `rgb_array`; in mode `human` the window is up to date.
+        """The first-person view, uint8 (480, 640, 3), in mode `rgb_array`; None in mode `human`, which draws a window.
 
         Raises:
             RenderError: No OpenGL context could be made.
-            ViewerError: The window was closed by `close`.
+            ViewerError: The viewer is closed.
         """
         if self._viewer is not None:
             self._viewer.show(self.core.world)
@@ -104,14 +102,14 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         return self.core.rgb(*RENDER_SIZE, self.core.layout.camera.profile)
 
     def close(self) -> None:
-        """Close the window and free what was compiled."""
+        """Close the window and free all compiled episodes."""
         if self._viewer is not None:
             self._viewer.close()
         self.core.close()
 
 
 def to_space(spec: specs.Array) -> spaces.Space[Any]:
-    """The Gymnasium space of what a dm_env spec declares.
+    """The Gymnasium space of a dm_env spec.
 
     Raises:
         EnvironmentConfigError: The spec has no bounds.

@@ -1,8 +1,7 @@
-"""Where one can walk, from whichever package offers to work it out.
+"""Finds the installed package that computes where one can walk.
 
-Sampling a house needs a navigable floor, and the navmesh is the planner's, which mjsim may not import. So mjsim
-names what it needs as a protocol, and takes what an installed distribution offers in the entry-point group
-`mjsim.navigable`. This project's own entry is the planner's navmesh.
+Sampling a house needs a navigable floor. The navmesh belongs to the planner, which mjsim must not import, so mjsim
+defines a protocol and loads the entry point `mjsim.navigable`. This project registers the planner's navmesh there.
 """
 
 from collections.abc import Sequence
@@ -21,17 +20,17 @@ class NavigableBuilder(Protocol):
     """Makes the navigable floor of a house."""
 
     def __call__(self, obstacles: Sequence[ArrayLike], bounds: Sequence[float], /) -> NavigablePoints:
-        """Work out where one can walk.
+        """Compute where one can walk.
 
         Args:
-            obstacles: Convex polygons, m, each (k, 2).
+            obstacles: Convex polygons, m, each of shape (vertices, 2).
             bounds: (x_min, y_min, x_max, y_max), m.
         """
         ...
 
 
 def installed_builder(group: str = GROUP) -> NavigableBuilder:
-    """The builder that an installed distribution offers; of several, the first by name.
+    """The builder that an installed package registers; of several, the first by name.
 
     Raises:
         EnvironmentConfigError: None is installed, or it cannot be loaded.

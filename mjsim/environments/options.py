@@ -1,44 +1,52 @@
-"""Everything that decides what an environment is, and the making of its core."""
+"""Options of an environment, and how the core is built from them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any, Literal
 
 from mjsim.environments.control import Control, resolve_control
 from mjsim.environments.core import Rearrangement
-from mjsim.environments.episodes import EpisodeSource
+from mjsim.environments.episodes import EpisodeCache, sample
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.environments.layout import CameraOptions, HouseKit, Layout
-from mjsim.environments.navigable import NavigableBuilder
+from mjsim.environments.navigable import NavigableBuilder, installed_builder
+from mjsim.environments.observation_layout import CameraOptions, ObservationLayout
 from mjsim.environments.rewards import RewardFunction, resolve_reward
 from mjsim.environments.sensors import Sensor, resolve_sensors
 from mjsim.episode import Episode
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import footprint
+from mjsim.model.scene import compile_house
 from mjsim.options import WorldOptions
 
 SECONDS_PER_OBJECT = 60.0
+DEFAULT_CACHE_SIZE = 8  # compiled episodes
 
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentOptions:
-    """What both `mjsim.make` and `gymnasium.make` take.
+    """Options of both `mjsim.make` and `gymnasium.make`.
 
     Attributes:
-        house: Name under `models/houses`, or the path of a `catalogue.toml`.
-        objects: How many misplaced objects; a pair for the least and the most, drawn per episode.
-        observations: Names of sensors or bundles, or sensors of your own (docs/environments.md).
-        actions: `continuous`, `discrete` or a control of your own.
+        house: Name under `models/houses`, or path of a `catalogue.toml`.
+        objects: Number of misplaced objects; or (min, max), from which each episode draws its own.
+        observations: Names of sensors or bundles, or `Sensor` values of your own (docs/environments.md).
+        actions: `continuous`, `discrete` or a `Control` of your own.
         reward: `time`, `shaped` or a function of your own.
-        time_limit: Simulated time after which an episode is cut off, s; None for 60 s per object.
-        episodes: None for a new house per episode; a number for so many houses that come again and again, which
-            makes resets quick; or episodes that were sampled before.
-        slots: Objects that the arrays have room for; None for the most that `objects` or `episodes` have.
-        camera: The eye camera's images.
+        time_limit: Simulated time after which an episode is truncated, s; None for 60 s per object.
+        episodes: None for a new house in every episode; a number of different houses that come again and again,
+            which makes resets fast; or a list of sampled episodes.
+        slots: Rows of the arrays with a row per object; None for the largest number of objects of an episode.
+        camera: Images of the eye camera.
         world: Limits of walking, reach and grip.
-        keep: How many compiled episodes are kept, about 20 MB each; None for all of a number of `episodes`, else 8.
-        physics_errors: `raise`, or `truncate` to let training go on: a failure of the physics then cuts the episode
-            off, with the last sound observation and `info["physics_error"]`.
-        navigable: Works out where one can walk; None for the installed one.
+        keep: How many compiled episodes are cached, about 20 MB each; None for all if `episodes` is a number, else 8.
+        physics_errors: `raise`, or `truncate` so that training goes on: an error of the physics then truncates the
+            episode, with the last valid observation and the error in `info["physics_error"]`.
+        navigable: Computes where one can walk; None for the installed builder.
+
+    Raises:
+        EnvironmentConfigError: A value is out of range.
     """
 
     house: str = "apartment"
@@ -56,44 +64,36 @@ class EnvironmentOptions:
     navigable: NavigableBuilder | None = None
 
     def __post_init__(self) -> None:
-        low, high = self.levels
-        if not 1 <= low <= high:
-            raise EnvironmentConfigError(
-                f"objects must be at least 1, least before most; got {self.objects!r}"
-            )
-        if self.time_limit is not None and not (math.isfinite(self.time_limit) and self.time_limit > 0):
-            raise EnvironmentConfigError(
-                f"time_limit must be a positive number of seconds, got {self.time_limit}"
-            )
-        if self.episodes is not None and not (
-            self.episodes > 0 if isinstance(self.episodes, int) else len(self.episodes)
+        low, high = self.object_range
+        limit, episodes = self.time_limit, self.episodes
+        count = 1 if episodes is None else episodes if isinstance(episodes, int) else len(episodes)
+        for is_valid, message in (
+            (1 <= low <= high, f"objects must be at least 1, min before max; got {self.objects!r}"),
+            (
+                limit is None or (math.isfinite(limit) and limit > 0),
+                f"time_limit must be a positive number of seconds, got {limit}",
+            ),
+            (count > 0, "episodes is empty; give at least one, or None to sample without end"),
+            (self.keep is None or self.keep > 0, f"keep must be at least 1, got {self.keep}"),
+            (
+                self.physics_errors in ("raise", "truncate"),
+                f"physics_errors must be 'raise' or 'truncate', got {self.physics_errors!r}",
+            ),
+            (
+                self.slots is None or self.slots >= high,
+                f"slots is {self.slots}, but an episode may have {high} objects",
+            ),
         ):
-            raise EnvironmentConfigError(
-                "episodes is empty; give at least one, or None to sample without end"
-            )
-        if self.keep is not None and self.keep < 1:
-            raise EnvironmentConfigError(f"keep must be at least 1, got {self.keep}")
-        if self.physics_errors not in ("raise", "truncate"):
-            raise EnvironmentConfigError(
-                f"physics_errors must be 'raise' or 'truncate', got {self.physics_errors!r}"
-            )
-        if self.slots is not None and self.slots < high:
-            raise EnvironmentConfigError(f"slots is {self.slots}, but an episode may have {high} objects")
+            if not is_valid:
+                raise EnvironmentConfigError(message)
 
     @property
-    def levels(self) -> tuple[int, int]:
-        """The least and the most objects of an episode."""
+    def object_range(self) -> tuple[int, int]:
+        """The smallest and the largest number of objects of an episode."""
         if isinstance(self.episodes, Sequence) and self.episodes:
             counts = [len(e.objects) for e in self.episodes]
             return min(counts), max(counts)
         return (self.objects, self.objects) if isinstance(self.objects, int) else self.objects
-
-    @property
-    def kept(self) -> int:
-        """How many compiled episodes are kept."""
-        if self.keep is not None:
-            return self.keep
-        return self.episodes if isinstance(self.episodes, int) else 8
 
 
 def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
@@ -110,38 +110,39 @@ def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
 
 
 def build(options: EnvironmentOptions) -> Rearrangement:
-    """Make the core: read the house, work out where one can walk, put sensors, control and reward together.
+    """Make the core: load the house and combine episodes, sensors, control and reward.
 
     Raises:
-        EnvironmentConfigError: A name is unknown, or no navigable floor can be made.
+        EnvironmentConfigError: A name is unknown, or no builder of a navigable floor is installed.
         AssetError: The house is malformed.
     """
     sensors = resolve_sensors(options.observations)
     control, reward = resolve_control(options.actions), resolve_reward(options.reward)
-    given = isinstance(options.episodes, Sequence)
-    kit = HouseKit.load(options.house, sampling=not given, builder=options.navigable)
-    most = options.levels[1]
-    layout = Layout(
-        slots=options.slots or most,
-        categories=tuple(kit.catalogue.categories),
-        receptacles=tuple(kit.catalogue.receptacles),
-        floor=kit.floor,
+    catalogue = Catalogue.load(options.house)
+    floor = footprint(compile_house(catalogue))
+    make: Callable[[int], Episode]
+    count: int | None
+    if isinstance(options.episodes, Sequence):
+        make, count, cache_size = options.episodes.__getitem__, len(options.episodes), DEFAULT_CACHE_SIZE
+    else:
+        navigable = (options.navigable or installed_builder())(floor.obstacles, floor.bounds)
+        make = partial(sample, catalogue, navigable, options.object_range)
+        count, cache_size = options.episodes, options.episodes or DEFAULT_CACHE_SIZE
+    max_objects = options.object_range[1]
+    layout = ObservationLayout(
+        slots=options.slots or max_objects,
+        categories=tuple(catalogue.categories),
+        receptacles=tuple(catalogue.receptacles),
+        floor=floor,
         camera=options.camera,
         max_speed=options.world.max_speed,
-        time_limit=options.time_limit or SECONDS_PER_OBJECT * most,
-    )
-    source = EpisodeSource(
-        kit,
-        objects=options.levels,
-        episodes=options.episodes,
-        options=options.world,
-        keep=options.kept,
+        time_limit=options.time_limit or SECONDS_PER_OBJECT * max_objects,
     )
     return Rearrangement(
-        source,
+        EpisodeCache(catalogue, make, count=count, options=options.world, size=options.keep or cache_size),
         layout,
         sensors=sensors,
         control=control,
         reward=reward,
-        forgiving=options.physics_errors == "truncate",
+        truncate_on_physics_error=options.physics_errors == "truncate",
     )

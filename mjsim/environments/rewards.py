@@ -1,4 +1,4 @@
-"""What an agent is paid: less for every second, and if wanted an advance on getting nearer to the end."""
+"""Reward: minus the time that passes, optionally with shaping towards the end of the task."""
 
 import math
 from dataclasses import dataclass
@@ -19,22 +19,25 @@ class RewardFunction(Protocol):
     """Reward of one step of the environment."""
 
     def __call__(self, scene: Scene, before: Observation, after: Observation) -> float:
-        """What the change from `before` to `after` is worth."""
+        """The reward for the step from `before` to `after`."""
         ...
 
 
 @dataclass(frozen=True)
 class TimeReward:
-    """Minus the time that passed, with potential-based shaping on top where it is switched on.
+    """Minus the time that passed, plus potential-based shaping if `shaping` is not 0.
 
-    The shaping is `shaping * (discount * potential(after) - potential(before))` with the potential minus the
-    estimated time to the end. Whatever the estimate, such a term leaves the optimal policy as it is, provided
-    that the agent discounts by the same factor (Ng, Harada and Russell 1999).
+    The shaping is `shaping * (discount * potential(after) - potential(before))`, where the potential is minus the
+    estimated time to the end. Such a term does not change the optimal policy, whatever the estimate, provided
+    that the agent uses the same discount factor (Ng, Harada and Russell 1999).
 
     Attributes:
         per_second: Cost of a second.
-        shaping: Weight of the shaping; 0 switches it off, 1 weighs an estimated second like a real one.
-        discount: The agent's discount factor per environment step.
+        shaping: Weight of the shaping; 1 weighs an estimated second like a real one.
+        discount: The agent's discount factor per environment step, 0 to 1.
+
+    Raises:
+        EnvironmentConfigError: A value is not finite, or `discount` is not 0 to 1.
     """
 
     per_second: float = 1.0
@@ -59,18 +62,18 @@ class TimeReward:
 
 
 def potential(scene: Scene, observation: Observation) -> float:
-    """Minus a rough estimate of the time to the end, s: straight lines, one object at a time; 0 when all is done."""
+    """Minus a rough estimate of the time to the end, s; straight lines, one object at a time, 0 when all is done."""
     status = observation.object_status
     bins = np.array(
         [scene.receptacles[scene.episode.targets[n]].center[:2] for n in observation.object_names]
     )
     loose = np.array([s is ObjectStatus.LOOSE for s in status])
     carried = np.array([s is ObjectStatus.CARRIED for s in status])
-    things = observation.object_positions[:, :2]
-    walk = np.linalg.norm(bins - things, axis=1)[loose].sum()
+    objects = observation.object_positions[:, :2]
+    walk = np.linalg.norm(bins - objects, axis=1)[loose].sum()
     walk += np.linalg.norm(bins - observation.position, axis=1)[carried].sum()
     if loose.any() and carried.sum() < CAPACITY:
-        walk += np.linalg.norm(things - observation.position, axis=1)[loose].min()
+        walk += np.linalg.norm(objects - observation.position, axis=1)[loose].min()
     handling = HANDLING_TIME * (2 * loose.sum() + carried.sum())
     return -float(walk / WALKING_SPEED + handling)
 
@@ -79,7 +82,7 @@ REWARDS = {"time": TimeReward(), "shaped": TimeReward(shaping=1.0)}
 
 
 def resolve_reward(reward: str | RewardFunction) -> RewardFunction:
-    """The reward function itself, or the one of that name: `time` or `shaped`.
+    """The reward function itself, or the one with that name: `time` or `shaped`.
 
     Raises:
         EnvironmentConfigError: No reward has that name.

@@ -3,9 +3,9 @@
 import os
 import time
 import warnings
-from typing import Any, Protocol
+from typing import Any
 
-from mjsim.environments.dm_physics import physics_of
+from mjsim.environments.episodes import dm_control_physics
 from mjsim.environments.errors import ViewerError
 from mjsim.world import World
 
@@ -13,36 +13,19 @@ _BACKEND = "MUJOCO_GL"
 _REMEDY = "run it where there is a display, or use render_mode='rgb_array', which needs none"
 
 
-class Viewer(Protocol):
-    """Shows worlds to a person."""
-
-    def show(self, world: World) -> None:
-        """Show the present state of a world."""
-        ...
-
-    def close(self) -> None:
-        """Close the window; again does nothing."""
-        ...
-
-
-def open_viewer(*, width: int = 1024, height: int = 768, realtime: bool = True) -> Viewer:
-    """Open a window.
+class InteractiveViewer:
+    """dm_control's viewer without its own loop: `show` draws one frame, as Gymnasium's render mode `human` needs it.
 
     Args:
-        width: px.
-        height: px.
+        width: Width of the window, px.
+        height: Height of the window, px.
         realtime: Whether `show` waits until as much time has passed as was simulated.
 
     Raises:
         ViewerError: There is no display, or no GLFW.
     """
-    return _DmControlViewer(width, height, realtime)
 
-
-class _DmControlViewer:
-    """dm_control's viewer has a loop of its own; a window for Gymnasium has to be driven from outside."""
-
-    def __init__(self, width: int, height: int, realtime: bool) -> None:
+    def __init__(self, *, width: int = 1024, height: int = 768, realtime: bool = True) -> None:
         self._window: Any = None
         gui, self._render, self._viewer_module, self._renderer_module = _load()
         try:
@@ -54,20 +37,24 @@ class _DmControlViewer:
         self._world: World | None = None
         self._renderer: Any = None
         self._viewer: Any = None
-        self._shown_at = (0.0, 0.0)
+        self._last_shown = (0.0, 0.0)  # clock and simulated time, s
 
     def show(self, world: World) -> None:
-        """Show a world, and keep up with real time."""
+        """Draw the present state of a world.
+
+        Raises:
+            ViewerError: The viewer is closed.
+        """
         if self._window is None:
             raise ViewerError("the viewer is closed; open another")
         if world is not self._world:
             self._load_world(world)
-        self._keep_pace(world.data.time)
+        self._wait_for_real_time(world.data.time)
         self._viewport.set_size(*self._window.shape)
         self._window.update(self._pixels)
 
     def close(self) -> None:
-        """Close the window."""
+        """Close the window; may be called again."""
         self._release()
         if self._window is not None:
             self._window.close()
@@ -80,7 +67,7 @@ class _DmControlViewer:
     def _load_world(self, world: World) -> None:
         self._release()
         self._world = world
-        physics = physics_of(world)
+        physics = dm_control_physics(world)
         surface = self._render.Renderer(max_width=2048, max_height=2048)
         self._renderer = self._renderer_module.OffScreenRenderer(physics.model, surface)
         self._viewer = self._viewer_module.Viewer(self._viewport, self._window.mouse, self._window.keyboard)
@@ -93,18 +80,18 @@ class _DmControlViewer:
             self._renderer.release()
             self._viewer = self._renderer = self._world = None
 
-    def _keep_pace(self, simulated: float) -> None:
-        clock, before = self._shown_at
+    def _wait_for_real_time(self, simulated: float) -> None:
+        clock, before = self._last_shown
         now = time.monotonic()
         if self._realtime and simulated > before:
             time.sleep(max(0.0, min(clock + simulated - before - now, 1.0)))
-        self._shown_at = (time.monotonic(), simulated)
+        self._last_shown = (time.monotonic(), simulated)
 
 
 def _load() -> tuple[Any, Any, Any, Any]:
-    """dm_control's modules of the viewer, with GLFW as the OpenGL backend of this process.
+    """dm_control's viewer modules, with GLFW as the OpenGL backend.
 
-    A process has one backend, for windows and off screen alike; a window made first settles it.
+    A process has one backend, for windows and off screen alike, fixed by its first use.
 
     Raises:
         ViewerError: Another backend is in use, or GLFW cannot be loaded.
@@ -125,14 +112,14 @@ def _load() -> tuple[Any, Any, Any, Any]:
 
 
 def _check_display() -> None:
-    """Ask GLFW alone first: dm_control would settle the process's backend before it fails."""
+    """Ask GLFW directly first: dm_control would fix the backend of the process before it fails."""
     try:
-        with warnings.catch_warnings(record=True) as reasons:
+        with warnings.catch_warnings(record=True) as caught:
             import glfw
 
-            ready = glfw.init()
+            is_ready = glfw.init()
     except ImportError as error:
         raise ViewerError(f"GLFW cannot be loaded ({error}); {_REMEDY}") from error
-    if not ready:
-        said = "; ".join(str(r.message) for r in reasons) or "GLFW gives no reason"
-        raise ViewerError(f"no display ({said}); {_REMEDY}")
+    if not is_ready:
+        reasons = "; ".join(str(w.message) for w in caught) or "GLFW gives no reason"
+        raise ViewerError(f"no display ({reasons}); {_REMEDY}")

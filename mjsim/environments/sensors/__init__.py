@@ -1,12 +1,12 @@
-"""Sensors: small declared arrays of which an observation is put together."""
+"""Sensors: the named arrays that make up an observation."""
 
 from collections.abc import Sequence
 
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.sensors import house, person, sight, task
-from mjsim.environments.sensors.base import IMAGES, Moment, Sensor, unit_spec
+from mjsim.environments.sensors.base import IMAGES, Sensor, SensorInput, unit_spec
 
-__all__ = ["BUNDLES", "IMAGES", "SENSORS", "Moment", "Sensor", "resolve_sensors", "unit_spec"]
+__all__ = ["BUNDLES", "IMAGES", "SENSORS", "Sensor", "SensorInput", "resolve_sensors", "unit_spec"]
 
 _VECTORS = (
     person.GPS,
@@ -32,7 +32,7 @@ BUNDLES = {"state": _VECTORS}
 
 
 def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:
-    """Sensors by name, by the name of a bundle, or as they are; each once, in order.
+    """Sensors by name, by the name of a bundle, or given as they are; without repetition, in order.
 
     Raises:
         EnvironmentConfigError: A name is unknown, none is given, or two different sensors share a name.

@@ -1,4 +1,4 @@
-"""The house as the augmented-reality system knows it: map, free way around the person, receptacles."""
+"""The house as the augmented-reality system knows it: map, distances to obstacles, receptacles."""
 
 import math
 
@@ -7,8 +7,8 @@ import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
 
-from mjsim.environments.layout import Layout
-from mjsim.environments.sensors.base import Moment, Sensor, unit_spec
+from mjsim.environments.observation_layout import ObservationLayout
+from mjsim.environments.sensors.base import Sensor, SensorInput, unit_spec
 
 MAP_SIZE = 64
 RAYS = 24
@@ -16,37 +16,39 @@ RANGE = 3.0  # m
 _SUBPIXEL = 8  # fractional bits of OpenCV's polygon vertices
 
 
-def occupancy(layout: Layout, size: int = MAP_SIZE) -> NDArray[np.uint8]:
-    """Raster of the floor's obstacles.
+def occupancy(layout: ObservationLayout, size: int = MAP_SIZE) -> NDArray[np.uint8]:
+    """Occupancy grid of the floor.
 
     Args:
-        layout: With the floor.
-        size: Rows and columns.
+        layout: Holds the floor.
+        size: Number of rows and of columns.
 
     Returns:
-        1 where an obstacle covers the middle of a cell or touches it, else 0; shape (size, size). Row 0 lies at the
-        floor's least y, column 0 at its least x; cells are stretched so that the bounds fill the raster.
+        Shape (size, size): 1 where an obstacle covers or touches the centre of a cell, else 0. Row 0 is at the
+        minimum y of the floor, column 0 at its minimum x; the bounds of the floor fill the grid.
     """
     raster = np.zeros((size, size), np.uint8)
     x_min, y_min, x_max, y_max = layout.floor.bounds
     cells = np.array([size / (x_max - x_min), size / (y_max - y_min)])
     for outline in layout.floor.obstacles:
-        # OpenCV puts the middle of the first pixel at 0.
+        # OpenCV puts the centre of the first pixel at 0.
         corners = (outline - (x_min, y_min)) * cells - 0.5
         cv2.fillConvexPoly(raster, np.round(corners * 2**_SUBPIXEL).astype(np.int32), 1, shift=_SUBPIXEL)
     return raster
 
 
-def free_way(layout: Layout, position: NDArray[np.float64], heading: float) -> NDArray[np.float64]:
-    """How far it is to the next obstacle in each of `RAYS` directions.
+def ray_distances(
+    layout: ObservationLayout, position: NDArray[np.float64], heading: float
+) -> NDArray[np.float64]:
+    """Distance to the nearest obstacle in each of `RAYS` directions.
 
     Args:
-        layout: With the floor.
-        position: Floor point (2,), m.
-        heading: rad; ray k points k / RAYS of a turn to the left of it.
+        layout: Holds the floor.
+        position: Floor point, m, shape (2,).
+        heading: Direction of ray 0, rad; ray k points k / RAYS of a full turn to the left of it.
 
     Returns:
-        m, shape (RAYS,), at most `RANGE`.
+        Distances, m, shape (RAYS,), at most `RANGE`.
     """
     start, edge = _edges_in_front(layout, position)
     angles = heading + 2 * math.pi * np.arange(RAYS) / RAYS
@@ -61,9 +63,9 @@ def free_way(layout: Layout, position: NDArray[np.float64], heading: float) -> N
 
 
 def _edges_in_front(
-    layout: Layout, position: NDArray[np.float64]
+    layout: ObservationLayout, position: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Edges that a ray from `position` may meet first: near, and facing it, as outlines run counter-clockwise."""
+    """Edges within range that face `position`; outlines run counter-clockwise. Start points and vectors, m."""
     start, edge = layout.edges
     offset = start - position
     facing = edge[:, 0] * offset[:, 1] - edge[:, 1] * offset[:, 0] > 0
@@ -73,21 +75,21 @@ def _edges_in_front(
     return start[chosen], edge[chosen]
 
 
-def _rangefinder(moment: Moment) -> NDArray[np.float32]:
-    seen = moment.observation
-    return (free_way(moment.layout, seen.position, seen.heading) / RANGE).astype(np.float32)
+def _rangefinder(inputs: SensorInput) -> NDArray[np.float32]:
+    state = inputs.state
+    return (ray_distances(inputs.layout, state.position, state.heading) / RANGE).astype(np.float32)
 
 
-def _receptacles(moment: Moment) -> NDArray[np.float32]:
-    known = moment.world.scene.receptacles
-    centres = np.array([known[key].center[:2] for key in moment.layout.receptacles])
-    return moment.layout.scaled(moment.to_body(centres))
+def _receptacles(inputs: SensorInput) -> NDArray[np.float32]:
+    known = inputs.world.scene.receptacles
+    centres = np.array([known[key].center[:2] for key in inputs.layout.receptacles])
+    return inputs.layout.scaled(inputs.to_body(centres))
 
 
 MAP = Sensor(
     "map",
     lambda _: specs.BoundedArray((MAP_SIZE, MAP_SIZE), np.uint8, 0, 1),
-    lambda moment: occupancy(moment.layout),
+    lambda inputs: occupancy(inputs.layout),
 )
 RANGEFINDER = Sensor("rangefinder", lambda _: unit_spec(RAYS, low=0.0), _rangefinder)
 RECEPTACLES = Sensor("receptacles", lambda layout: unit_spec(len(layout.receptacles), 2), _receptacles)

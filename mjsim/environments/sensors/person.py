@@ -1,4 +1,4 @@
-"""The person's own state: where, how fast, and what is in the hands."""
+"""The person's own state: pose, velocity, and the objects in the hands."""
 
 import math
 
@@ -6,49 +6,49 @@ import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
 
-from mjsim.environments.layout import Layout
-from mjsim.environments.sensors.base import Moment, Sensor, rotated, unit_spec
+from mjsim.environments.observation_layout import ObservationLayout
+from mjsim.environments.sensors.base import Sensor, SensorInput, rotated, unit_spec
 
 Array = NDArray[np.float32]
 
 
-def _gps(moment: Moment) -> Array:
-    start = moment.start
-    offset = moment.observation.position - np.array([start.x, start.y])
-    return moment.layout.scaled(rotated(offset, -start.heading))
+def _gps(inputs: SensorInput) -> Array:
+    start = inputs.start
+    offset = inputs.state.position - np.array([start.x, start.y])
+    return inputs.layout.scaled(rotated(offset, -start.heading))
 
 
 def _direction(angle: float) -> list[float]:
     return [math.cos(angle), math.sin(angle)]
 
 
-def _compass(moment: Moment) -> Array:
-    return np.array(_direction(moment.observation.heading - moment.start.heading), np.float32)
+def _compass(inputs: SensorInput) -> Array:
+    return np.array(_direction(inputs.state.heading - inputs.start.heading), np.float32)
 
 
-def _pose(moment: Moment) -> Array:
-    bounds = np.array(moment.layout.floor.bounds)
+def _pose(inputs: SensorInput) -> Array:
+    bounds = np.array(inputs.layout.floor.bounds)
     middle, half = (bounds[:2] + bounds[2:]) / 2, (bounds[2:] - bounds[:2]) / 2
-    place = np.clip((moment.observation.position - middle) / half, -1.0, 1.0)
-    return np.array([*place, *_direction(moment.observation.heading)], np.float32)
+    position = np.clip((inputs.state.position - middle) / half, -1.0, 1.0)
+    return np.array([*position, *_direction(inputs.state.heading)], np.float32)
 
 
-def _motion(moment: Moment) -> Array:
-    seen = moment.observation
-    velocity = rotated(seen.velocity, -seen.heading) / moment.layout.max_speed
-    values = np.array([*velocity, seen.pitch / (math.pi / 2), float(seen.busy)], np.float32)
+def _motion(inputs: SensorInput) -> Array:
+    state = inputs.state
+    velocity = rotated(state.velocity, -state.heading) / inputs.layout.max_speed
+    values = np.array([*velocity, state.pitch / (math.pi / 2), float(state.busy)], np.float32)
     return np.clip(values, -1.0, 1.0)
 
 
-def _inventory_spec(layout: Layout) -> specs.Array:
+def _inventory_spec(layout: ObservationLayout) -> specs.Array:
     return unit_spec(2, layout.slots, low=0.0)
 
 
-def _inventory(moment: Moment) -> Array:
-    held = np.zeros((2, moment.layout.slots), np.float32)
-    for hand, name in enumerate(moment.observation.hands):
+def _inventory(inputs: SensorInput) -> Array:
+    held = np.zeros((2, inputs.layout.slots), np.float32)
+    for hand, name in enumerate(inputs.state.hands):
         if name is not None:
-            held[hand, moment.observation.object_names.index(name)] = 1.0
+            held[hand, inputs.state.object_names.index(name)] = 1.0
     return held
 
 

@@ -1,11 +1,11 @@
-"""The objects and what is left to do with them; one row per slot, zeros in slots without an object."""
+"""The objects and what is left to do; one row per slot, zeros in slots without an object."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.environments.sensors.base import Moment, Sensor, unit_spec
+from mjsim.environments.sensors.base import Sensor, SensorInput, unit_spec
 from mjsim.observation import ObjectStatus
 
 _STATUS = tuple(ObjectStatus)
@@ -13,8 +13,8 @@ _STATUS = tuple(ObjectStatus)
 Array = NDArray[np.float32]
 
 
-def _in_slots(moment: Moment, rows: NDArray[np.float32]) -> Array:
-    padded = np.zeros((moment.layout.slots, *rows.shape[1:]), np.float32)
+def _padded(inputs: SensorInput, rows: NDArray[np.float32]) -> Array:
+    padded = np.zeros((inputs.layout.slots, *rows.shape[1:]), np.float32)
     padded[: len(rows)] = rows
     return padded
 
@@ -23,56 +23,59 @@ def _one_hot(choices: Sequence[int], width: int) -> Array:
     return np.eye(width, dtype=np.float32)[list(choices)]
 
 
-def _mask(moment: Moment) -> Array:
-    return _in_slots(moment, np.ones(len(moment.observation.object_names), np.float32))
+def _mask(inputs: SensorInput) -> Array:
+    return _padded(inputs, np.ones(len(inputs.state.object_names), np.float32))
 
 
-def _positions(moment: Moment) -> Array:
-    centres = moment.observation.object_positions
-    local = np.column_stack([moment.to_body(centres[:, :2]), centres[:, 2]])
-    return _in_slots(moment, moment.layout.scaled(local))
+def _positions(inputs: SensorInput) -> Array:
+    centres = inputs.state.object_positions
+    local = np.column_stack([inputs.to_body(centres[:, :2]), centres[:, 2]])
+    return _padded(inputs, inputs.layout.scaled(local))
 
 
-def _rotations(moment: Moment) -> Array:
-    quaternions = moment.observation.object_quaternions
-    # A quaternion and its negative are the same rotation; agents should see one of them only.
+def _rotations(inputs: SensorInput) -> Array:
+    quaternions = inputs.state.object_quaternions
+    # A quaternion and its negative are the same rotation: use the one with w >= 0.
     upper = np.where(quaternions[:, :1] < 0, -quaternions, quaternions)
     unit = upper / np.linalg.norm(upper, axis=1, keepdims=True)
-    return _in_slots(moment, np.clip(unit, -1.0, 1.0).astype(np.float32))
+    return _padded(inputs, np.clip(unit, -1.0, 1.0).astype(np.float32))
 
 
-def _statuses(moment: Moment) -> Array:
-    statuses = [_STATUS.index(s) for s in moment.observation.object_status]
-    return _in_slots(moment, _one_hot(statuses, len(_STATUS)))
+def _statuses(inputs: SensorInput) -> Array:
+    statuses = [_STATUS.index(s) for s in inputs.state.object_status]
+    return _padded(inputs, _one_hot(statuses, len(_STATUS)))
 
 
-def _categories(moment: Moment) -> Array:
-    keys = moment.layout.categories
-    found = [keys.index(o.category) for o in moment.world.scene.episode.objects]
-    return _in_slots(moment, _one_hot(found, len(keys)))
+def _categories(inputs: SensorInput) -> Array:
+    keys = inputs.layout.categories
+    found = [keys.index(o.category) for o in inputs.world.scene.episode.objects]
+    return _padded(inputs, _one_hot(found, len(keys)))
 
 
-def goals(moment: Moment) -> NDArray[np.float64]:
-    """Where each object has to be dealt with next: itself while loose, else its receptacle; m, shape (n, 2)."""
-    seen, scene = moment.observation, moment.world.scene
-    bins = np.array([scene.receptacles[scene.episode.targets[n]].center[:2] for n in seen.object_names])
-    loose = np.array([s is ObjectStatus.LOOSE for s in seen.object_status])
-    return np.where(loose[:, None], seen.object_positions[:, :2], bins)
+def goals(inputs: SensorInput) -> NDArray[np.float64]:
+    """Where the next pick or place of each object happens: at the object while it is loose, else at its receptacle.
+
+    Floor points, m, shape (objects, 2).
+    """
+    state, scene = inputs.state, inputs.world.scene
+    bins = np.array([scene.receptacles[scene.episode.targets[n]].center[:2] for n in state.object_names])
+    loose = np.array([s is ObjectStatus.LOOSE for s in state.object_status])
+    return np.where(loose[:, None], state.object_positions[:, :2], bins)
 
 
-def _goals(moment: Moment) -> Array:
-    undelivered = [s is not ObjectStatus.DELIVERED for s in moment.observation.object_status]
-    local = moment.to_body(goals(moment)) * np.array(undelivered)[:, None]
-    return _in_slots(moment, moment.layout.scaled(local))
+def _goals(inputs: SensorInput) -> Array:
+    undelivered = [s is not ObjectStatus.DELIVERED for s in inputs.state.object_status]
+    local = inputs.to_body(goals(inputs)) * np.array(undelivered)[:, None]
+    return _padded(inputs, inputs.layout.scaled(local))
 
 
-def _remaining(moment: Moment) -> Array:
-    statuses = moment.observation.object_status
+def _remaining(inputs: SensorInput) -> Array:
+    statuses = inputs.state.object_status
     return np.array([sum(s is not ObjectStatus.DELIVERED for s in statuses) / len(statuses)], np.float32)
 
 
-def _time_left(moment: Moment) -> Array:
-    left = 1.0 - moment.observation.time / moment.layout.time_limit
+def _time_left(inputs: SensorInput) -> Array:
+    left = 1.0 - inputs.state.time / inputs.layout.time_limit
     return np.array([max(0.0, left)], np.float32)
 
 
