@@ -278,12 +278,16 @@ class Session:
         )
 
     def _look(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
-        seen = visible_objects(
-            self._world.scene, self._world.data, observation.eye, observation.heading, observation.pitch
-        )
         # What has been put away stays in view, in its bin, but nobody takes it for misplaced.
-        loose = set(observation.names_with(ObjectStatus.LOOSE))
-        return {name: _position_of(observation, name) for name in seen if name in loose}
+        seen = visible_objects(
+            self._world.scene,
+            self._world.data,
+            observation.eye,
+            observation.heading,
+            observation.pitch,
+            among=observation.names_with(ObjectStatus.LOOSE),
+        )
+        return {name: _position_of(observation, name) for name in seen}
 
     def _guidance(self, observation: Observation) -> Guidance | None:
         return self._assistant.guidance(observation) if "goal" in self._shown else None

@@ -4,18 +4,23 @@ It stands in for looking: a simulated participant without assistance knows only 
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjsim.kernels import kernel
 from mjsim.model.scene import Scene
 
 SHOWN_GROUPS = (0, 1, 2)  # what the first-person view draws of the house and the objects
-PASS = 1e-4  # share of a ray that is skipped to get through a surface of the person
-INSET = 0.7  # of the half extents: box corners and face centres of round things are empty
-_OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
+SKIP = 1e-4  # share of a ray that is skipped to get through a surface of the person
+INSET = 0.7  # of the half extents: box corners and face centres of round objects are empty
+OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
+MIN_OCCLUDER = 0.25  # m, half extent: large boxes are tested before any ray is cast
+MARGIN = 1e-6  # m, for rounding
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,61 @@ class FieldOfView:
     range: float = 8.0
 
 
+class ShownGeoms(NamedTuple):
+    """The drawn geoms of all objects: what of them the model alone decides.
+
+    Attributes:
+        ids: Geom ids, (g,).
+        owners: Position of each geom's object in the episode's order, (g,).
+        centers: Centres of the geoms' own bounding boxes in the geoms' frames, m, (g, 3).
+        half_sizes: Half extents of those boxes, m, (g, 3).
+    """
+
+    ids: NDArray[np.int64]
+    owners: NDArray[np.int64]
+    centers: NDArray[np.float64]
+    half_sizes: NDArray[np.float64]
+
+
+class Occluders(NamedTuple):
+    """Large static boxes (walls, cupboards), the largest first.
+
+    Attributes:
+        centers: m, (w, 3).
+        axes: Their axes as columns, (w, 3, 3).
+        half_sizes: Half extents, m, (w, 3).
+    """
+
+    centers: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    half_sizes: NDArray[np.float64]
+
+
+class Gaze(NamedTuple):
+    """Where the eye is and what it could see if nothing were in between.
+
+    Attributes:
+        eye: m, (3,).
+        axes: Rows forward, left and up, (3, 3).
+        slopes: Tangents of half the horizontal and half the vertical field of view, (2,).
+        range: m.
+    """
+
+    eye: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    range: float
+
+
+class _SightModel(NamedTuple):
+    """What does not change while a scene lasts."""
+
+    shown: ShownGeoms
+    occluders: Occluders
+    groups: NDArray[np.uint8]
+    person: NDArray[np.bool_]  # per geom: whether it belongs to the person
+
+
 def visible_objects(
     scene: Scene,
     data: mujoco.MjData,
@@ -41,6 +101,7 @@ def visible_objects(
     pitch: float = 0.0,
     *,
     field: FieldOfView | None = None,
+    among: Collection[str] | None = None,
 ) -> tuple[str, ...]:
     """Instance names of the objects in view, in the episode's order.
 
@@ -55,69 +116,179 @@ def visible_objects(
         heading: Yaw of the gaze, rad, 0 along +x, counter-clockwise.
         pitch: Elevation of the gaze, rad, positive upwards.
         field: Field of view; by default 80 by 65 degrees and 8 m.
+        among: Instance names to look for; None for all. The fewer, the quicker.
     """
-    field = field or FieldOfView()
-    origin = np.array(eye, dtype=np.float64)
-    rays = _targets(scene, data) - origin
-    inside = _in_field(rays, heading, pitch, field)
-    owners, points = np.nonzero(inside)
-    if not owners.size:
-        return ()
-    hits = _first_hits(scene, data, origin, rays[owners, points])
-    met = np.where(hits >= 0, scene.index.geom_owner[hits], -1)
-    seen = np.unique(owners[met == owners])
-    return tuple(scene.index.names[i] for i in seen)
+    sight = scene.once("sight", lambda: _sight_model(scene, data))
+    names = scene.index.names
+    wanted = np.ones(len(names), np.bool_)
+    if among is not None:
+        wanted[:] = [name in among for name in names]
+    gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView())
+    owners, rays = open_rays(sight.shown, data.geom_xpos, data.geom_xmat, wanted, gaze, sight.occluders)
+    seen: set[int] = set()
+    for owner, ray in zip(owners.tolist(), rays, strict=True):
+        if owner not in seen:
+            geom = _first_hit(scene.model, data, gaze.eye, ray, sight)
+            if geom >= 0 and scene.index.geom_owner[geom] == owner:
+                seen.add(owner)
+    return tuple(names[i] for i in sorted(seen))
 
 
-def _first_hits(
-    scene: Scene, data: mujoco.MjData, origin: NDArray[np.float64], directions: NDArray[np.float64]
-) -> NDArray[np.int32]:
-    """Geom that each ray (k, 3) from `origin` meets first, the person's aside; -1 for none; shape (k,)."""
-    model, count = scene.model, len(directions)
+def _first_hit(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    eye: NDArray[np.float64],
+    ray: NDArray[np.float64],
+    sight: _SightModel,
+) -> int:
+    """Geom that a ray (3,) from the eye meets first, the person's aside; -1 for none."""
+    geom, gone = np.full(1, -1, np.int32), 0.0
+    gone = mujoco.mj_ray(model, data, eye, ray, sight.groups, True, -1, geom)
+    # The hands are drawn, but they do not hide anything from the person.
+    while geom[0] >= 0 and sight.person[geom[0]]:
+        gone += SKIP
+        gone += mujoco.mj_ray(model, data, eye + gone * ray, ray, sight.groups, True, -1, geom)
+    return int(geom[0])
+
+
+def _sight_model(scene: Scene, data: mujoco.MjData) -> _SightModel:
+    model, owner = scene.model, scene.index.geom_owner
+    drawn = np.isin(model.geom_group, SHOWN_GROUPS)
+    static = model.body_weldid[model.geom_bodyid] == 0
     groups = np.zeros(mujoco.mjNGROUP, np.uint8)
     groups[list(SHOWN_GROUPS)] = 1
-    hits, distances = np.full(count, -1, np.int32), np.empty(count)
-    mujoco.mj_multiRay(
-        model, data, origin, np.ascontiguousarray(directions).ravel(), groups, True, -1, hits, distances, None,
-        count, mujoco.mjMAXVAL,
-    )  # fmt: skip
-    # What moves and is no object is the person: the hands are drawn, but nobody looks at them.
-    person = (scene.index.geom_owner == -1) & (model.body_weldid[model.geom_bodyid] != 0)
-    for ray in np.flatnonzero((hits >= 0) & person[hits]):
-        gone, geom = distances[ray], hits[ray : ray + 1]
-        while geom[0] >= 0 and person[geom[0]]:
-            gone += PASS
-            start = origin + gone * directions[ray]
-            gone += mujoco.mj_ray(model, data, start, directions[ray], groups, True, -1, geom)
-    return hits
-
-
-def _targets(scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
-    """Points to look at, m, shape (n, 7, 3): in the upright box around each object's shown geoms."""
-    model, owner = scene.model, scene.index.geom_owner
-    geoms = np.flatnonzero((owner >= 0) & np.isin(model.geom_group, SHOWN_GROUPS))
-    rotations = data.geom_xmat[geoms].reshape(-1, 3, 3)
-    local = model.geom_aabb[geoms]
-    centers = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", rotations, local[:, :3])
-    halves = np.einsum("gij,gj->gi", np.abs(rotations), local[:, 3:])
-    low = np.full((len(scene.index.names), 3), np.inf)
-    high = -low
-    np.minimum.at(low, owner[geoms], centers - halves)
-    np.maximum.at(high, owner[geoms], centers + halves)
-    middle, half = (low + high) / 2, (high - low) / 2
-    return np.asarray(middle[:, None] + half[:, None] * _OFFSETS)
-
-
-def _in_field(
-    rays: NDArray[np.float64], heading: float, pitch: float, field: FieldOfView
-) -> NDArray[np.bool_]:
-    """Which rays (..., 3) end inside the viewing frustum."""
-    c, s, cp, sp = math.cos(heading), math.sin(heading), math.cos(pitch), math.sin(pitch)
-    forward = rays @ np.array([c * cp, s * cp, sp])
-    left = rays @ np.array([-s, c, 0.0])
-    up = rays @ np.array([-c * sp, -s * sp, cp])
-    return np.asarray(
-        (np.abs(left) <= forward * math.tan(field.horizontal / 2))
-        & (np.abs(up) <= forward * math.tan(field.vertical / 2))
-        & (np.linalg.norm(rays, axis=-1) <= field.range)
+    ids = np.flatnonzero((owner >= 0) & drawn)
+    boxes = model.geom_aabb[ids]
+    shown = ShownGeoms(ids, owner[ids].astype(np.int64), boxes[:, :3].copy(), boxes[:, 3:].copy())
+    alpha = model.geom_rgba[:, 3].copy()  # a ray passes through what is fully transparent
+    textured = model.geom_matid >= 0
+    alpha[textured] *= model.mat_rgba[model.geom_matid[textured], 3]
+    extents = np.sort(model.geom_size, axis=1)
+    large = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (extents[:, 1] >= MIN_OCCLUDER)
+    walls = np.flatnonzero(large & static & drawn & (alpha > 0))
+    walls = walls[np.argsort(-extents[walls, 1] * extents[walls, 2], kind="stable")]
+    occluders = Occluders(
+        data.geom_xpos[walls].copy(),
+        data.geom_xmat[walls].reshape(-1, 3, 3).copy(),
+        model.geom_size[walls].copy(),
     )
+    return _SightModel(shown, occluders, groups, (owner == -1) & ~static)
+
+
+def _gaze(eye: NDArray[np.float64], heading: float, pitch: float, field: FieldOfView) -> Gaze:
+    c, s, cp, sp = math.cos(heading), math.sin(heading), math.cos(pitch), math.sin(pitch)
+    axes = np.array([[c * cp, s * cp, sp], [-s, c, 0.0], [-c * sp, -s * sp, cp]])
+    slopes = np.array([math.tan(field.horizontal / 2), math.tan(field.vertical / 2)])
+    return Gaze(eye, axes, slopes, float(field.range))
+
+
+@kernel
+def open_rays(
+    shown: ShownGeoms,
+    positions: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    wanted: NDArray[np.bool_],
+    gaze: Gaze,
+    occluders: Occluders,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Rays worth casting: inside the field of view, and no occluder certainly in front of the object.
+
+    Args:
+        shown: Drawn geoms of the objects.
+        positions: Geom positions, m, (ngeom, 3).
+        rotations: Geom rotations, row by row, (ngeom, 9).
+        wanted: Which objects count, (n,).
+        gaze: Eye and field of view.
+        occluders: Boxes that block.
+
+    Returns:
+        Object of each ray, (k,), in order, and vectors from the eye to points in its bounding box, m, (k, 3).
+    """
+    low, high = bounding_boxes(shown, positions, rotations, wanted)
+    owners, rays = np.empty(7 * len(wanted), np.int64), np.empty((7 * len(wanted), 3))
+    count = 0
+    for i in range(len(wanted)):
+        if low[i, 0] > high[i, 0]:
+            continue
+        for offset in OFFSETS:
+            ray = rays[count]
+            for k in range(3):
+                middle, half = (low[i, k] + high[i, k]) / 2, (high[i, k] - low[i, k]) / 2
+                ray[k] = middle + half * offset[k] - gaze.eye[k]
+            if in_field(ray, gaze) and not is_blocked(ray, low[i], high[i], gaze.eye, occluders):
+                owners[count] = i
+                count += 1
+    return owners[:count], rays[:count]
+
+
+@kernel
+def bounding_boxes(
+    shown: ShownGeoms,
+    positions: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    wanted: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper corners of the upright boxes around the wanted objects, m, each (n, 3); else inf, -inf."""
+    low, high = np.full((len(wanted), 3), np.inf), np.full((len(wanted), 3), -np.inf)
+    for g in range(len(shown.ids)):
+        geom, i = shown.ids[g], shown.owners[g]
+        if not wanted[i]:
+            continue
+        for k in range(3):
+            r0, r1, r2 = rotations[geom, 3 * k], rotations[geom, 3 * k + 1], rotations[geom, 3 * k + 2]
+            c, h = shown.centers[g], shown.half_sizes[g]
+            center = positions[geom, k] + (r0 * c[0] + r1 * c[1] + r2 * c[2])
+            half = abs(r0) * h[0] + abs(r1) * h[1] + abs(r2) * h[2]
+            low[i, k] = min(low[i, k], center - half)
+            high[i, k] = max(high[i, k], center + half)
+    return low, high
+
+
+@kernel
+def in_field(ray: NDArray[np.float64], gaze: Gaze) -> bool:
+    """Whether a vector (3,) from the eye, m, ends inside the viewing frustum."""
+    if ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2 > gaze.range**2:
+        return False
+    forward = ray[0] * gaze.axes[0, 0] + ray[1] * gaze.axes[0, 1] + ray[2] * gaze.axes[0, 2]
+    left = ray[0] * gaze.axes[1, 0] + ray[1] * gaze.axes[1, 1] + ray[2] * gaze.axes[1, 2]
+    up = ray[0] * gaze.axes[2, 0] + ray[1] * gaze.axes[2, 1] + ray[2] * gaze.axes[2, 2]
+    return bool(abs(left) <= forward * gaze.slopes[0] and abs(up) <= forward * gaze.slopes[1])
+
+
+@kernel
+def is_blocked(
+    ray: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    eye: NDArray[np.float64],
+    occluders: Occluders,
+) -> bool:
+    """Whether a ray (3,) from the eye enters an occluder before the box from `low` to `high` (3,), m.
+
+    Occluders are taken as a little smaller than they are, and the box as a little larger.
+    """
+    reach = 0.0  # share of the ray at which it enters the object's box
+    for k in range(3):
+        if ray[k] > MARGIN:
+            reach = max(reach, (low[k] - MARGIN - eye[k]) / ray[k])
+        elif ray[k] < -MARGIN:
+            reach = max(reach, (high[k] + MARGIN - eye[k]) / ray[k])
+    for w in range(len(occluders.centers)):
+        entry, leave = -np.inf, reach
+        for k in range(3):
+            axis = occluders.axes[w, :, k]
+            along = ray[0] * axis[0] + ray[1] * axis[1] + ray[2] * axis[2]
+            start = 0.0
+            for j in range(3):
+                start += (eye[j] - occluders.centers[w, j]) * axis[j]
+            half = occluders.half_sizes[w, k] - MARGIN
+            if abs(along) > MARGIN:
+                near, far = (-half - start) / along, (half - start) / along
+                entry, leave = max(entry, min(near, far)), min(leave, max(near, far))
+            elif abs(start) > half:
+                leave = -np.inf
+            if entry >= leave:
+                break
+        if 0.0 < entry < leave:
+            return True
+    return False

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import Scene, compose
-from mjsim.visibility import FieldOfView, visible_objects
+from mjsim.visibility import OFFSETS, FieldOfView, visible_objects
 from planner.navmesh import NavMesh
 
 EYE_HEIGHT = 1.6
@@ -155,6 +155,47 @@ def _unblocked_share(
             met += int(geom[0] in geoms)
     assert possible > 0
     return met / possible
+
+
+def _seen_by_every_ray(
+    scene: Scene, data: mujoco.MjData, eye: NDArray[np.float64], field: FieldOfView
+) -> set[str]:
+    """Objects in view along +x as `visible_objects` defines it, with every ray cast and no culling."""
+    model, owner, groups = scene.model, scene.index.geom_owner, np.array([1, 1, 1, 0, 0, 0], np.uint8)
+    seen, geom = set(), np.zeros(1, np.int32)
+    for i, name in enumerate(scene.index.names):
+        geoms = np.flatnonzero((owner == i) & (model.geom_group <= 2))
+        turned = data.geom_xmat[geoms].reshape(-1, 3, 3)
+        middles = data.geom_xpos[geoms] + (turned @ model.geom_aabb[geoms, :3, None])[..., 0]
+        halves = (abs(turned) @ model.geom_aabb[geoms, 3:, None])[..., 0]
+        low, high = (middles - halves).min(axis=0), (middles + halves).max(axis=0)
+        for offset in OFFSETS:
+            forward, left, up = ray = (low + high) / 2 + (high - low) / 2 * offset - eye
+            inside = (
+                abs(left) <= forward * math.tan(field.horizontal / 2) and np.linalg.norm(ray) <= field.range
+            )
+            if inside and abs(up) <= forward * math.tan(field.vertical / 2):
+                mujoco.mj_ray(model, data, eye, ray, groups, True, -1, geom)
+                if owner[geom[0]] == i:
+                    seen.add(name)
+    return seen
+
+
+def test_culling_changes_no_answer(episode: Episode, catalogue: Catalogue, navmesh: NavMesh) -> None:
+    """Field of view, occluders and early exits save rays; what is seen is what all rays together meet."""
+    house_scene = compose(episode, catalogue, avatar=False)
+    data = mujoco.MjData(house_scene.model)
+    mujoco.mj_forward(house_scene.model, data)
+    rng, field, count = np.random.default_rng(5), FieldOfView(2.6, 2.0, 9.0), 0
+    for _ in range(60):
+        eye = np.array([*navmesh.sample(rng), rng.uniform(0.3, 1.7)])
+        seen = visible_objects(house_scene, data, eye, 0.0, field=field)
+        assert set(seen) == _seen_by_every_ray(house_scene, data, eye, field)
+        some = house_scene.index.names[::2]
+        among = visible_objects(house_scene, data, eye, 0.0, field=field, among=some)
+        assert among == tuple(name for name in seen if name in some)
+        count += len(seen)
+    assert count > 60
 
 
 def test_agrees_with_dense_rays(scene: Scene, navmesh: NavMesh) -> None:

@@ -1,7 +1,8 @@
 """Composition of a house, its receptacles and an episode's objects into one compiled model (MjSpec)."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar, cast
 
 import mujoco
 import numpy as np
@@ -15,6 +16,8 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.model.library import read_model
 from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
 from mjsim.model.rooms import RoomMap
+
+T = TypeVar("T")
 
 TIMESTEP = 0.004
 SLEEP_TOLERANCE = 0.05
@@ -111,6 +114,13 @@ class Scene:
     rooms: RoomMap
     receptacles: Mapping[str, ReceptacleGeometry]
     spec: mujoco.MjSpec
+    _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
+
+    def once(self, key: str, make: Callable[[], T]) -> T:
+        """What `make` returns at the first call with `key`, and the same value ever after."""
+        if key not in self._derived:
+            self._derived[key] = make()
+        return cast(T, self._derived[key])
 
 
 def compose_house(catalogue: Catalogue) -> mujoco.MjSpec:
