@@ -94,7 +94,7 @@ class Recording:
             "log_hash": np.array([*self._log_hash[:count], self._log.hash], np.uint64),
             "checkpoint_step": np.array(list(kept), np.int64),
             "checkpoint_physics": np.array(states) if states else np.zeros((0, 0)),
-            "checkpoint_memory": np.array([state.memory for state in kept.values()], np.str_),
+            "checkpoint_details": np.array([state.details_json() for state in kept.values()], np.str_),
             "checkpoint_hash": np.array([state.hash for state in kept.values()], np.uint64),
         }
         save_arrays(path, arrays)
@@ -120,7 +120,7 @@ class Recorded:
         log_hash: Hash of that much of the log, shape (T + 1,).
         checkpoint_step: Control steps that have a checkpoint, ascending, shape (K,).
         checkpoint_physics: Their states, shape (K, n).
-        checkpoint_memory: What the world remembered beside the physics, JSON, shape (K,).
+        checkpoint_details: What the world remembered beside the physics, JSON, shape (K,).
         checkpoint_hash: Hash of each checkpoint, shape (K,).
     """
 
@@ -130,7 +130,7 @@ class Recorded:
     log_hash: NDArray[np.uint64]
     checkpoint_step: NDArray[np.int64]
     checkpoint_physics: NDArray[np.float64]
-    checkpoint_memory: NDArray[np.str_]
+    checkpoint_details: NDArray[np.str_]
     checkpoint_hash: NDArray[np.uint64]
 
     @classmethod
@@ -149,8 +149,17 @@ class Recorded:
         return cls(**{name: arrays[name] for name in names})
 
     def checkpoint(self, number: int) -> WorldState:
-        """The `number`-th checkpoint."""
-        return WorldState(self.checkpoint_physics[number], str(self.checkpoint_memory[number]))
+        """The `number`-th checkpoint.
+
+        Raises:
+            StateError: It is not the state of a world of this version.
+        """
+        return WorldState.from_json(self.checkpoint_physics[number], str(self.checkpoint_details[number]))
+
+    def checkpoint_is_intact(self, number: int) -> bool:
+        """Whether the `number`-th checkpoint is the one that was recorded."""
+        content = self.checkpoint_physics[number].tobytes() + str(self.checkpoint_details[number]).encode()
+        return hash64(content) == int(self.checkpoint_hash[number])
 
 
 def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:

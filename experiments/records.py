@@ -18,7 +18,9 @@ from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.rollout import Rollout
 
-LOG_FORMAT = 3  # 2 had no health of the physics, 1 neither state hashes nor checkpoints
+LOG_FORMAT = (
+    4  # 3 had untyped checkpoints, 2 no health of the physics, 1 neither state hashes nor checkpoints
+)
 EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
     "events.jsonl",

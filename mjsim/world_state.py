@@ -1,25 +1,32 @@
-"""What makes a run repeatable: a hash of the state, checkpoints to go on from, and what the physics depends on.
+"""What makes a run repeatable: state hashes, checkpoints, and the versions that the physics depends on.
 
 With sleep on, MuJoCo's state vector does not say which bodies sleep, so setting it on live data is not exact. Setting
 it after `mj_resetData` is. A run therefore passes through a checkpoint itself: it takes the state, resets, and sets
 it again. From then on it and a run that starts at the checkpoint are the same, bit for bit. Between checkpoints the
-physics is left alone. A pick or place under way is a generator, which no value can hold: checkpoints are only taken
-while the world is not busy.
+physics is left alone. A pick or place under way is a generator, which no value can hold, so checkpoints are taken
+only while the world is not busy.
 """
 
 import functools
 import hashlib
+import json
 import platform
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.errors import StateError
+from mjsim.health.monitor import HealthState
+from mjsim.observation import ObjectStatus
+from mjsim.person.carrying import CarryingState
+from mjsim.person.grips import GripState
+from mjsim.person.rig import RigState
 
 CHECKPOINT_PERIOD = 10.0  # s at least from one checkpoint to the next
 
@@ -44,22 +51,72 @@ _NO_PHYSICS = ("render", "environments")  # folders of this package that no stat
 
 
 @dataclass(frozen=True, eq=False)
+class PersonState:
+    """Commands, grips and compliance of the person where physics moves it.
+
+    Attributes:
+        rig: Commands of the servos.
+        grips: Object and grip in each hand.
+        carrying: Compliance offsets and strain of the hands.
+        hand_velocities: Of the hands' targets, m/s, shape (2, 3).
+    """
+
+    rig: RigState
+    grips: GripState
+    carrying: CarryingState
+    hand_velocities: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class StateDetails:
+    """What a world remembers beside its physics.
+
+    Attributes:
+        hands: Object in the left and the right hand.
+        status: Status per object.
+        health: What the health monitor has accumulated.
+        person: The person's commands; None in a state without physics.
+    """
+
+    hands: tuple[str | None, str | None]
+    status: tuple[ObjectStatus, ...]
+    health: HealthState
+    person: PersonState | None
+
+
+@dataclass(frozen=True, eq=False)
 class WorldState:
     """A world between two motions, complete: a world that is set to it goes on as the one that it was taken from.
 
     Attributes:
-        physics: MuJoCo's integration state, shape (n,).
-        memory: What the world remembers beside the physics (commands, hands, statuses), as JSON, in which numbers
-            keep their full precision.
+        physics: MuJoCo's integration state, or that of a world without physics, shape (n,).
+        details: Everything else.
     """
 
     physics: NDArray[np.float64]
-    memory: str
+    details: StateDetails
 
     @property
     def hash(self) -> int:
         """64 bits that differ whenever two states do (up to chance)."""
-        return hash64(self.physics.tobytes() + self.memory.encode())
+        return hash64(self.physics.tobytes() + self.details_json().encode())
+
+    def details_json(self) -> str:
+        """The details as JSON, in which numbers keep their full precision."""
+        return json.dumps(msgspec.to_builtins(self.details, enc_hook=np.ndarray.tolist))
+
+    @classmethod
+    def from_json(cls, physics: NDArray[np.float64], details: str) -> "WorldState":
+        """The state of an array and of what `details_json` gave.
+
+        Raises:
+            StateError: `details` is something else.
+        """
+        try:
+            values = json.loads(details)
+            return cls(physics, msgspec.convert(values, StateDetails, dec_hook=lambda _, a: np.array(a)))
+        except (ValueError, TypeError) as error:  # of JSON, of msgspec and of arrays
+            raise StateError(f"the state's details do not fit this version's worlds: {error}") from error
 
 
 class StateHash:

@@ -440,7 +440,7 @@ def test_a_state_is_all_there_is(house: Scene, fidelity: str) -> None:
         face(world, 0.3, 3.7)
     state = stopped.state()
     other = world_of(house, fidelity)
-    restored = other.restore(WorldState(state.physics.copy(), str(state.memory)))
+    restored = other.restore(WorldState.from_json(state.physics.copy(), state.details_json()))
     assert same(restored, going.observation())
     assert other.state_hash() == going.state_hash()
     for action in (Place("o0"), Place("o1")):
@@ -471,7 +471,7 @@ def test_a_state_of_another_fidelity_is_refused(house: Scene) -> None:
     damaged = states["event"].physics.copy()
     damaged[-2:] = 1.0
     with pytest.raises(StateError, match="rings"):
-        world_of(house, "event").restore(WorldState(damaged, states["event"].memory))
+        world_of(house, "event").restore(WorldState(damaged, states["event"].details))
 
 
 @kinematic_tiers

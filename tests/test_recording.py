@@ -1,6 +1,6 @@
 """The state of a world as a value: complete, exact, and hashed."""
 
-import json
+import dataclasses
 
 import mujoco
 import numpy as np
@@ -63,9 +63,10 @@ def test_two_worlds_that_are_set_to_a_state_go_on_alike(scene, world):
     wander(world, 3, seed=2)
     free(world)
     state = world.state()
-    assert any(json.loads(state.memory)["hands"])
+    assert any(state.details.hands)
     other = World(scene)
-    seen = [w.restore(WorldState(state.physics.copy(), str(state.memory))) for w in (world, other)]
+    copy = WorldState.from_json(state.physics.copy(), state.details_json())
+    seen = [w.restore(copy) for w in (world, other)]
     assert seen[0].hands == seen[1].hands
     assert world.state().hash == other.state().hash == state.hash
     assert wander(world, 150, seed=3) == wander(other, 150, seed=3)
@@ -95,22 +96,30 @@ def test_a_busy_world_has_no_state(world):
 @pytest.mark.parametrize("size", [0, 7])
 def test_a_state_of_another_scene_is_refused(world, size):
     with pytest.raises(StateError, match=f"a state of {size} numbers"):
-        world.restore(WorldState(np.zeros(size), "{}"))
+        world.restore(WorldState(np.zeros(size), world.state().details))
 
 
 def test_a_state_that_is_not_finite_is_refused(world):
     world.reset()
-    physics = world.state().physics
-    physics[3] = np.nan
+    state = world.state()
+    state.physics[3] = np.nan
     with pytest.raises(StateError, match="1 of them not finite"):
-        world.restore(WorldState(physics, "{}"))
+        world.restore(state)
 
 
-@pytest.mark.parametrize("memory", ["{}", "[]", "{", '{"health": {"altitude": 3}}'])
-def test_a_memory_that_is_none_is_refused(world, memory):
+@pytest.mark.parametrize("details", ["{}", "[]", "{", '{"health": {"altitude": 3}}'])
+def test_details_of_something_else_are_refused(details):
+    with pytest.raises(StateError, match="details do not fit"):
+        WorldState.from_json(np.zeros(1), details)
+
+
+def test_a_state_of_other_objects_is_refused(world):
     world.reset()
-    with pytest.raises(StateError, match="memory does not fit"):
-        world.restore(WorldState(world.state().physics, memory))
+    state = world.state()
+    for changes in ({"status": state.details.status[1:]}, {"hands": ("nobody's", None)}):
+        details = dataclasses.replace(state.details, **changes)
+        with pytest.raises(StateError, match="same episode"):
+            world.restore(WorldState(state.physics, details))
     world.reset()
 
 

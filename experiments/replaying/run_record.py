@@ -239,13 +239,13 @@ def _log_faults(log: bytes, recorded: Recorded) -> Iterator[Fault]:
 
 
 def _checkpoint_faults(recorded: Recorded, steps: int) -> Iterator[Fault]:
-    count = {len(getattr(recorded, f"checkpoint_{name}")) for name in ("step", "physics", "memory", "hash")}
+    count = {len(getattr(recorded, f"checkpoint_{name}")) for name in ("step", "physics", "details", "hash")}
     if len(count) > 1 and len(recorded.checkpoint_step):
         yield Fault(
             int(recorded.checkpoint_step[min(count)]), f"{records.RECORDING}: checkpoints are missing"
         )
         return
     for number, step in enumerate(recorded.checkpoint_step.tolist()):
-        if not 0 <= step < steps or recorded.checkpoint(number).hash != int(recorded.checkpoint_hash[number]):
+        if not 0 <= step < steps or not recorded.checkpoint_is_intact(number):
             bad = max(0, min(step, steps))
             yield Fault(bad, f"{records.RECORDING}: the checkpoint is not the one that was recorded")

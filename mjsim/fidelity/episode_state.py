@@ -1,11 +1,12 @@
 """What is true of the household whatever moves it: who holds what, what is put away, and what just happened."""
 
-from typing import Any
-
 from mjsim.actions import EventKind, WorldEvent
+from mjsim.errors import StateError
+from mjsim.health.monitor import HealthState
 from mjsim.inventory import Inventory
 from mjsim.model.scene import Scene
 from mjsim.observation import ObjectStatus
+from mjsim.world_state import PersonState, StateDetails
 
 
 class EpisodeState:
@@ -57,14 +58,26 @@ class EpisodeState:
         self.status[item] = ObjectStatus.LOOSE
         self.report(time, EventKind.DISLODGED, item, self._targets[self._index.names[item]])
 
-    def memory(self) -> dict[str, Any]:
-        """Hands and statuses, JSON-ready."""
-        return {"hands": list(self.inventory.hands), "status": [status.value for status in self.status]}
+    def details(self, health: HealthState, person: PersonState | None = None) -> StateDetails:
+        """Hands and statuses as part of a world's state."""
+        return StateDetails(self.inventory.hands, tuple(self.status), health, person)
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Take over what `memory` gave."""
-        self._set(Inventory(*memory["hands"]))
-        self.status = [ObjectStatus(value) for value in memory["status"]]
+    def restore(self, details: StateDetails) -> None:
+        """Go on from hands and statuses of a world's state.
+
+        Raises:
+            StateError: It is of other objects.
+        """
+        if len(details.status) != len(self._index.names) or not {*details.hands} <= {
+            None,
+            *self._index.names,
+        }:
+            raise StateError(
+                f"a state of {len(details.status)} objects with {details.hands} in the hands does not fit a world of "
+                f"{len(self._index.names)} objects; take it from a world of the same episode"
+            )
+        self._set(Inventory(*details.hands))
+        self.status = list(details.status)
         self.events = []
 
     def _let_go(self, item: int) -> None:

@@ -1,6 +1,5 @@
 """No physics but for the fall of what is let go of: picks and places are worked out at once, and then played."""
 
-import json
 from dataclasses import dataclass
 
 import mujoco
@@ -8,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick
-from mjsim.errors import StateError
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import Rows
 from mjsim.fidelity.kinematic_world import Walker
@@ -138,8 +136,7 @@ class Event:
 
     def state(self) -> WorldState:
         """Everything from which `restore` goes on."""
-        memory = {"health": self._full.monitor.memory(), **self.episode_state.memory()}
-        return WorldState(self._walker.pack(), json.dumps(memory))
+        return WorldState(self._walker.pack(), self.episode_state.details(self._full.monitor.get_state()))
 
     def restore(self, state: WorldState) -> None:
         """Go on from a state.
@@ -148,12 +145,8 @@ class Event:
             StateError: It does not fit.
         """
         self._walker.unpack(state.physics)
-        try:
-            memory = json.loads(state.memory)
-            self.episode_state.recall(memory)
-            self._full.monitor.recall(memory["health"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
+        self.episode_state.restore(state.details)
+        self._full.monitor.set_state(state.details.health)
         self._motion, self._written = None, False
 
     def _begin(self, result: ActionResult) -> _Motion:

@@ -1,9 +1,7 @@
 """Everything in physics: walking, reaching, carrying, letting go."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -29,7 +27,7 @@ from mjsim.person.picking import pick, take
 from mjsim.person.placing import place
 from mjsim.person.rig import Rig
 from mjsim.rollout import Rollout
-from mjsim.world_state import StateHash, WorldState, set_physics, take_physics
+from mjsim.world_state import PersonState, StateHash, WorldState, set_physics, take_physics
 
 # A delivered object may be shoved a little by the next one; farther out than this it is out.
 _DISLODGED_MARGIN = 0.03
@@ -211,15 +209,14 @@ class Full:
     def state(self) -> WorldState:
         """Everything from which `restore` goes on."""
         person = self.person
-        memory: dict[str, Any] = {
-            "rig": person.rig.memory(),
-            "grips": person.grips.memory(),
-            "carrying": self.carrying.memory(),
-            "health": self.monitor.memory(),
-            "hand_velocities": person.hand_velocities.tolist(),
-            **self.episode_state.memory(),
-        }
-        return WorldState(take_physics(self.scene.model, self.data), json.dumps(memory))
+        commands = PersonState(
+            rig=person.rig.get_state(),
+            grips=person.grips.get_state(),
+            carrying=self.carrying.get_state(),
+            hand_velocities=person.hand_velocities.copy(),
+        )
+        details = self.episode_state.details(self.monitor.get_state(), commands)
+        return WorldState(take_physics(self.scene.model, self.data), details)
 
     def restore(self, state: WorldState) -> None:
         """Go on from a state.
@@ -227,19 +224,19 @@ class Full:
         Raises:
             StateError: It does not fit.
         """
-        person = self.person
+        person, commands = self.person, state.details.person
+        if commands is None:
+            raise StateError(
+                "a state without physics does not fit the tier `full`; a state fits its own tier"
+            )
         set_physics(self.scene.model, self.data, state.physics)
         self._end_motion()
-        try:
-            memory = json.loads(state.memory)
-            self.monitor.recall(memory["health"])
-            person.rig.recall(memory["rig"])
-            person.grips.recall(memory["grips"])
-            person.hand_velocities = np.array(memory["hand_velocities"])
-            self.carrying.recall(memory["carrying"])
-            self.episode_state.recall(memory)
-        except (KeyError, TypeError, ValueError) as error:
-            raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
+        self.episode_state.restore(state.details)
+        self.monitor.set_state(state.details.health)
+        person.rig.set_state(commands.rig)
+        person.grips.set_state(commands.grips)
+        person.hand_velocities = commands.hand_velocities.copy()
+        self.carrying.set_state(commands.carrying)
 
     def dislodged(self) -> list[int]:
         """Delivered objects that have left their receptacles."""

@@ -122,7 +122,7 @@ class Walker:
         rig, body = self._rig, self.live[BODY:HANDS]
         self.live[TIME] = data.time
         body[:4], body[4:8] = rig.pose[:4], rig.rates[:4]
-        body[8:12], body[12:16] = rig.motion, rig.memory()["command"][:4]
+        body[8:12], body[12:16] = rig.motion, rig.get_state().command[:4]
         self.live[HANDS : HANDS + 6] = rig.hand_targets.ravel()
         self.live[HANDS + 6 : HOLDS] = 0.0
         self.live[HOLDS:] = [-1 if hold is None else 2 * hold[0] + hold[1] for hold in holds]

@@ -4,10 +4,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.fidelity.body_state import HEADING, SERVO, TURN_RATE, VX, VY, X, Y
+from mjsim.fidelity.body_state import FORWARD, HEADING, SERVO, TURN_RATE, VX, VY, X, Y
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import BODY, HAND_SPEEDS, HANDS, HOLDS
 from mjsim.fidelity.kinematic_world import Walker
+from mjsim.person.rig import RigState
 
 
 def enter(full: Full, walker: Walker) -> None:
@@ -18,15 +19,9 @@ def enter(full: Full, walker: Walker) -> None:
     walker.write(data)
     rig = person.rig
     rig.rates[:4], rig.rates[4:] = body[4:8], live[HAND_SPEEDS:HOLDS]
-    hands = live[HANDS:HAND_SPEEDS].reshape(2, 3).tolist()
-    rig.recall(
-        {
-            "motion": body[8:12].tolist(),
-            "hand_targets": hands,
-            "hand_targets_before": hands,
-            "command": [*body[SERVO:].tolist(), *live[HANDS:HAND_SPEEDS].tolist()],
-        }
-    )
+    hands = live[HANDS:HAND_SPEEDS]
+    targets = hands.reshape(2, 3)
+    rig.set_state(RigState(body[FORWARD:SERVO], targets, targets, np.concatenate((body[SERVO:], hands))))
     person.hand_velocities = live[HAND_SPEEDS:HOLDS].reshape(2, 3).copy()
     full.carrying.reset()
     person.grips.reset()
@@ -71,5 +66,4 @@ def _put_to_sleep(data: mujoco.MjData, walker: Walker) -> None:
 
 def leave(full: Full, walker: Walker) -> None:
     """Let a walk go on from physics: what is held is put in line with its hand, all else stands still."""
-    grips = full.person.grips.memory()
-    walker.take_over(full.data, [None if grip is None else (grip[0], grip[1]) for grip in grips])
+    walker.take_over(full.data, full.person.grips.get_state())

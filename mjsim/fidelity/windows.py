@@ -1,6 +1,5 @@
 """Physics while something is picked up or put away; in between the person walks without it."""
 
-import json
 from dataclasses import dataclass
 
 import mujoco
@@ -8,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import IDLE, Action, ActionResult, Move
-from mjsim.errors import StateError
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_world import Walker
 from mjsim.fidelity.kinematics import LocomotionState
@@ -161,8 +159,7 @@ class Windows:
         """Everything from which `restore` goes on."""
         if self._open:
             return self._full.state()
-        memory = {"health": self._full.monitor.memory(), **self.episode_state.memory()}
-        return WorldState(self._walker.pack(), json.dumps(memory))
+        return WorldState(self._walker.pack(), self.episode_state.details(self._full.monitor.get_state()))
 
     def restore(self, state: WorldState) -> None:
         """Go on from a state.
@@ -170,19 +167,15 @@ class Windows:
         Raises:
             StateError: It does not fit.
         """
-        try:
-            memory = json.loads(state.memory)
-            self._coming, self._open = None, "rig" in memory
-            if self._open:
-                self._full.restore(state)
-                return
-            self._full.reset()
-            self._walker.unpack(state.physics)
-            self.episode_state.recall(memory)
-            self._full.monitor.recall(memory["health"])
-            self._written = False
-        except (KeyError, TypeError, ValueError) as error:
-            raise StateError(f"the state's memory does not fit this version's worlds: {error!r}") from error
+        self._coming, self._open = None, state.details.person is not None
+        if self._open:
+            self._full.restore(state)
+            return
+        self._full.reset()
+        self._walker.unpack(state.physics)
+        self.episode_state.restore(state.details)
+        self._full.monitor.set_state(state.details.health)
+        self._written = False
 
     def _write(self) -> None:
         if not self._open and not self._written:

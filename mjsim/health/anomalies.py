@@ -4,8 +4,7 @@
 """
 
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -40,6 +39,19 @@ class Release:
     y: float
     still: int = 0
     since: float = 0.0
+
+
+@dataclass(frozen=True)
+class ReleasesState:
+    """Released and held objects, as a value.
+
+    Attributes:
+        falling: Number and release of each object that has not come to rest.
+        gripped: Number of each held object, when it was last seen in the hand, s, and where its centre was, m.
+    """
+
+    falling: tuple[tuple[int, Release], ...]
+    gripped: tuple[tuple[int, float, list[float]], ...]
 
 
 class Releases:
@@ -89,17 +101,32 @@ class Releases:
                 del self.falling[item]
         return settled
 
-    def memory(self) -> dict[str, Any]:
-        """Everything, JSON-ready."""
-        return {
-            "falling": [[item, asdict(release)] for item, release in self.falling.items()],
-            "gripped": [[item, *last] for item, last in self._gripped.items()],
-        }
+    def get_state(self) -> ReleasesState:
+        """Everything, as a value."""
+        falling = tuple((item, replace(release)) for item, release in self.falling.items())
+        return ReleasesState(falling, tuple((item, *last) for item, last in self._gripped.items()))
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Take over what `memory` gave."""
-        self.falling = {int(item): Release(**release) for item, release in memory["falling"]}
-        self._gripped = {int(item): (float(time), list(at)) for item, time, at in memory["gripped"]}
+    def set_state(self, state: ReleasesState) -> None:
+        """Go on from what `get_state` gave."""
+        self.falling = {item: replace(release) for item, release in state.falling}
+        self._gripped = {item: (time, center) for item, time, center in state.gripped}
+
+
+@dataclass(frozen=True, eq=False)
+class AnomalyState:
+    """What an `AnomalyDetector` remembers, as a value.
+
+    Attributes:
+        anchors: Where each object's centre was last looked at, m, shape (n, 3).
+        ejected: Objects that count as ejected until a hand holds them again.
+        ejections: Number so far.
+        tunnellings: Number so far.
+    """
+
+    anchors: NDArray[np.float64]
+    ejected: tuple[int, ...]
+    ejections: int
+    tunnellings: int
 
 
 class AnomalyDetector:
@@ -154,19 +181,17 @@ class AnomalyDetector:
         self.ejections += len(ejected)
         return found + [(EventKind.EJECTED, item) for item in ejected]
 
-    def memory(self) -> dict[str, Any]:
-        """Everything, JSON-ready."""
-        return {
-            "anchors": self.anchors.tolist(),
-            "ejected": sorted(self._ejected),
-            "counts": [self.ejections, self.tunnellings],
-        }
+    def get_state(self) -> AnomalyState:
+        """Everything, as a value."""
+        return AnomalyState(
+            self.anchors.copy(), tuple(sorted(self._ejected)), self.ejections, self.tunnellings
+        )
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Take over what `memory` gave."""
-        self.anchors[:] = np.reshape(memory["anchors"], self.anchors.shape)
-        self._ejected = {int(item) for item in memory["ejected"]}
-        self.ejections, self.tunnellings = (int(count) for count in memory["counts"])
+    def set_state(self, state: AnomalyState) -> None:
+        """Go on from what `get_state` gave."""
+        self.anchors[:] = state.anchors.reshape(self.anchors.shape)
+        self._ejected = set(state.ejected)
+        self.ejections, self.tunnellings = state.ejections, state.tunnellings
 
     def _flown(self, data: mujoco.MjData, item: int, release: Release) -> bool:
         x, y = data.xipos[self._bodies[item], :2].tolist()

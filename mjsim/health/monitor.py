@@ -6,14 +6,20 @@ and reported as an event.
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from mjsim.actions import EventKind
 from mjsim.errors import PhysicsError
-from mjsim.health.anomalies import MOVED_DISTANCE, AnomalyDetector, Releases
+from mjsim.health.anomalies import (
+    MOVED_DISTANCE,
+    AnomalyDetector,
+    AnomalyState,
+    Releases,
+    ReleasesState,
+)
 from mjsim.health.scan import ESCAPING, NOT_FINITE, WARNED, survey
 from mjsim.health.values import QUIET, Health, HealthSample
 from mjsim.model.clearance import carry_clearance
@@ -24,6 +30,25 @@ from mjsim.person.rig import Rig
 
 _KICK = 2.0  # times the walking speed: a light thing that bounces off somebody who walks into it
 _FALL = 5.6  # m/s, from the height at which things are carried
+
+
+@dataclass(frozen=True, eq=False)
+class HealthState:
+    """What a `HealthMonitor` has accumulated, as a value.
+
+    Attributes:
+        extremes: Deepest overlap of an object and of the trunk, m; largest weld error, m and rad.
+        settle_times: See `Health.settle_times`.
+        sample: The latest control step.
+        anomalies: Objects that flew off or passed through something.
+        releases: Objects between release and rest.
+    """
+
+    extremes: tuple[float, float, float, float]
+    settle_times: tuple[float, ...]
+    sample: HealthSample
+    anomalies: AnomalyState
+    releases: ReleasesState
 
 
 class HealthMonitor:
@@ -88,24 +113,23 @@ class HealthMonitor:
         """Go on after something else than physics has moved the person and what the hands hold."""
         self._escapes.resume(self._rig.data)
 
-    def memory(self) -> dict[str, Any]:
-        """Everything accumulated, JSON-ready."""
-        return {
-            "extremes": [self._deepest, self._deepest_trunk, self._stretched, self._twisted],
-            "settle_times": list(self._settle_times),
-            # JSON has no NaN.
-            "latest": [None if math.isnan(value) else value for value in self.sample.row],
-            "escapes": self._escapes.memory(),
-            "releases": self._releases.memory(),
-        }
+    def get_state(self) -> HealthState:
+        """Everything accumulated, as a value."""
+        return HealthState(
+            extremes=(self._deepest, self._deepest_trunk, self._stretched, self._twisted),
+            settle_times=tuple(self._settle_times),
+            sample=self.sample,
+            anomalies=self._escapes.get_state(),
+            releases=self._releases.get_state(),
+        )
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Take over what `memory` gave."""
-        self._deepest, self._deepest_trunk, self._stretched, self._twisted = map(float, memory["extremes"])
-        self._settle_times = [float(t) for t in memory["settle_times"]]
-        self.sample = HealthSample.of_row([math.nan if v is None else float(v) for v in memory["latest"]])
-        self._escapes.recall(memory["escapes"])
-        self._releases.recall(memory["releases"])
+    def set_state(self, state: HealthState) -> None:
+        """Go on from what `get_state` gave."""
+        self._deepest, self._deepest_trunk, self._stretched, self._twisted = state.extremes
+        self._settle_times = list(state.settle_times)
+        self.sample = state.sample
+        self._escapes.set_state(state.anomalies)
+        self._releases.set_state(state.releases)
 
     def snapshot(self) -> Health:
         """The extremes as a value."""

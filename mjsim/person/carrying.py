@@ -3,7 +3,7 @@
 How a hand does that is in `postures`. What still gets caught, by a blow or from above, slips out of the hand.
 """
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,19 @@ from mjsim.person.slots import object_corners
 
 _NO_CONTACTS = (np.zeros((0, 2), np.int32), np.zeros((0, 9)))
 _HOUSE, _PERSON = -1, -2  # who bears a geom, where no object does
+
+
+@dataclass(frozen=True, eq=False)
+class CarryingState:
+    """What carrying remembers between control steps.
+
+    Attributes:
+        compliance: How far contact has pushed each hand off its posture, m, shape (2, 2).
+        strained: Control steps for which each hand has been strained, shape (2,).
+    """
+
+    compliance: NDArray[np.float64]
+    strained: NDArray[np.int64]
 
 
 class Carrying:
@@ -37,22 +50,22 @@ class Carrying:
         self._rest = np.array(avatar.REST)
         self._postures = {p: np.array(p) for p in (avatar.CARRY, avatar.TUCKED, avatar.ASIDE)}
         self._goals = np.zeros((2, 3))
-        self._yield = np.zeros((2, 2))
+        self._compliance = np.zeros((2, 2))
         self._strained = np.zeros(2, np.int64)
 
     def reset(self) -> None:
         """Forget all contacts."""
-        self._yield[:] = 0.0
+        self._compliance[:] = 0.0
         self._strained[:] = 0
 
-    def memory(self) -> dict[str, Any]:
-        """How far the hands have given way and for how long they are strained, JSON-ready."""
-        return {"yield": self._yield.tolist(), "strained": self._strained.tolist()}
+    def get_state(self) -> CarryingState:
+        """Compliance offsets and strain of the hands as a value."""
+        return CarryingState(self._compliance.copy(), self._strained.copy())
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Take over what `memory` gave."""
-        self._yield[:] = memory["yield"]
-        self._strained[:] = memory["strained"]
+    def set_state(self, state: CarryingState) -> None:
+        """Go on from what `get_state` gave."""
+        self._compliance[:] = state.compliance
+        self._strained[:] = state.strained
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
         """Set the targets of the hands that no motion moves, and guard the walking command.
@@ -66,7 +79,7 @@ class Carrying:
         geoms, frames = self._contacts() if left >= 0 or right >= 0 else _NO_CONTACTS
         posture = self._postures[held_posture]
         update_hands(
-            rig.pose, rig.motion, rig.hand_targets, person.hand_velocities, self._yield, self._goals,
+            rig.pose, rig.motion, rig.hand_targets, person.hand_velocities, self._compliance, self._goals,
             left, right, moving, posture, self._rest, self.loads, *self.field,
             geoms, frames, self._bearer, person.dt,
         )  # fmt: skip

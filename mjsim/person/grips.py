@@ -15,6 +15,9 @@ from mjsim.person.rig import Rig
 AWAKE = -11  # in `MjData.tree_asleep`: for ten steps of the physics at least
 
 
+GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and grip, per hand
+
+
 class Grips:
     """Closes, opens and watches the welds of the pool that `avatar.attach_avatar` declared."""
 
@@ -88,13 +91,14 @@ class Grips:
         closed = self._closed[hand]
         return 0.0 if closed is None else self.gap(hand, *closed)
 
-    def memory(self) -> list[list[int] | None]:
-        """Object and grip that each hand holds, JSON-ready; the welds themselves are part of the physics."""
-        return [None if closed is None else list(closed) for closed in self._closed]
+    def get_state(self) -> GripState:
+        """Object and grip that each hand holds; the welds themselves are part of the physics."""
+        left, right = self._closed
+        return left, right
 
-    def recall(self, memory: list[list[int] | None]) -> None:
-        """Take over what `memory` gave."""
-        self._closed = [None if closed is None else (closed[0], closed[1]) for closed in memory]
+    def set_state(self, state: GripState) -> None:
+        """Go on from what `get_state` gave."""
+        self._closed = list(state)
         self._note()
 
     def reset(self) -> None:

@@ -1,6 +1,7 @@
 """The person as servos: where the body is, where it is told to go, and the physics steps in between."""
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -17,6 +18,23 @@ Vector = NDArray[np.float64]
 # A position servo with damping lags a moving target by kv / kp seconds; the command leads by as much.
 _LEAD = avatar.HAND_KV / avatar.HAND_KP
 _SERVOS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class RigState:
+    """Commands of the person, as a value.
+
+    Attributes:
+        motion: See `Rig.motion`, shape (4,).
+        hand_targets: See `Rig.hand_targets`, m, shape (2, 3).
+        previous_hand_targets: Those of the control step before, m, shape (2, 3).
+        command: What the servos were told last: velocities of x, y and yaw, pitch, hand positions, shape (10,).
+    """
+
+    motion: Vector
+    hand_targets: Vector
+    previous_hand_targets: Vector
+    command: Vector
 
 
 class Rig:
@@ -66,21 +84,17 @@ class Rig:
         self._commands[:] = self._command
         self._ramps[:] = 0.0
 
-    def memory(self) -> dict[str, Any]:
-        """The commands, JSON-ready."""
-        return {
-            "motion": self.motion.tolist(),
-            "hand_targets": self.hand_targets.tolist(),
-            "hand_targets_before": self._hand_targets_before.tolist(),
-            "command": self._command.tolist(),
-        }
+    def get_state(self) -> RigState:
+        """The commands as a value."""
+        arrays = (self.motion, self.hand_targets, self._hand_targets_before, self._command)
+        return RigState(*(array.copy() for array in arrays))
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Take the commands from what `memory` gave."""
-        self.motion[:] = memory["motion"]
-        self.hand_targets[:] = memory["hand_targets"]
-        self._hand_targets_before[:] = memory["hand_targets_before"]
-        self._command[:] = memory["command"]
+    def set_state(self, state: RigState) -> None:
+        """Go on from commands of `get_state`."""
+        self.motion[:] = state.motion
+        self.hand_targets[:] = state.hand_targets
+        self._hand_targets_before[:] = state.previous_hand_targets
+        self._command[:] = state.command
 
     @property
     def velocity(self) -> Vector:
