@@ -298,13 +298,13 @@ def test_a_forged_event_with_its_hashes(copy, house):
 def test_a_changed_checkpoint(run, copy, house, number, data):
     folder = restored(run, copy)
     recorded = read_arrays(folder / records.RECORDING)
-    physics, memory = recorded["checkpoint_physics"], recorded["checkpoint_memory"]
+    physics, details = recorded["checkpoint_physics"], recorded["checkpoint_details"]
     if data.draw(st.booleans()):
         place = data.draw(st.integers(0, physics.shape[1] - 1))
         physics[number, place] = np.nextafter(physics[number, place], 9.0)
     else:
-        memory[number] = str(memory[number]).replace("loose", "carried", 1)
-    change(folder, records.RECORDING, checkpoint_physics=physics, checkpoint_memory=memory)
+        details[number] = str(details[number]).replace("loose", "carried", 1)
+    change(folder, records.RECORDING, checkpoint_physics=physics, checkpoint_details=details)
     step = int(recorded["checkpoint_step"][number])
     assert bad_step(folder, house)[0] == step
     assert bad_step(folder, house, start=step * DT)[0] == step
