@@ -1,7 +1,8 @@
-"""The glasses: render what the person sees, draw the HUD over it, and film it."""
+"""First-person frames with the HUD over them, and films of them."""
 
 from dataclasses import dataclass
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +13,11 @@ from experiments.video import VideoWriter
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
+from hud.state import HudState
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.render import Renderer, render_house_map, render_pictures
 from mjsim.world import World
-
-EYE = "avatar/eye"
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,29 @@ class FirstPersonRenderer:
         self._compositor = Compositor(self._pictures)
         self._size = (film.width, film.height)
 
-    def frame(self, world: World, observation: Observation, assistant: Assistant) -> NDArray[np.uint8]:
-        """What the person sees now, uint8 RGB of shape (height, width, 3)."""
-        pose = self._renderer.camera_view(world.data, EYE)
+    def camera_view(self, data: Any) -> CameraView:
+        """The eye camera as the next frame of `data` shows it; a condition needs it to point to a goal."""
+        pose = self._renderer.camera_view(data)
         width, height = self._size
-        camera = CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
-        state = assistant.hud_state(observation, camera)
+        return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
+
+    def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
+        """What the person sees.
+
+        Args:
+            data: State of the scene's model.
+            state: What the HUD shows; its markers are drawn into the scene.
+
+        Returns:
+            RGB, uint8, shape (height, width, 3).
+
+        Raises:
+            RenderError: A marker cannot be drawn, or the renderer is closed.
+        """
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
             self._compositor = Compositor(self._pictures)
-        rgb = self._renderer.rgb(world.data, EYE, markers=state.markers)
-        return self._compositor.compose(rgb, state)
+        return self._compositor.compose(self._renderer.rgb(data, markers=state.markers), state)
 
     def close(self) -> None:
         """Free the GL context."""
@@ -82,4 +94,5 @@ class Filming:
 
     def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
         """Film one frame."""
-        self._video.write(self._glasses.frame(world, observation, assistant))
+        state = assistant.hud_state(observation, self._glasses.camera_view(world.data))
+        self._video.write(self._glasses.frame(world.data, state))

@@ -103,7 +103,8 @@ class _Photographer:
         now = Now(world, observation, self._targets)
         come = [shot for shot in self._due if shot.moment(now)]
         if come:
-            frame = self._glasses.frame(world, observation, assistant)
+            state = assistant.hud_state(observation, self._glasses.camera_view(world.data))
+            frame = self._glasses.frame(world.data, state)
             self.taken |= {shot.name: frame for shot in come}
             self._due = [shot for shot in self._due if shot not in come]
         if not self._due:
