@@ -11,10 +11,10 @@ from mjsim.episode import Episode
 from mjsim.model.avatar import TRUNK_RADIUS
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import footprint
-from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
+from mjsim.model.house import compiled_house
+from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 from mjsim.model.sampling import sample_episode
-from mjsim.model.scene import compose_house
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
@@ -52,19 +52,19 @@ class House:
             name: Name under `models/houses`, or the path of a `catalogue.toml`.
 
         Raises:
-            AssetError: The house cannot be read.
+            AssetError: The house cannot be read, or does not compile.
         """
         catalogue = Catalogue.load(name)
-        model = compose_house(catalogue).compile()
-        floor = footprint(model)
+        model = compiled_house(catalogue)
+        floor = footprint(model.model)
         navmesh = NavMesh.build(floor.obstacles, floor.bounds)
         return cls(
             catalogue=catalogue,
             navmesh=navmesh,
             geodesics=Geodesics(navmesh),
             body_geodesics=Geodesics(NavMesh.build(floor.obstacles, floor.bounds, agent_radius=TRUNK_RADIUS)),
-            rooms=RoomMap.from_model(model, catalogue.rooms),
-            receptacles=receptacle_geometries(model, catalogue.receptacles),
+            rooms=model.rooms,
+            receptacles=model.receptacles,
             bounds=floor.bounds,
         )
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from mjsim.errors import EpisodeError
 from mjsim.files import write_text_atomically
 
@@ -95,25 +97,16 @@ class Episode:
             EpisodeError: Not JSON, an unknown format version, or missing or ill-typed fields.
         """
         try:
-            raw = json.loads(text)
-        except json.JSONDecodeError as error:
+            found = msgspec.json.decode(text, type=_Header).format
+            if found != FORMAT_VERSION:
+                raise EpisodeError(
+                    f"episode format {found!r} is not {FORMAT_VERSION}; sample it anew with this version"
+                )
+            return msgspec.json.decode(text, type=cls)
+        except msgspec.ValidationError as error:
+            raise EpisodeError(f"episode is malformed: {error}; sample it anew") from error
+        except msgspec.DecodeError as error:
             raise EpisodeError(f"episode is not JSON: {error}") from error
-        if not isinstance(raw, dict) or raw.get("format") != FORMAT_VERSION:
-            found = raw.get("format") if isinstance(raw, dict) else type(raw).__name__
-            raise EpisodeError(
-                f"episode format {found!r} is not {FORMAT_VERSION}; sample it anew with this version"
-            )
-        try:
-            return cls(
-                house=str(raw["house"]),
-                seed=int(raw["seed"]),
-                start=StartPose(**{k: float(raw["start"][k]) for k in ("x", "y", "heading")}),
-                objects=tuple(_placed_object(o) for o in raw["objects"]),
-                receptacles=tuple(str(r) for r in raw["receptacles"]),
-                targets={str(k): str(v) for k, v in raw["targets"].items()},
-            )
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise EpisodeError(f"episode is malformed: {type(error).__name__}: {error}") from error
 
     def save(self, path: Path) -> None:
         """Write the JSON to `path`, whole or not at all."""
@@ -134,17 +127,5 @@ class Episode:
             raise EpisodeError(f"{path}: {error}") from error
 
 
-def _placed_object(raw: dict[str, Any]) -> PlacedObject:
-    point = tuple(float(v) for v in raw["point"])
-    position = tuple(float(v) for v in raw["position"])
-    quaternion = tuple(float(v) for v in raw["quaternion"])
-    if (len(point), len(position), len(quaternion)) != (2, 3, 4):
-        raise ValueError(f"{raw['name']}: point, position and quaternion need 2, 3 and 4 numbers")
-    return PlacedObject(
-        name=str(raw["name"]),
-        category=str(raw["category"]),
-        model=str(raw["model"]),
-        point=(point[0], point[1]),
-        position=(position[0], position[1], position[2]),
-        quaternion=(quaternion[0], quaternion[1], quaternion[2], quaternion[3]),
-    )
+class _Header(msgspec.Struct):
+    format: Any = None

@@ -9,8 +9,9 @@ from hypothesis import settings
 from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import Footprint, footprint
+from mjsim.model.house import compiled_house
 from mjsim.model.sampling import sample_episode
-from mjsim.model.scene import Scene, compile_house, compose
+from mjsim.model.scene import Scene, compose
 from planner.navmesh import NavMesh
 
 # Whether a test passes must not depend on how busy the machine is.
@@ -27,7 +28,7 @@ def catalogue() -> Catalogue:
 @pytest.fixture(scope="session")
 def house_model(catalogue: Catalogue) -> mujoco.MjModel:
     """The tidy apartment, without objects or person."""
-    return compile_house(catalogue)
+    return compiled_house(catalogue).model
 
 
 @pytest.fixture(scope="session")
@@ -65,6 +66,16 @@ def small_house(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_catalogue(small_house: Path) -> Catalogue:
     """Categories `solids` (cube, wedge) -> crate in the west, and `rounds` (ball) -> tray in the east."""
     return Catalogue.load(str(small_house / "catalogue.toml"))
+
+
+@pytest.fixture
+def fresh_house(tmp_path: Path) -> Path:
+    """Catalogue of a small house with a content of its own, so that nothing of it is compiled yet."""
+    write_small_house(tmp_path)
+    (tmp_path / "house.xml").write_text(
+        (tmp_path / "house.xml").read_text().replace('model="small"', f'model="{tmp_path.name}"')
+    )
+    return tmp_path / "catalogue.toml"
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from mjsim.model.bounding_volumes import surface_area_tree, tighten
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.scene import compose_house
+from mjsim.model.house import compiled_house
 
 
 def _cluttered(seed: int, moving: int) -> mujoco.MjSpec:
@@ -82,8 +82,7 @@ def _touched(model: mujoco.MjModel, low: np.ndarray, high: np.ndarray) -> int:
 
 def test_the_house_is_searched_in_two_thirds_of_the_tests(catalogue: Catalogue) -> None:
     """Measured: a little more than half of them."""
-    spec = compose_house(catalogue)
-    spec.compiler.fusestatic = True
+    spec = compiled_house(catalogue).spec()
     plain, tight = spec.compile(), spec.compile()
     tighten(tight)
     places = np.random.default_rng(0).uniform((0, 0, 0.5), (12, 10, 1.5), (300, 3))

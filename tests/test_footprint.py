@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from mjsim.errors import AssetError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import Footprint, footprint
-from mjsim.model.scene import Scene, compile_house
+from mjsim.model.house import compiled_house
+from mjsim.model.scene import Scene
 
 ROOM = '<site name="room:r" type="box" pos="1 2 1" size="3 4 1"/>'
 WEDGE = '<asset><mesh name="wedge" vertex="0 0 0 .4 0 0 0 .3 0 0 0 .5"/></asset>'
@@ -118,7 +119,7 @@ def test_unknown_outline_is_an_error() -> None:
 
 
 def test_small_house_is_walls_and_receptacles(small_catalogue: Catalogue) -> None:
-    plan = footprint(compile_house(small_catalogue))
+    plan = footprint(compiled_house(small_catalogue).model)
     # Neither lintel nor lamp nor the receptacles' thin floors.
     assert len(plan.obstacles) == 6 + 2 * 4
     assert plan.bounds == (0, 0, 6, 4)

@@ -186,10 +186,10 @@ import hashlib
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import footprint
 from mjsim.model.sampling import sample_episode
-from mjsim.model.scene import compile_house
+from mjsim.model.house import compiled_house
 from planner.navmesh import NavMesh
 catalogue = Catalogue.load("apartment")
-plan = footprint(compile_house(catalogue))
+plan = footprint(compiled_house(catalogue).model)
 navmesh = NavMesh.build(plan.obstacles, plan.bounds)
 episode = sample_episode(catalogue, navmesh, objects=18, seed=1)
 print(hashlib.sha256(episode.to_json().encode()).hexdigest())

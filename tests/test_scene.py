@@ -11,9 +11,10 @@ from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import AssetError, EpisodeError
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
+from mjsim.model.house import compiled_house
+from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
-from mjsim.model.scene import Scene, SceneIndex, compile_house, compose, compose_house
+from mjsim.model.scene import Scene, SceneIndex, compose
 
 
 def small_episode(catalogue: Catalogue, *placed: tuple[str, float, float]) -> Episode:
@@ -183,7 +184,7 @@ def test_index_needs_free_bodies(house_model: mujoco.MjModel) -> None:
 
 
 def test_house_spec_has_receptacles_at_their_mounts(catalogue: Catalogue) -> None:
-    model = compose_house(catalogue).compile()
+    model = compiled_house(catalogue).model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     for key in catalogue.receptacles:
@@ -193,7 +194,7 @@ def test_house_spec_has_receptacles_at_their_mounts(catalogue: Catalogue) -> Non
 
 
 def test_rooms_of_the_small_house(small_catalogue: Catalogue) -> None:
-    rooms = RoomMap.from_model(compile_house(small_catalogue), small_catalogue.rooms)
+    rooms = compiled_house(small_catalogue).rooms
     assert [rooms.room_at(p) for p in [(1, 1), (5, 0.5), (5, 3.5), (2.9, 2), (3.1, 2)]] == [
         "west", "east", "east", "west", "east",
     ]  # fmt: skip
@@ -265,7 +266,7 @@ def test_turned_receptacle() -> None:
 
 
 def test_receptacle_margin(small_catalogue: Catalogue) -> None:
-    tray = receptacle_geometries(compile_house(small_catalogue), ["tray"])["tray"]
+    tray = compiled_house(small_catalogue).receptacles["tray"]
     # The tray is turned by -90 degrees, so its local -y is the house's -x.
     np.testing.assert_allclose(tray.approach, [5.7 - 0.6, 3.6], atol=1e-6)
     x, y, z = tray.center

@@ -17,7 +17,7 @@ from mjsim.environments.sensors import Sensor, resolve_sensors
 from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import footprint
-from mjsim.model.scene import compile_house
+from mjsim.model.house import compiled_house
 from mjsim.options import WorldOptions
 
 SECONDS_PER_OBJECT = 60.0
@@ -119,7 +119,7 @@ def build(options: EnvironmentOptions) -> Rearrangement:
     sensors = resolve_sensors(options.observations)
     control, reward = resolve_control(options.actions), resolve_reward(options.reward)
     catalogue = Catalogue.load(options.house)
-    floor = footprint(compile_house(catalogue))
+    floor = footprint(compiled_house(catalogue).model)
     make: Callable[[int], Episode]
     count: int | None
     if isinstance(options.episodes, Sequence):

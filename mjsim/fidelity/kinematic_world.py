@@ -28,6 +28,7 @@ from mjsim.fidelity.motion_primitives import Script, play_rows
 from mjsim.fidelity.trunk_contact import Floor
 from mjsim.health.values import HealthSample
 from mjsim.model import avatar
+from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
@@ -62,7 +63,7 @@ class Walker:
         distance, gradient, frame = carrying.field
         self.house = KinematicModel(
             gait=Gait.of(scene.model, options),
-            floor=scene.catalogue.library.once(("floor",), lambda: Floor.of(scene.model)),
+            floor=compiled_house(scene.catalogue).once(("floor",), lambda: Floor.of(scene.model)),
             grips=_grip_poses(scene),
             loads=carrying.loads,
             rest=np.array(avatar.REST),

@@ -2,13 +2,17 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
+
+import msgspec
 
 from mjsim.errors import AssetError
 from mjsim.model.assets import models_root
-from mjsim.model.library import Library
+from mjsim.model.model_files import content_hash
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -66,9 +70,11 @@ class Category:
     objects: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Catalogue:
     """Everything a house can be furnished and cluttered with; mappings keep the file's order.
+
+    Two catalogues are equal when the contents of all their files are.
 
     Attributes:
         name: What `Catalogue.load` was given: a name under `models/houses`, or a path.
@@ -78,7 +84,7 @@ class Catalogue:
         categories: Category key -> category.
         receptacles: Receptacle key -> receptacle.
         objects: Object model key -> object model.
-        library: The models, once they are read.
+        content: Hash over the catalogue and every model, mesh and texture file that it leads to.
     """
 
     name: str
@@ -88,7 +94,13 @@ class Catalogue:
     categories: Mapping[str, Category]
     receptacles: Mapping[str, Receptacle]
     objects: Mapping[str, ObjectModel]
-    library: Library = field(default_factory=Library, compare=False, repr=False)
+    content: str
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Catalogue) and self.content == other.content
+
+    def __hash__(self) -> int:
+        return hash(self.content)
 
     @classmethod
     def load(cls, house: str = "apartment") -> "Catalogue":
@@ -102,18 +114,11 @@ class Catalogue:
                 or used twice; the message names the culprit.
         """
         path = _catalogue_path(house)
-        reader = _Reader(path, _parse(path))
-        owner = reader.owners()
-        receptacle_category = {c.receptacle: c.key for c in reader.categories().values()}
-        return cls(
-            name=house,
-            label=reader.text(reader.table("house"), "house", "label"),
-            house_path=reader.file(reader.table("house"), "house", path.parent),
-            rooms=reader.rooms(),
-            categories=reader.categories(),
-            receptacles=reader.receptacles(receptacle_category),
-            objects=reader.objects(owner),
-        )
+        try:
+            text = path.read_text(encoding="utf-8")
+            return _Reader(path, tomllib.loads(text)).catalogue(house, text)
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise AssetError(f"cannot read catalogue {path}: {error}") from error
 
     def receptacle_of(self, model: str) -> Receptacle:
         """Receptacle that takes the object model `model`.
@@ -143,120 +148,133 @@ def _catalogue_path(house: str) -> Path:
     return path
 
 
-def _parse(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise AssetError(f"cannot read catalogue {path}: {error}") from error
+_Text = Annotated[str, msgspec.Meta(pattern=r"\S")]  # not blank
+_Table = Annotated[dict[str, Any], msgspec.Meta(min_length=1)]
+
+
+class _Tables(msgspec.Struct, forbid_unknown_fields=True):
+    house: _Table
+    rooms: _Table
+    categories: _Table
+    receptacles: _Table
+    objects: _Table
+
+
+class _ModelEntry(msgspec.Struct):
+    """An entry of [objects], or [house]."""
+
+    label: _Text
+    model: _Text
+
+
+class _ReceptacleEntry(_ModelEntry):
+    place: _Text
+    room: _Text
+
+
+class _CategoryEntry(msgspec.Struct):
+    label: _Text
+    receptacle: _Text
+    objects: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)]
 
 
 class _Reader:
-    """Typed access to a parsed catalogue; every error names the file and the entry."""
+    """The tables of a catalogue; every error names the file and the entry."""
 
     def __init__(self, path: Path, raw: dict[str, Any]) -> None:
         self._path = path
-        self._raw = raw
-        known = {"house", "rooms", "categories", "receptacles", "objects"}
-        if unknown := sorted(set(raw) - known):
-            raise self._error(f"unknown table [{unknown[0]}]; the tables are {sorted(known)}")
+        tables = self._convert(raw, _Tables, "catalogue")
+        self._house = self._convert(tables.house, _ModelEntry, "house")
+        self._rooms = {k: self._convert(v, _Text, f"rooms.{k}") for k, v in tables.rooms.items()}
+        self._categories = self._entries(tables.categories, _CategoryEntry, "categories")
+        self._receptacles = self._entries(tables.receptacles, _ReceptacleEntry, "receptacles")
+        self._objects = self._entries(tables.objects, _ModelEntry, "objects")
 
-    def _error(self, message: str) -> AssetError:
-        return AssetError(f"{self._path}: {message}")
+    def catalogue(self, name: str, text: str) -> Catalogue:
+        categories, receptacles, objects = (
+            self._checked_categories(),
+            self._checked_receptacles(),
+            self._checked_objects(),
+        )
+        house_path = self._file(self._house, "house", self._path.parent)
+        models = [house_path, *(r.path for r in receptacles.values()), *(o.path for o in objects.values())]
+        return Catalogue(
+            name=name,
+            label=self._house.label,
+            house_path=house_path,
+            rooms=self._rooms,
+            categories=categories,
+            receptacles=receptacles,
+            objects=objects,
+            content=content_hash(text, models),
+        )
 
-    def table(self, name: str) -> dict[str, Any]:
-        table = self._raw.get(name)
-        if not isinstance(table, dict) or not table:
-            raise self._error(f"table [{name}] is missing or empty")
-        return table
+    def _error(self, where: str, message: str) -> AssetError:
+        return AssetError(f"{self._path}: [{where}] {message}")
 
-    def entries(self, name: str) -> dict[str, dict[str, Any]]:
-        table = self.table(name)
-        for key, entry in table.items():
-            if not isinstance(entry, dict):
-                raise self._error(f"[{name}.{key}] must be a table, got {entry!r}")
-        return table
+    def _convert(self, value: Any, kind: type[T], where: str) -> T:
+        try:
+            return msgspec.convert(value, kind)
+        except msgspec.ValidationError as error:
+            raise self._error(where, f"{error}; got {value!r:.80}; see docs/models.md") from error
 
-    def text(self, entry: Mapping[str, Any], where: str, field: str) -> str:
-        value = entry.get(field)
-        if not isinstance(value, str) or not value.strip():
-            raise self._error(f"[{where}] needs a non-empty text {field!r}, got {value!r}")
-        return value
+    def _entries(self, table: dict[str, Any], kind: type[T], name: str) -> dict[str, T]:
+        return {key: self._convert(entry, kind, f"{name}.{key}") for key, entry in table.items()}
 
-    def file(self, entry: Mapping[str, Any], where: str, folder: Path) -> Path:
-        path = folder / self.text(entry, where, "model")
+    def _file(self, entry: _ModelEntry, where: str, folder: Path) -> Path:
+        path = folder / entry.model
         if not path.is_file():
-            raise self._error(f"[{where}] names the model {path}, which does not exist")
+            raise self._error(where, f"names the model {path}, which does not exist")
         return path
 
-    def rooms(self) -> dict[str, str]:
-        rooms = self.table("rooms")
-        return {key: self.text(rooms, "rooms", key) for key in rooms}
-
-    def owners(self) -> dict[str, str]:
-        """Object model key -> category key, each object in exactly one category."""
-        owner: dict[str, str] = {}
-        for category in self.categories().values():
-            for key in category.objects:
-                if key in owner:
-                    raise self._error(
-                        f"object {key!r} is in the categories {owner[key]!r} and {category.key!r}; keep one"
-                    )
-                owner[key] = category.key
-        return owner
-
-    def categories(self) -> dict[str, Category]:
-        categories: dict[str, Category] = {}
+    def _checked_categories(self) -> dict[str, Category]:
         taken: dict[str, str] = {}
-        for key, entry in self.entries("categories").items():
+        for key, entry in self._categories.items():
             where = f"categories.{key}"
-            receptacle = self.text(entry, where, "receptacle")
-            if receptacle not in self.entries("receptacles"):
+            if entry.receptacle not in self._receptacles:
                 raise self._error(
-                    f"[{where}] names the receptacle {receptacle!r}, which is not in [receptacles]"
+                    where, f"names the receptacle {entry.receptacle!r}, which is not in [receptacles]"
                 )
-            if receptacle in taken:
+            if (other := taken.setdefault(entry.receptacle, key)) != key:
                 raise self._error(
-                    f"[{where}] and [categories.{taken[receptacle]}] share the receptacle {receptacle!r}"
+                    where, f"and [categories.{other}] share the receptacle {entry.receptacle!r}"
                 )
-            taken[receptacle] = key
-            categories[key] = Category(
-                key, self.text(entry, where, "label"), receptacle, self._category_objects(entry, where)
-            )
-        return categories
+            for model in entry.objects:
+                if model not in self._objects:
+                    raise self._error(where, f"lists the object {model!r}, which is not in [objects]")
+        return {k: Category(k, e.label, e.receptacle, e.objects) for k, e in self._categories.items()}
 
-    def _category_objects(self, entry: Mapping[str, Any], where: str) -> tuple[str, ...]:
-        objects = entry.get("objects")
-        if not isinstance(objects, list) or not objects:
-            raise self._error(f"[{where}] has no object: 'objects' must list at least one key of [objects]")
-        known = self.entries("objects")
-        for key in objects:
-            if not isinstance(key, str) or key not in known:
-                raise self._error(f"[{where}] lists the object {key!r}, which is not in [objects]")
-        return tuple(objects)
-
-    def receptacles(self, category_of: Mapping[str, str]) -> dict[str, Receptacle]:
-        rooms = self.rooms()
-        receptacles: dict[str, Receptacle] = {}
-        for key, entry in self.entries("receptacles").items():
+    def _checked_receptacles(self) -> dict[str, Receptacle]:
+        category_of = {entry.receptacle: key for key, entry in self._categories.items()}
+        receptacles = {}
+        for key, entry in self._receptacles.items():
             where = f"receptacles.{key}"
-            room = self.text(entry, where, "room")
-            if room not in rooms:
+            if entry.room not in self._rooms:
                 raise self._error(
-                    f"[{where}] is in the room {room!r}, which is not in [rooms]: {sorted(rooms)}"
+                    where, f"is in the room {entry.room!r}, which is not in [rooms]: {sorted(self._rooms)}"
                 )
             if key not in category_of:
-                raise self._error(f"[{where}] takes no category; name it in one of [categories] or remove it")
-            label, place = self.text(entry, where, "label"), self.text(entry, where, "place")
-            path = self.file(entry, where, models_root())
-            receptacles[key] = Receptacle(key, label, place, room, category_of[key], path)
+                raise self._error(where, "takes no category; name it in one of [categories] or remove it")
+            path = self._file(entry, where, models_root())
+            receptacles[key] = Receptacle(key, entry.label, entry.place, entry.room, category_of[key], path)
         return receptacles
 
-    def objects(self, category_of: Mapping[str, str]) -> dict[str, ObjectModel]:
-        objects: dict[str, ObjectModel] = {}
-        for key, entry in self.entries("objects").items():
+    def _checked_objects(self) -> dict[str, ObjectModel]:
+        category_of: dict[str, str] = {}
+        for category, listed in self._categories.items():
+            for key in listed.objects:
+                if key in category_of:
+                    raise self._error(
+                        f"objects.{key}",
+                        f"is in the categories {category_of[key]!r} and {category!r}; keep one",
+                    )
+                category_of[key] = category
+        objects = {}
+        for key, entry in self._objects.items():
             where = f"objects.{key}"
             if key not in category_of:
-                raise self._error(f"[{where}] is in no category; list it in one of [categories] or remove it")
-            path = self.file(entry, where, models_root())
-            objects[key] = ObjectModel(key, self.text(entry, where, "label"), category_of[key], path)
+                raise self._error(where, "is in no category; list it in one of [categories] or remove it")
+            objects[key] = ObjectModel(
+                key, entry.label, category_of[key], self._file(entry, where, models_root())
+            )
         return objects

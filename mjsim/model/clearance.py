@@ -10,6 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 from mjsim.kernels import kernel
 from mjsim.model.footprint import footprint
+from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
 
 _BORDER = 0.4  # m of grid around the rooms
@@ -95,7 +96,7 @@ CARRY_BAND = (0.93, 1.60)  # heights that carried things take up, m
 def carry_clearance(scene: Scene) -> ClearanceField:
     """Clearance at the heights of what is carried; worked out once per house."""
     low, high = CARRY_BAND
-    return scene.catalogue.library.once(
+    return compiled_house(scene.catalogue).once(
         ("clearance", low, high), lambda: ClearanceField.from_model(scene.model, low=low, high=high)
     )
 

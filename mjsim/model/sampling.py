@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import SamplingError
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.receptacles import receptacle_geometries
-from mjsim.model.scene import compile_house
+from mjsim.model.house import compiled_house
 from mjsim.model.settling import settle
 
 POINTS = 40
@@ -79,8 +78,7 @@ def sample_episode(
         PhysicsError: MuJoCo warned while the objects settled.
     """
     _check_arguments(objects, seed, points)
-    geometries = receptacle_geometries(compile_house(catalogue), catalogue.receptacles)
-    centers = np.array([g.center[:2] for g in geometries.values()])
+    centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
     pool = sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
     categories = _point_categories(catalogue, points, _rng(seed, _Purpose.CATEGORIES))[:objects]
     models = _point_models(catalogue, categories, _rng(seed, _Purpose.MODELS, objects))

@@ -13,15 +13,18 @@ from mjsim.errors import AssetError, EpisodeError
 from mjsim.model.avatar import attach_avatar
 from mjsim.model.bounding_volumes import tighten
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.library import read_model
-from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
+from mjsim.model.house import compile_errors, compiled_house
+from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 
+<<<<<<< HEAD
 T = TypeVar("T")
 
 TIMESTEP = 0.004
 SLEEP_TOLERANCE = 0.05
 
+=======
+>>>>>>> 54614de (A house is compiled once per process: compiled_house(catalogue), cached by the content of its files)
 
 @dataclass(frozen=True, eq=False)
 class SceneIndex:
@@ -123,101 +126,43 @@ class Scene:
         return cast(T, self._derived[key])
 
 
-def compose_house(catalogue: Catalogue) -> mujoco.MjSpec:
-    """Put the receptacles into the house, at their mounts, under the prefix `<receptacle>/`; no objects.
-
-    The files are read at the first call for a catalogue.
-
-    Raises:
-        AssetError: A model is malformed or a mount is missing.
-    """
-    return catalogue.library.once("house", lambda: _read_house(catalogue)).copy()
-
-
-def _read_house(catalogue: Catalogue) -> mujoco.MjSpec:
-    spec = read_model(catalogue.house_path)
-    spec.copy_during_attach = True
-    for key, receptacle in catalogue.receptacles.items():
-        mount = spec.site(f"mount:{key}")
-        if mount is None:
-            raise AssetError(f"{catalogue.house_path} has no site 'mount:{key}'; add one")
-        spec.attach(read_model(receptacle.path, body="receptacle"), prefix=f"{key}/", site=mount)
-    _set_options(spec)
-    return spec
-
-
-def compile_house(catalogue: Catalogue) -> mujoco.MjModel:
-    """Compile the tidy, empty house: receptacles, but neither objects nor a person.
-
-    Raises:
-        AssetError: A model is malformed, a mount is missing, or it does not compile.
-    """
-    return compile_spec(compose_house(catalogue), f"house {catalogue.name!r}")
-
-
-def compose(episode: Episode, catalogue: Catalogue, *, avatar: bool = True) -> Scene:
+def compose(episode: Episode, catalogue: Catalogue, *, avatar: bool = True, visuals: bool = True) -> Scene:
     """Compose and compile an episode: house, receptacles, objects in their poses, person at the start.
 
     Args:
         episode: What to compose.
         catalogue: Catalogue of the episode's house.
         avatar: Whether to add the person's body.
+        visuals: Whether to include what is only drawn; without it a scene moves the same and compiles faster.
 
     Raises:
         AssetError: A model is malformed, or does not compile.
         EpisodeError: The episode names an object model or a receptacle that the catalogue does not have.
     """
     _check_names(episode, catalogue)
-    spec = compose_house(catalogue)
+    house = compiled_house(catalogue)
+    spec = house.spec(visuals=visuals)
     spec.copy_during_attach = True
-    for placed in episode.objects:
-        model = catalogue.library.object_model(catalogue.objects[placed.model].path)
-        _attach_object(spec, model, placed)
     names = tuple(o.name for o in episode.objects)
-    if avatar:
-        start = episode.start
-        attach_avatar(spec, names, start=(start.x, start.y, start.heading))
-    model = compile_spec(spec, f"episode {episode.seed} of house {episode.house!r}")
+    with compile_errors(f"episode {episode.seed} of house {catalogue.house_path}"):
+        for placed in episode.objects:
+            model = house.object_spec(catalogue.objects[placed.model].path, visuals=visuals)
+            _attach_object(spec, model, placed)
+        if avatar:
+            start = episode.start
+            attach_avatar(spec, names, start=(start.x, start.y, start.heading))
+        spec.dedup_assets()  # attaching copies a model's assets for every instance
+        model = spec.compile()
+    tighten(model)
     return Scene(
         model=model,
         episode=episode,
         catalogue=catalogue,
         index=SceneIndex.from_model(model, names),
-        rooms=RoomMap.from_model(model, catalogue.rooms),
-        receptacles=receptacle_geometries(model, catalogue.receptacles),
+        rooms=house.rooms,
+        receptacles=house.receptacles,
         spec=spec,
     )
-
-
-def compile_spec(spec: mujoco.MjSpec, what: str) -> mujoco.MjModel:
-    """Compile, with meshes and textures that several instances use kept once.
-
-    Raises:
-        AssetError: It does not compile; the message says `what`.
-    """
-    # Attaching copies a model's assets for every instance.
-    spec.dedup_assets()
-    # The broad phase visits every body of the house in every step; as one body it steps four times as fast.
-    spec.compiler.fusestatic = True
-    try:
-        model = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        raise AssetError(f"{what} does not compile: {error}") from error
-    tighten(model)
-    return model
-
-
-def _set_options(spec: mujoco.MjSpec) -> None:
-    option = spec.option
-    option.timestep = TIMESTEP
-    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.impratio = 10.0
-    option.sleep_tolerance = SLEEP_TOLERANCE
-    option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    # A silent reset would hide a blow-up; the world turns the warning into an error.
-    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
 def _check_names(episode: Episode, catalogue: Catalogue) -> None:

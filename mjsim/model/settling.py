@@ -41,7 +41,7 @@ def settle(episode: Episode, catalogue: Catalogue) -> Settled:
         EpisodeError: The episode does not fit the catalogue.
         PhysicsError: MuJoCo warned.
     """
-    scene = compose(episode, catalogue, avatar=False)
+    scene = compose(episode, catalogue, avatar=False, visuals=False)
     data = mujoco.MjData(scene.model)
     steps = round(0.1 / scene.model.opt.timestep)
     while data.time < MAX_TIME and _awake(scene, data).any():

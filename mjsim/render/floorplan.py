@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjsim.errors import RenderError
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.scene import compile_house
+from mjsim.model.house import compiled_house
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
@@ -111,7 +111,7 @@ def render_house_map(
         AssetError: The house does not compile.
         RenderError: As for `render_floorplan`.
     """
-    model = compile_house(catalogue)
+    model = compiled_house(catalogue).model
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     rgb = render_floorplan(model, data, bounds, pixels_per_metre).rgb
