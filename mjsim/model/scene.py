@@ -17,14 +17,8 @@ from mjsim.model.house import compile_errors, compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 
-<<<<<<< HEAD
 T = TypeVar("T")
 
-TIMESTEP = 0.004
-SLEEP_TOLERANCE = 0.05
-
-=======
->>>>>>> 54614de (A house is compiled once per process: compiled_house(catalogue), cached by the content of its files)
 
 @dataclass(frozen=True, eq=False)
 class SceneIndex:
