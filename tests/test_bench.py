@@ -56,3 +56,15 @@ def test_the_render_benchmark_measures_positive_times_and_judges_them() -> None:
     }  # fmt: skip
     verdicts = [line.rpartition(": ")[2].rstrip(")") for line in module.lines(result)][-4:]
     assert verdicts == ["MISSED", "holds", "holds", "MISSED"]
+
+
+def test_the_trials_benchmark_shares_out_all_the_time_of_a_batch() -> None:
+    """On the smallest batch; it times callables all over the program by name, so a renamed one fails here."""
+    module = benchmark("trials")
+    row = module.measure_batch(module.Setting("event", "optimal", "follower", 1e9), seeds=1, objects=2)
+    assert sum(row["shares"].values()) == pytest.approx(1.0)
+    assert all(0.0 <= share < 1.0 for share in row["shares"].values())
+    assert row["shares"]["planning"] > 0.0 < row["shares"]["world"]
+    assert row["simulated_per_s"] == pytest.approx(row["share_of_bare"] * row["bare_simulated_per_s"])
+    text = "\n".join(module.lines({"objects": 2, "seeds": 1, "rows": [row]}))
+    assert "event, follower: " in text and "(>= 1e+09: MISSED)" in text

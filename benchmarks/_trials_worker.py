@@ -1,0 +1,123 @@
+"""Runs the trials of a batch in a process of its own, with timers around the parts of the program.
+
+Called by the trials benchmark with a JSON list: fidelity, assistance, participant, objects, seeds; writes one JSON
+object. Run with `python -P`, as this folder has modules named like packages.
+"""
+
+import json
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
+from unittest.mock import patch
+
+from experiments.house import House
+from experiments.recorded_trial import RecordingWorld, play
+from experiments.trial import TrialConfig, run_trial
+from mjsim.model.scene import Scene
+from mjsim.options import WorldOptions
+from mjsim.world import World
+
+# Part -> callables. Time in a callable of one part that is called by another part belongs to the caller.
+PARTS = {
+    "planning": ("planner.replanner.Replanner.update",),
+    "shortest paths": ("planner.geodesics.Geodesics.shortest_path",),
+    "looking": ("experiments.session.visible_objects",),
+    "world": tuple(f"mjsim.world.World.{n}" for n in ("reset", "step", "walk", "finish", "state", "restore")),
+    "house and scene": (
+        "experiments.house.House.sample_episode",
+        "experiments.trial.compose",
+        "mjsim.world.World.__init__",
+    ),
+    "recording": (
+        "experiments.records.EventLog.append",
+        "experiments.records.Trajectory.append",
+        "experiments.records.Trajectory.extend",
+        "experiments.records.Trajectory.arrays",
+        "experiments.recording.Recording.append",
+        "experiments.recording.Recording.extend",
+        "experiments.recording.Recording.save",
+        "experiments.trial.save_arrays",
+        "experiments.trial.write_json",
+        "mjsim.episode.Episode.save",
+    ),
+}
+REST = "participant and the rest"
+
+
+class Timers:
+    """Wall time in the callables of `PARTS`; use as a context manager, which patches them meanwhile.
+
+    Attributes:
+        seconds: Part -> s.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = defaultdict(float)
+        self._is_inside = False
+        self._patches = ExitStack()
+
+    def __enter__(self) -> "Timers":
+        for part, names in PARTS.items():
+            for name in names:
+                self._patches.enter_context(patch(name, self._timed(part, resolve_name(name))))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._patches.close()
+
+    def _timed(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        def timed(*arguments: Any, **keywords: Any) -> Any:
+            if self._is_inside:
+                return function(*arguments, **keywords)
+            self._is_inside, started = True, time.perf_counter()
+            try:
+                return function(*arguments, **keywords)
+            finally:
+                self._is_inside = False
+                self.seconds[part] += time.perf_counter() - started
+
+        return timed
+
+
+def main() -> None:
+    """Run the trials, then repeat their calls on bare worlds."""
+    fidelity, assistance, user, objects, seeds = json.loads(sys.argv[1])
+    started = time.perf_counter()
+    house = House.load()
+    house_s = time.perf_counter() - started
+    worlds: list[RecordingWorld] = []
+
+    def recording_world(scene: Scene, options: WorldOptions) -> World:
+        worlds.append(RecordingWorld(scene, options))
+        return worlds[-1]
+
+    timers, trials_s, bare_s = Timers(), 0.0, 0.0
+    for seed in range(seeds):
+        config = TrialConfig(objects, assistance, seed, user, fidelity=fidelity, regret=False)
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            timers,
+            patch("experiments.trial.World", recording_world),
+        ):
+            started = time.perf_counter()
+            run_trial(config, Path(folder) / "run", topdown=False, house=house)
+            trials_s += time.perf_counter() - started
+        recorded = worlds.pop()
+        world = World(recorded.scene, recorded.options)
+        world.reset()
+        started = time.perf_counter()
+        play(world, recorded.calls)
+        bare_s += time.perf_counter() - started
+    parts = {part: timers.seconds[part] for part in PARTS}
+    parts[REST] = trials_s - sum(parts.values())
+    print(json.dumps({"house_s": house_s, "bare_s": bare_s, "parts": parts}))
+
+
+if __name__ == "__main__":
+    main()
