@@ -10,7 +10,6 @@ from experiments.known_house import KnownHouse, spread_viewpoints
 from mjsim.episode import Episode
 from mjsim.model.avatar import TRUNK_RADIUS
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.footprint import footprint
 from mjsim.model.house import compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
@@ -56,7 +55,7 @@ class House:
         """
         catalogue = Catalogue.load(name)
         model = compiled_house(catalogue)
-        floor = footprint(model.model)
+        floor = model.floor
         navmesh = NavMesh.build(floor.obstacles, floor.bounds)
         return cls(
             catalogue=catalogue,

@@ -1,23 +1,77 @@
 """Physics side of the rearrangement simulator: houses, episodes, world, observation and rendering.
 
-Importing it registers the Gymnasium environment `mjsim/Rearrange-v0` by name, and loads none of the simulator.
+The names below are the public surface: semantic versioning covers them, what their docstrings and `docs/` say of them,
+the command line, and the files that it writes. Each is loaded at its first use; `import mjsim` loads none of the
+simulator. It only makes `gymnasium.make("mjsim/Rearrange-v0")` known to Gymnasium.
+
+    catalogue = mjsim.Catalogue.load("apartment")
+    episode = mjsim.sample_episode(catalogue, objects=12, seed=3)
+    world = mjsim.World(mjsim.compose(episode, catalogue))
+    step = world.step(mjsim.Move(forward=1.0))
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from mjsim.environments.registration import register_environments
+from mjsim.environments.registration import register_when_gymnasium_loads
+
+__all__ = [
+    "IDLE",
+    "ActionResult",
+    "Catalogue",
+    "Episode",
+    "MjsimError",
+    "Move",
+    "Observation",
+    "Pick",
+    "Place",
+    "Refusal",
+    "Scene",
+    "StepResult",
+    "World",
+    "WorldOptions",
+    "compose",
+    "make",
+    "navigable_floor",
+    "sample_episode",
+]
 
 if TYPE_CHECKING:
+    from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
     from mjsim.environments.dm_environment import make
+    from mjsim.episode import Episode
+    from mjsim.errors import MjsimError
+    from mjsim.model.catalogue import Catalogue
+    from mjsim.model.navigable import navigable_floor
+    from mjsim.model.sampling import sample_episode
+    from mjsim.model.scene import Scene, compose
+    from mjsim.observation import Observation
+    from mjsim.options import WorldOptions
+    from mjsim.world import StepResult, World
+else:  # hidden from type checkers, which would otherwise accept any name
+    _MODULES = {
+        "actions": ("IDLE", "ActionResult", "Move", "Pick", "Place", "Refusal"),
+        "environments.dm_environment": ("make",),
+        "episode": ("Episode",),
+        "errors": ("MjsimError",),
+        "model.catalogue": ("Catalogue",),
+        "model.navigable": ("navigable_floor",),
+        "model.sampling": ("sample_episode",),
+        "model.scene": ("Scene", "compose"),
+        "observation": ("Observation",),
+        "options": ("WorldOptions",),
+        "world": ("StepResult", "World"),
+    }
 
-__all__ = ["make"]
+    def __getattr__(name):
+        import importlib
 
-register_environments()
+        for module, names in _MODULES.items():
+            if name in names:
+                return getattr(importlib.import_module(f"mjsim.{module}"), name)
+        raise AttributeError(f"module 'mjsim' has no attribute {name!r}; its public names are {__all__}")
+
+    def __dir__():
+        return sorted({*globals(), *__all__})
 
 
-def __getattr__(name: str) -> Any:
-    if name == "make":
-        from mjsim.environments.dm_environment import make
-
-        return make
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+register_when_gymnasium_loads()

@@ -14,17 +14,17 @@ from hypothesis import strategies as st
 
 import mjsim
 from mjsim.actions import IDLE, Move, Pick, Place
-from mjsim.environments import navigable
 from mjsim.environments.control import MOVES, Continuous, Discrete
 from mjsim.environments.core import Rearrangement
 from mjsim.environments.episodes import EpisodeCache, sample
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.environments.navigable import installed_builder
 from mjsim.environments.options import EnvironmentOptions, build
 from mjsim.environments.rewards import TimeReward, potential
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import ActionError, PhysicsError, SamplingError
+from mjsim.model import navigable
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.navigable import installed_builder
 from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.navmesh import NavMesh
@@ -304,7 +304,7 @@ def test_a_missing_builder_is_named(
     offers: list[EntryPoint], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(navigable, "entry_points", lambda **_: offers)
-    with pytest.raises(EnvironmentConfigError, match=said):
+    with pytest.raises(SamplingError, match=said):
         installed_builder()
 
 

@@ -273,10 +273,7 @@ print(json.dumps(sorted(heavy & set(sys.modules))))
 """
 
 
-# gymnasium only until `import mjsim` (for mjsim.kernels) no longer loads it
-@pytest.mark.parametrize(
-    ("objects", "allowed"), [(12, set()), (16, {"gymnasium", "llvmlite", "numba", "scipy"})]
-)
+@pytest.mark.parametrize(("objects", "allowed"), [(12, set()), (16, {"llvmlite", "numba", "scipy"})])
 def test_a_fresh_process_loads_no_more_than_it_takes_to_plan(tmp_path, objects, allowed):
     """To load a library takes longer than to plan; numba, which brings scipy, pays from about 15 objects on."""
     path = tmp_path / "problem.json"

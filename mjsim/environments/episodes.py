@@ -9,7 +9,8 @@ import numpy as np
 
 from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.sampling import NavigablePoints, sample_episode
+from mjsim.model.navigable import NavigablePoints
+from mjsim.model.sampling import sample_episode
 from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
 from mjsim.render import Labels, Renderer

@@ -10,14 +10,13 @@ from mjsim.environments.control import Control, resolve_control
 from mjsim.environments.core import Rearrangement
 from mjsim.environments.episodes import EpisodeCache, sample
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.environments.navigable import NavigableBuilder, installed_builder
 from mjsim.environments.observation_layout import CameraOptions, ObservationLayout
 from mjsim.environments.rewards import RewardFunction, resolve_reward
 from mjsim.environments.sensors import Sensor, resolve_sensors
 from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.footprint import footprint
 from mjsim.model.house import compiled_house
+from mjsim.model.navigable import NavigableBuilder, navigable_floor
 from mjsim.options import WorldOptions
 
 SECONDS_PER_OBJECT = 60.0
@@ -113,19 +112,21 @@ def build(options: EnvironmentOptions) -> Rearrangement:
     """Make the core: load the house and combine episodes, sensors, control and reward.
 
     Raises:
-        EnvironmentConfigError: A name is unknown, or no builder of a navigable floor is installed.
+        EnvironmentConfigError: A name is unknown.
+        SamplingError: No builder of a navigable floor is installed.
         AssetError: The house is malformed.
     """
     sensors = resolve_sensors(options.observations)
     control, reward = resolve_control(options.actions), resolve_reward(options.reward)
     catalogue = Catalogue.load(options.house)
-    floor = footprint(compiled_house(catalogue).model)
+    floor = compiled_house(catalogue).floor
     make: Callable[[int], Episode]
     count: int | None
     if isinstance(options.episodes, Sequence):
         make, count, cache_size = options.episodes.__getitem__, len(options.episodes), DEFAULT_CACHE_SIZE
     else:
-        navigable = (options.navigable or installed_builder())(floor.obstacles, floor.bounds)
+        build_floor = options.navigable
+        navigable = build_floor(floor.obstacles, floor.bounds) if build_floor else navigable_floor(catalogue)
         make = partial(sample, catalogue, navigable, options.object_range)
         count, cache_size = options.episodes, options.episodes or DEFAULT_CACHE_SIZE
     max_objects = options.object_range[1]

@@ -1,11 +1,52 @@
-"""The environment's entry in Gymnasium's registry."""
+"""The environment's entry in Gymnasium's registry, made without importing Gymnasium."""
 
-from gymnasium.envs.registration import register, registry
+import importlib.abc
+import importlib.machinery
+import sys
+from collections.abc import Sequence
+from types import ModuleType
 
 ENVIRONMENT_ID = "mjsim/Rearrange-v0"
+_REGISTRY = "gymnasium.envs.registration"
 
 
-def register_environments() -> None:
-    """Make `gymnasium.make("mjsim/Rearrange-v0")` work; again does nothing. Imports none of the simulator."""
+def register_when_gymnasium_loads() -> None:
+    """Make `gymnasium.make("mjsim/Rearrange-v0")` work, now if Gymnasium is loaded, else once it is."""
+    if _REGISTRY in sys.modules:
+        _register()
+    elif not any(isinstance(finder, _GymnasiumFinder) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _GymnasiumFinder())
+
+
+def _register() -> None:
+    from gymnasium.envs.registration import register, registry
+
     if ENVIRONMENT_ID not in registry:
         register(id=ENVIRONMENT_ID, entry_point="mjsim.environments.gymnasium_environment:RearrangeEnv")
+
+
+class _GymnasiumFinder(importlib.abc.MetaPathFinder):
+    """Registers the environment when Gymnasium's registry is imported; Gymnasium 1.0 dropped its entry points."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        """The spec of Gymnasium's registry, with a loader that registers the environment; None for the rest."""
+        if fullname != _REGISTRY:
+            return None
+        spec = importlib.machinery.PathFinder.find_spec(fullname, path, target)
+        if spec is not None and spec.loader is not None:
+            spec.loader = _RegisteringLoader(spec.loader)
+        return spec
+
+
+class _RegisteringLoader(importlib.abc.Loader):
+    def __init__(self, loader: importlib.abc.Loader) -> None:
+        self._loader = loader
+
+    def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType | None:
+        return self._loader.create_module(spec)
+
+    def exec_module(self, module: ModuleType) -> None:
+        self._loader.exec_module(module)
+        _register()

@@ -11,6 +11,7 @@ import mujoco
 
 from mjsim.errors import AssetError
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import Footprint, footprint
 from mjsim.model.model_files import read_model
 from mjsim.model.object_model import remove_visuals, separate_visuals
 from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
@@ -52,6 +53,11 @@ class CompiledHouse:
     def receptacles(self) -> dict[str, ReceptacleGeometry]:
         """Receptacle key -> its geometry."""
         return receptacle_geometries(self.model, self.catalogue.receptacles)
+
+    @cached_property
+    def floor(self) -> Footprint:
+        """Obstacles and bounds of the floor."""
+        return footprint(self.model)
 
     def spec(self, *, visuals: bool = True) -> mujoco.MjSpec:
         """An editable copy, with all static bodies fused into one.

@@ -8,15 +8,15 @@ import enum
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import SamplingError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
+from mjsim.model.navigable import NavigablePoints, navigable_floor
 from mjsim.model.settling import settle
 
 POINTS = 40
@@ -26,19 +26,6 @@ DROP = (0.01, 0.02)  # m above the floor
 PACKINGS, DRAWS = 20, 4000  # a jammed packing is given up as a whole, to keep the points uniform
 DROPS = 8
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
-
-
-class NavigablePoints(Protocol):
-    """What sampling needs to know of the floor; points are (x, y) in m."""
-
-    def sample(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """A point (2,) drawn uniformly from the part of the floor that a person can walk over."""
-
-    def is_navigable(self, point: ArrayLike) -> bool:
-        """Whether a person can stand at a point (2,)."""
-
-    def snap(self, point: ArrayLike, max_distance: float) -> NDArray[np.float64]:
-        """The nearest point (2,) that `sample` could draw: the point itself if it is one."""
 
 
 class _Purpose(enum.IntEnum):
@@ -53,7 +40,12 @@ class _Purpose(enum.IntEnum):
 
 
 def sample_episode(
-    catalogue: Catalogue, navigable: NavigablePoints, *, objects: int, seed: int, points: int = POINTS
+    catalogue: Catalogue,
+    navigable: NavigablePoints | None = None,
+    *,
+    objects: int,
+    seed: int,
+    points: int = POINTS,
 ) -> Episode:
     """Sample a disorganized house.
 
@@ -62,7 +54,7 @@ def sample_episode(
 
     Args:
         catalogue: What the house offers.
-        navigable: The navigable floor of the same house.
+        navigable: The navigable floor of the same house; None for that of the installed planner.
         objects: How many objects: the level, 1 to `points`. Categories are equally frequent when it is a
             multiple of their number.
         seed: Not negative.
@@ -78,6 +70,8 @@ def sample_episode(
         PhysicsError: MuJoCo warned while the objects settled.
     """
     _check_arguments(objects, seed, points)
+    if navigable is None:
+        navigable = navigable_floor(catalogue)
     centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
     pool = sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
     categories = _point_categories(catalogue, points, _rng(seed, _Purpose.CATEGORIES))[:objects]

@@ -1,0 +1,95 @@
+"""The public surface of mjsim, as a list: a name that appears or goes is a decision, and shows up here."""
+
+import ast
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import mjsim
+
+PUBLIC = [
+    *(
+        "IDLE",
+        "ActionResult",
+        "Catalogue",
+        "Episode",
+        "MjsimError",
+        "Move",
+        "Observation",
+        "Pick",
+        "Place",
+        "Refusal",
+    ),
+    *("Scene", "StepResult", "World", "WorldOptions", "compose", "make", "navigable_floor", "sample_episode"),
+]
+
+
+def test_the_public_names_are_these() -> None:
+    assert mjsim.__all__ == PUBLIC
+    assert set(PUBLIC) <= set(dir(mjsim))
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_every_name_resolves_to_something_documented(name: str) -> None:
+    value = getattr(mjsim, name)
+    assert name == "IDLE" or (value.__name__ == name and value.__doc__)
+
+
+def test_type_checkers_see_the_same_names() -> None:
+    tree = ast.parse(Path(inspect.getfile(mjsim)).read_text(encoding="utf-8"))
+    block = next(n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING")
+    imports = [n for n in block.body if isinstance(n, ast.ImportFrom)]
+    assert sorted(a.name for n in imports for a in n.names) == sorted(PUBLIC)
+    for node in imports:
+        for alias in node.names:
+            assert getattr(mjsim, alias.name) is getattr(sys.modules[str(node.module)], alias.name)
+
+
+def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(AttributeError, match=r"'maker'.*'make'"):
+        _ = mjsim.maker  # type: ignore[attr-defined]
+
+
+def run(code: str) -> str:
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.strip()
+
+
+def test_import_mjsim_loads_none_of_the_simulator() -> None:
+    heavy = {
+        "OpenGL",
+        "dm_control",
+        "dm_env",
+        "experiments",
+        "gymnasium",
+        "mujoco",
+        "numba",
+        "numpy",
+        "planner",
+    }
+    assert run(f"import sys, mjsim; print(sorted({heavy} & set(sys.modules)))") == "[]"
+
+
+@pytest.mark.parametrize(
+    "imports", ["mjsim, gymnasium", "gymnasium, mjsim", "mjsim, importlib, mjsim, gymnasium"]
+)
+def test_gymnasium_knows_the_environment_in_either_order_of_import(imports: str) -> None:
+    assert run(f"import {imports}; print(gymnasium.spec('mjsim/Rearrange-v0').id)") == "mjsim/Rearrange-v0"
+
+
+def test_gymnasium_finds_the_environment_by_the_name_of_the_package() -> None:
+    name = "mjsim:mjsim/Rearrange-v0"
+    assert (
+        run(f"import gymnasium; print(gymnasium.make({name!r}, objects=1).spec.id)") == "mjsim/Rearrange-v0"
+    )
+
+
+def test_the_readme_runs_as_it_stands_and_needs_mjsim_alone() -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    code = readme.split("```python\n")[1].split("```")[0]
+    assert "experiments" not in code
+    assert "None" in run(code) or "Refusal" in run(code)
