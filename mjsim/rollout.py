@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +10,39 @@ from numpy.typing import NDArray
 from mjsim.actions import WorldEvent
 from mjsim.observation import Observation
 
-_LAST = ("observation", "events")  # of a stretch's last step alone
+_HEALTH = 7  # numbers of a `HealthSample`
+
+
+class RolloutArrays(NamedTuple):
+    """The arrays of a `Rollout`, for kernels that fill them row by row."""
+
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    headings: NDArray[np.float64]
+    pitches: NDArray[np.float64]
+    object_positions: NDArray[np.float64]
+    object_quaternions: NDArray[np.float64]
+    state_hashes: NDArray[np.uint64]
+    health: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, steps: int, objects: int) -> "RolloutArrays":
+        """Arrays for `steps` control steps, not yet filled."""
+        return cls(
+            times=np.empty(steps),
+            positions=np.empty((steps, 2)),
+            headings=np.empty(steps),
+            pitches=np.empty(steps),
+            object_positions=np.empty((steps, objects, 3)),
+            object_quaternions=np.empty((steps, objects, 4)),
+            state_hashes=np.empty(steps, np.uint64),
+            health=np.empty((steps, _HEALTH)),
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """What n control steps brought; row i is the state after step i, as single steps would have observed it.
+    """The states that n control steps went through; row i is the state after step i, as `World.step` observes it.
 
     Attributes:
         times: Simulated time, s, shape (n,).
@@ -41,36 +69,12 @@ class Rollout:
     events: tuple[WorldEvent, ...]
 
     def __len__(self) -> int:
-        return len(self.headings)
+        return len(self.times)
 
-    def then(self, later: "Rollout") -> "Rollout":
-        """This stretch and the one that follows it, as one."""
-        arrays = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name not in _LAST}
-        joined = {name: np.concatenate((rows, getattr(later, name))) for name, rows in arrays.items()}
-        return Rollout(**joined, observation=later.observation, events=later.events)
-
-    @classmethod
-    def of(
-        cls,
-        observations: list[Observation],
-        state_hashes: list[int],
-        last: Observation,
-        events: tuple[WorldEvent, ...],
-        health: list[tuple[float, ...]],
-    ) -> "Rollout":
-        """Stack the observations after each step; `last` stands for them where there are none."""
-        count, objects = len(observations), len(last.object_names)
-        return cls(
-            times=np.array([o.time for o in observations]),
-            positions=np.array([o.position for o in observations]).reshape(count, 2),
-            headings=np.array([o.heading for o in observations]),
-            pitches=np.array([o.pitch for o in observations]),
-            object_positions=np.array([o.object_positions for o in observations]).reshape(count, objects, 3),
-            object_quaternions=np.array([o.object_quaternions for o in observations]).reshape(
-                count, objects, 4
-            ),
-            state_hashes=np.array(state_hashes, np.uint64),
-            health=np.array(health, np.float64).reshape(count, 7),
-            observation=last,
-            events=events,
-        )
+    def followed_by(self, later: "Rollout") -> "Rollout":
+        """This rollout and the one that continues it, as one."""
+        joined: dict[str, Any] = {
+            name: np.concatenate((getattr(self, name), getattr(later, name)))
+            for name in RolloutArrays._fields
+        }
+        return dataclasses.replace(later, **joined)

@@ -1,4 +1,4 @@
-"""What is true of the household whatever moves it: who holds what, what is put away, and what just happened."""
+"""Hands, statuses and events of an episode, in whatever tier it runs."""
 
 from mjsim.actions import EventKind, WorldEvent
 from mjsim.errors import StateError
@@ -31,7 +31,7 @@ class EpisodeState:
         self.events: list[WorldEvent] = []
 
     def report(self, time: float, kind: EventKind, item: int, receptacle: str | None = None) -> None:
-        """Take note that something happened to object `item`."""
+        """Record an event of object `item`."""
         self.events.append(WorldEvent(time, kind, self._index.names[item], receptacle))
 
     def picked(self, time: float, hand: int, item: int, success: bool) -> None:

@@ -1,6 +1,5 @@
 """Everything in physics: walking, reaching, carrying, letting go."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
@@ -49,10 +48,11 @@ class Full:
 
     Attributes:
         data: The state of the physics.
-        episode_state: Who holds what, what is put away, what happened in the latest control step.
+        scene: The scene.
+        episode_state: Hands, statuses, and the events of the latest control step.
         person: The body in this physics.
-        carrying: How it keeps what it holds off the house.
-        monitor: Looks at the physics after every control step.
+        carrying: Keeps held objects off the house.
+        monitor: Checks the physics after every control step.
     """
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
@@ -108,7 +108,7 @@ class Full:
         """Advance by one control step."""
         result = self.resolve(action, busy=self.busy)
         if result is not None and result.applied:
-            self.begin(result)
+            self.begin(result, *self.hand_for(result), self.person.rig.pitch_target)
         self.advance(action if isinstance(action, Move) else IDLE)
         return result
 
@@ -146,19 +146,20 @@ class Full:
             return free[0], item
         return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item
 
-    def begin(self, result: ActionResult) -> None:
-        """Begin a feasible pick or place."""
-        hand, item = self.hand_for(result)
-        self._begin(result, pick, hand, item, self.person.rig.pitch_target)
-
-    def take_up(self, result: ActionResult, hand: int, item: int, pitch: float) -> None:
-        """Go on with a pick at the grip, or with a place at the turn; the head looks to `pitch`, rad, afterwards."""
-        self._begin(result, take, hand, item, pitch)
-
-    def _begin(
-        self, result: ActionResult, picking: Callable[..., Motion], hand: int, item: int, pitch: float
+    def begin(
+        self, result: ActionResult, hand: int, item: int, pitch: float, *, reached: bool = False
     ) -> None:
+        """Begin a feasible pick or place; the head looks to `pitch`, rad, afterwards.
+
+        Args:
+            result: The answer to the action.
+            hand: Hand that does it.
+            item: Object.
+            pitch: Where the head looked before, rad.
+            reached: Whether the hand is at the object already, for a pick.
+        """
         if isinstance(result.action, Pick):
+            picking = take if reached else pick
             steps = picking(self.person, hand, item, self.carrying.place_for, pitch)
         else:
             steps = place(self.person, hand, item, self.scene.receptacles[str(result.receptacle)], pitch)
@@ -207,7 +208,7 @@ class Full:
         return self._hash.of(self.data)
 
     def state(self) -> WorldState:
-        """Everything from which `restore` goes on."""
+        """Everything that `restore` needs to continue from here."""
         person = self.person
         commands = PersonState(
             rig=person.rig.get_state(),
@@ -219,7 +220,7 @@ class Full:
         return WorldState(take_physics(self.scene.model, self.data), details)
 
     def restore(self, state: WorldState) -> None:
-        """Go on from a state.
+        """Continue from a state.
 
         Raises:
             StateError: It does not fit.
@@ -248,8 +249,8 @@ class Full:
             if status is ObjectStatus.DELIVERED and not self.person.asleep(item) and not self._in_place(item)
         ]
 
-    def calm(self, speed: float) -> bool:
-        """Whether all that nobody holds sleeps, or is slower than `speed`, m/s."""
+    def is_settled(self, speed: float) -> bool:
+        """Whether every object that no hand holds sleeps, or is slower than `speed`, m/s."""
         if self._only_held_awake():
             return True
         gripped = self.person.grips.gripped
@@ -257,17 +258,12 @@ class Full:
         return all(self.person.speed(item) < speed for item in awake.tolist() if item not in gripped)
 
     def _only_held_awake(self) -> bool:
-        """Whether all that nobody holds sleeps: the person is always awake, and wakes what it holds."""
+        """Whether every object sleeps that no hand holds: the person is always awake, and wakes what it holds."""
         return bool(self.data.ntree_awake == 1 + len(self.person.grips.gripped))
 
     def poses(self) -> NDArray[np.float64]:
         """Poses of all objects, m and wxyz, shape (n, 7)."""
         return np.array(self.data.qpos[self.scene.index.qpos[:, None] + np.arange(7)])
-
-    @property
-    def _undisturbed(self) -> bool:
-        """Whether only the person is awake, who always is, and what it holds."""
-        return bool(self.data.ntree_awake == 1 + len(self.person.grips.gripped))
 
     def _in_place(self, item: int) -> bool:
         key = self.scene.episode.targets[self.scene.index.names[item]]
@@ -291,7 +287,7 @@ class Full:
         self.person.moving_hand = None
 
     def _held_posture(self) -> tuple[float, float, float]:
-        """Held things are drawn in to turn, and kept out of the way of a reaching hand."""
+        """Held objects are drawn in to turn, and kept out of the way of a reaching hand."""
         if self._motion is None:
             return avatar.CARRY
         return avatar.TUCKED if self.person.moving_hand is None else avatar.ASIDE

@@ -37,11 +37,11 @@ from mjsim.fidelity.body_state import (
     X,
     Y,
 )
-from mjsim.fidelity.trunk_contact import Floor, is_free, stride
+from mjsim.fidelity.trunk_contact import Floor, is_free, slide
 from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.options import WorldOptions
-from mjsim.person import rate_limits as slewing
+from mjsim.person import rate_limits
 
 
 class Gait(NamedTuple):
@@ -55,7 +55,7 @@ class Gait(NamedTuple):
         inertia, turn_gain, turn_force: Of the yaw's velocity servo.
         head_inertia, head_stiffness, head_damping, head_force: Of the head's position servo.
         lowest, highest: Range of the head's pitch.
-        radius: Of the trunk.
+        radius: Radius of the trunk.
     """
 
     max_speed: float
@@ -117,12 +117,12 @@ class Gait(NamedTuple):
 
 
 class LocomotionState(NamedTuple):
-    """All that a walk without physics depends on, for kernels that foresee one.
+    """Everything that walking without physics depends on, for kernels that roll it out.
 
     Attributes:
-        body: The body now; copy it before stepping it.
-        gait: How it walks.
-        floor: What it walks into.
+        body: The body now, shape (BODY_SIZE,); copy it before stepping it.
+        gait: Limits and servos.
+        floor: Outlines that the trunk meets.
     """
 
     body: NDArray[np.float64]
@@ -143,19 +143,19 @@ def walk(
 def command(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait
 ) -> None:
-    """Slew the commands towards what `Move(forward, left, turn, look)` asks; `advance` carries them out."""
+    """Slew the commands towards those of `Move(forward, left, turn, look)`; `advance` carries them out."""
     motion = body[FORWARD:SERVO]
-    slewing.slew_walk(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
-    slewing.slew_turn(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
-    slewing.slew_look(motion, look, gait.max_look, gait.lowest, gait.highest, gait.dt)
+    rate_limits.slew_walk(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
+    rate_limits.slew_turn(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
+    rate_limits.slew_look(motion, look, gait.max_look, gait.lowest, gait.highest, gait.dt)
 
 
 @kernel
 def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
     """Slew the walk to a stand and the yaw rate towards `turn`, rad/s."""
     motion = body[FORWARD:SERVO]
-    slewing.slew_walk(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
-    slewing.slew_turn(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
+    rate_limits.slew_walk(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
+    rate_limits.slew_turn(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
 
 
 @kernel
@@ -197,7 +197,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
             body[X] += h * body[VX]
             body[Y] += h * body[VY]
         else:
-            stride(body, h, gait.radius, floor)
+            slide(body, h, gait.radius, floor)
         body[HEADING] += h * body[TURN_RATE]
         body[PITCH] += h * body[PITCH_RATE]
     body[SERVO], body[SERVO + 1], body[SERVO + 2], body[SERVO + 3] = to_x, to_y, to_turn, to_pitch
@@ -205,7 +205,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
 
 @kernel
 def _servo(mass: float, damping: float, h: float) -> tuple[float, float, float]:
-    """What of its speed a servo keeps in a physics step, what it gains by a force, and what of that undamped."""
+    """Share of its speed that a servo keeps in a physics step, speed per force damped, and undamped."""
     return mass / (mass + h * damping), h / (mass + h * damping), h / mass
 
 

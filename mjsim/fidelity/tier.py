@@ -7,20 +7,20 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import Action, ActionResult, WorldEvent
+from mjsim.actions import Action, ActionResult
 from mjsim.fidelity.episode_state import EpisodeState
 from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.health.values import Health, HealthSample
 from mjsim.observation import Observation
-from mjsim.rollout import Rollout
+from mjsim.rollout import Rollout, RolloutArrays
 from mjsim.world_state import WorldState
 
 
 class Tier(Protocol):
-    """One way to advance a household by control steps.
+    """One way to advance the person and the objects by control steps.
 
     Attributes:
-        episode_state: Who holds what, what is put away, what happened in the latest control step.
+        episode_state: Hands, statuses, and the events of the latest control step.
     """
 
     episode_state: EpisodeState
@@ -47,12 +47,12 @@ class Tier(Protocol):
 
     @property
     def health_sample(self) -> HealthSample:
-        """What the physics was like in the latest control step."""
+        """Health of the physics in the latest control step."""
         ...
 
     @property
     def locomotion(self) -> LocomotionState | None:
-        """What the walk depends on; None while physics moves the person."""
+        """What walking depends on, for roll-out kernels; None while physics or a motion moves the person."""
         ...
 
     def reset(self) -> None:
@@ -60,7 +60,7 @@ class Tier(Protocol):
         ...
 
     def step(self, action: Action) -> ActionResult | None:
-        """Advance by one control step; events are in the episode_state then."""
+        """Advance by one control step; its events are in `episode_state` afterwards."""
         ...
 
     def walk(self, moves: NDArray[np.float64]) -> Rollout:
@@ -80,11 +80,11 @@ class Tier(Protocol):
         ...
 
     def state(self) -> WorldState:
-        """Everything from which `restore` goes on; not while busy."""
+        """Everything that `restore` needs to continue from here; not while busy."""
         ...
 
     def restore(self, state: WorldState) -> None:
-        """Go on from a state.
+        """Continue from a state.
 
         Raises:
             StateError: It does not fit.
@@ -97,14 +97,22 @@ def by_steps(tier: Tier, actions: Iterable[Action]) -> Rollout:
     observations: list[Observation] = []
     hashes: list[int] = []
     health: list[tuple[float, ...]] = []
-    events: tuple[WorldEvent, ...] = ()
     for action in actions:
         tier.step(action)
         observations.append(tier.observation())
         hashes.append(tier.state_hash())
         health.append(tier.health_sample.row)
-        events = tuple(tier.episode_state.events)
-        if events:
+        if tier.episode_state.events:
             break
     last = observations[-1] if observations else tier.observation()
-    return Rollout.of(observations, hashes, last, events, health)
+    arrays = RolloutArrays.empty(len(observations), len(last.object_names))
+    arrays.state_hashes[:] = hashes
+    for step, o in enumerate(observations):
+        arrays.times[step], arrays.positions[step] = o.time, o.position
+        arrays.headings[step], arrays.pitches[step] = o.heading, o.pitch
+        arrays.object_positions[step], arrays.object_quaternions[step] = (
+            o.object_positions,
+            o.object_quaternions,
+        )
+        arrays.health[step] = health[step]
+    return Rollout(*arrays, last, tuple(tier.episode_state.events) if observations else ())

@@ -14,10 +14,10 @@ from mjsim.model import avatar
 from mjsim.model.footprint import footprint
 
 _TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
-_LONGEST = 0.05  # m; a disc of 0.20 m cannot jump over a wall in strides of this length
+_MAX_STEP = 0.05  # m; a disc of 0.20 m cannot jump over a wall in steps of this length
 _CELL = 0.25  # m
-_KNOWN = 0.12  # m beyond the trunk that a cell of the grid knows of
-_ROUNDS = 12
+_MARGIN = 0.12  # m beyond the trunk that a cell of the grid covers
+_MAX_ROUNDS = 12
 _TOUCHING = 1e-7  # m
 
 
@@ -57,7 +57,7 @@ class Floor(NamedTuple):
     @classmethod
     def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
         """Convex counter-clockwise polygons (k, 2), m, for a trunk of this radius, m."""
-        reach = radius + _KNOWN
+        reach = radius + _MARGIN
         boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
         low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
         high = boxes[:, 2:].max(axis=0, initial=-np.inf) + reach if len(polygons) else np.ones(2)
@@ -94,8 +94,8 @@ def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 @kernel
 def is_free(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
     """Whether no outline comes within these distances along x and y."""
-    if max(reach_x, reach_y) > radius + _KNOWN:
-        return False  # farther than the grid knows
+    if max(reach_x, reach_y) > radius + _MARGIN:
+        return False  # farther than a cell covers
     start, end = _near(x, y, floor)
     for entry in range(start, end):
         box = floor.boxes[floor.near[entry]]
@@ -115,10 +115,10 @@ def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
 
 
 @kernel
-def stride(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> None:
+def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> None:
     """Move the trunk by its velocity for `h` seconds, sliding along what it meets."""
     length = h * math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
-    parts = 1 + int(length / _LONGEST)
+    parts = 1 + int(length / _MAX_STEP)
     for _ in range(parts):
         x, y = body[X], body[Y]
         body[X] += body[VX] * (h / parts)
@@ -132,7 +132,7 @@ def stride(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> 
 @kernel
 def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int, end: int) -> bool:
     """Move the disc out of the polygons near[start:end], and turn its velocity along them; whether that is possible."""
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         free = True
         for entry in range(start, end):
             polygon = floor.near[entry]
