@@ -1,5 +1,6 @@
 """A translucent drawing surface, and the patch that is laid over a frame."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hud.stencils import Floats, Stencils
+from hud import theme
+from hud.stencils import Floats, Stencils, disc, rounded
 from hud.theme import Face, Rgb
 
 
@@ -44,20 +46,21 @@ class Patch:
     keep: NDArray[np.uint8]
 
     def faded(self, opacity: float) -> "Patch":
-        """The same, more transparent."""
+        """The same with this share of its opacity, 0 to 1."""
         share = min(max(opacity, 0.0), 1.0)
         levels = np.arange(256.0)
         colour = np.rint(levels * share).astype(np.uint8)
         keep = np.rint(255.0 - (255.0 - levels) * share).astype(np.uint8)
         return Patch(cv2.LUT(self.colour, colour), cv2.LUT(self.keep, keep))
 
-    @staticmethod
-    def stack(strips: "Sequence[Patch]") -> "Patch":
-        """Patches of one width below each other."""
-        return Patch(np.concatenate([s.colour for s in strips]), np.concatenate([s.keep for s in strips]))
-
     def lay_over(self, frame: NDArray[np.uint8], x: int, y: int) -> None:
-        """Blend onto `frame` in place with the upper left corner at column x, row y; it must lie inside."""
+        """Blend onto `frame`, shape (H, W, 3), in place.
+
+        Args:
+            frame: Must hold the whole patch.
+            x: Column of the upper left corner, px.
+            y: Row of the upper left corner, px.
+        """
         height, width = self.keep.shape[:2]
         view = frame[y : y + height, x : x + width]
         cv2.multiply(view, self.keep, dst=view, scale=1.0 / 255.0)
@@ -67,27 +70,32 @@ class Patch:
 class Canvas:
     """Draws shapes, text and pictures with opacity; `patch` turns the result into bytes.
 
-    Colour times opacity and opacity lie in four planes, which the processor goes through quickest.
+    Args:
+        stencils: What is drawn with; their scale is the canvas's.
+        width: px of the frame.
+        height: px of the frame.
     """
 
-    def __init__(self, width: int, height: int, stencils: Stencils, unit: float) -> None:
+    def __init__(self, stencils: Stencils, width: int, height: int) -> None:
         self.width, self.height = width, height
-        self._stencils = stencils
-        self._unit = unit
+        self.stencils = stencils
+        self.type = stencils.type
+        self.unit = stencils.unit
+        self.px = stencils.type.px
+        # Colour times opacity, and opacity: one plane each, because the processor goes through planes quickest.
         self._planes: Floats = np.zeros((4, height, width), dtype=np.float32)
 
-    def rows(self, numbers: NDArray[np.int64]) -> "Canvas":
-        """A new canvas with copies of these rows."""
-        part = Canvas(self.width, 0, self._stencils, self._unit)
-        part.height, part._planes = len(numbers), self._planes[:, numbers]
-        return part
-
-    def px(self, size: float) -> int:
-        """Theme px to frame px."""
-        return round(size * self._unit)
+    @classmethod
+    def panel(cls, stencils: Stencils, rect: Rect) -> "Canvas":
+        """A canvas of the size of `rect` with the dark rounded background of a panel."""
+        canvas = cls(stencils, rect.width, rect.height)
+        whole, radius = Rect(0, 0, rect.width, rect.height), theme.PANEL_RADIUS * stencils.unit
+        canvas.rounded(whole, radius, theme.PANEL, theme.PANEL_OPACITY)
+        canvas.rounded(whole, radius, theme.EDGE, theme.EDGE_OPACITY, line=max(1.0, stencils.unit))
+        return canvas
 
     def fill(self, mask: Floats, colour: Rgb, opacity: float, x: int = 0, y: int = 0) -> None:
-        """Lay a colour over the canvas where `mask` (0..1, shape (h, w)) says, clipped to the canvas."""
+        """Lay a colour over the canvas where `mask` (0 to 1, shape (h, w)) says, clipped to the canvas."""
         x0, y0 = max(x, 0), max(y, 0)
         x1, y1 = min(x + mask.shape[1], self.width), min(y + mask.shape[0], self.height)
         if x0 >= x1 or y0 >= y1:
@@ -100,8 +108,7 @@ class Canvas:
 
     def rounded(self, rect: Rect, radius: float, colour: Rgb, opacity: float, line: float = 0.0) -> None:
         """A filled rounded rectangle, or with `line` > 0 only its outline of that width, px of the frame."""
-        mask = self._stencils.rounded(rect.width, rect.height, radius, line)
-        self.fill(mask, colour, opacity, rect.x, rect.y)
+        self.fill(rounded(rect.width, rect.height, radius, line), colour, opacity, rect.x, rect.y)
 
     def shape(self, points: Sequence[tuple[float, float]], colour: Rgb, line: float = 0.0) -> None:
         """A smooth-edged filled polygon, or with `line` > 0 an open stroke of that width, px of the frame."""
@@ -118,46 +125,52 @@ class Canvas:
         share = np.asarray(mask[y:bottom, x:right] / np.float32(255.0), dtype=np.float32)
         self.fill(share, colour, 1.0, int(x), int(y))
 
+    def arrow(
+        self, centre: float, angle: float, outline: Sequence[tuple[float, float]], size: float, colour: Rgb
+    ) -> None:
+        """A filled outline around the middle of a square canvas, turned to a direction.
+
+        Args:
+            centre: Column and row of the middle, px of the frame.
+            angle: Direction of the outline's x axis, rad, 0 to the right, counter-clockwise.
+            outline: Corners, in units of `size`, y downwards.
+            size: px of the frame.
+            colour: Of the inside.
+        """
+        c, s = math.cos(angle), -math.sin(angle)
+        points = [(centre + size * (a * c - b * s), centre + size * (a * s + b * c)) for a, b in outline]
+        self.shape(points, colour)
+
     def text(self, x: int, baseline: int, text: str, face: Face, colour: Rgb) -> int:
         """One line of text from column `x`; returns its width, px."""
         if not text:
             return 0
-        size = max(1, self.px(face.size))
-        stencil = self._stencils.text(text, size, face.weight)
+        stencil = self.stencils.text(text, face)
         self.fill(stencil.mask, colour, 1.0, x + stencil.x, baseline + stencil.y)
-        return self._stencils.face.width(text, size, face.weight)
+        return self.type.width(text, face)
 
-    def text_width(self, text: str, face: Face) -> int:
-        """Width of a line, px."""
-        return self._stencils.face.width(text, max(1, self.px(face.size)), face.weight)
-
-    def fit(self, text: str, face: Face, width: int) -> str:
-        """`text`, cut to one line of `width` px."""
-        return self._stencils.face.fit(text, max(1, self.px(face.size)), face.weight, width)
-
-    def wrap(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
-        """`text`, broken into at most `lines` lines of `width` px."""
-        return self._stencils.face.wrap(text, max(1, self.px(face.size)), face.weight, width, lines)
-
-    def picture(self, key: str, x: int, y: int, size: int, opacity: float = 1.0) -> None:
-        """The picture of that key, scaled to `size` px; nothing when there is none."""
-        scaled = self._stencils.scaled(key, size)
+    def tile(self, key: str | None, x: int, y: int, size: int, opacity: float = 1.0) -> None:
+        """A picture on a light rounded square of `size` px; an unknown key leaves the square empty."""
+        self.rounded(Rect(x, y, size, size), 4.0 * self.unit, theme.TILE_COLOUR, 0.94 * opacity)
+        inset = self.px(1)
+        side = size - 2 * inset
+        scaled = None if key is None else self.stencils.scaled(key, side)
         if scaled is None:
             return
-        area = self._planes[:, y : y + size, x : x + size]
+        area = self._planes[:, y + inset : y + inset + side, x + inset : x + inset + side]
         share = scaled.opacity * np.float32(opacity)
         area[:3] += scaled.colours * np.float32(255.0 * opacity) - area[:3] * share
         area[3] += (1.0 - area[3]) * share
 
-    def image(self, colours: NDArray[np.float32], opacity: NDArray[np.float32], x: int, y: int) -> None:
-        """An image (h, w, 3), 0..255, with an opacity (h, w), 0..1, per pixel; it must lie inside."""
+    def image(self, colours: Floats, opacity: Floats, x: int, y: int) -> None:
+        """An image (h, w, 3), 0 to 255, with an opacity (h, w), 0 to 1, per pixel; it must lie inside."""
         area = self._planes[:, y : y + colours.shape[0], x : x + colours.shape[1]]
         area[:3] += (np.moveaxis(colours, 2, 0) - area[:3]) * opacity
         area[3] += (1.0 - area[3]) * opacity
 
     def circle(self, x: float, y: float, radius: float, colour: Rgb, opacity: float = 1.0) -> None:
         """A smooth-edged disc; centre and radius in px of the frame."""
-        stencil = self._stencils.disc(x, y, radius)
+        stencil = disc(x, y, radius)
         self.fill(stencil.mask, colour, opacity, stencil.x, stencil.y)
 
     def patch(self) -> Patch:

@@ -1,12 +1,10 @@
-"""Drawing of the task list, row by row: from one state to the next few rows change, and the others are kept."""
-
-import functools
+"""Drawing of the task list."""
 
 from hud import theme
 from hud.canvas import Canvas, Patch, Rect
-from hud.pen import Pen
-from hud.rows import GAP, HEADER, LINE, NUMBER, PADDING, TARGET, TILE, ListRow
+from hud.layout import Row
 from hud.state import ChecklistItem
+from hud.stencils import Stencils
 
 
 def count_text(items: tuple[ChecklistItem, ...]) -> str:
@@ -18,74 +16,74 @@ def count_text(items: tuple[ChecklistItem, ...]) -> str:
 
 
 def draw_checklist(
-    pen: Pen,
+    stencils: Stencils,
     rect: Rect,
-    title: str,
+    header: tuple[str, str],
     items: tuple[ChecklistItem, ...],
-    rows: tuple[ListRow, ...],
+    rows: tuple[Row, ...],
     hidden: tuple[int, int],
-    count: str,
 ) -> Patch:
-    """The task list: the items that fit, how many are hidden before and after them, and a count beside the title."""
-    top = round(HEADER * pen.unit)
-    strips = [pen.strip(rect, 0, top, ("header", title, count), lambda canvas: _header(canvas, title, count))]
+    """The task list.
+
+    Args:
+        stencils: What is drawn with.
+        rect: Of the panel.
+        header: Title, and a count beside it.
+        items: Those that fit.
+        rows: Their rows.
+        hidden: How many items do not fit before and after them.
+    """
+    canvas = Canvas.panel(stencils, rect)
+    px, width = canvas.px, canvas.type.width
+    title, count = header
+    x = px(theme.PADDING + 2)
+    right = canvas.width - x
+    taken = width(count, theme.DETAIL) + px(theme.GAP)
+    line = canvas.type.fit(title, theme.TITLE, right - x - taken)
+    canvas.text(x, px(17), line, theme.TITLE, theme.TEXT)
+    canvas.text(right - taken + px(theme.GAP), px(17), count, theme.DETAIL, theme.QUIET)
+    top = round(theme.HEADER * canvas.unit)
     for item, row in zip(items, rows, strict=True):
-        draw = functools.partial(_row, pen, item=item, row=row)
-        strips.append(pen.strip(rect, top, row.height, (item, row), draw))
+        _draw_row(canvas, item, row, top)
         top += row.height
-    strips.append(
-        pen.strip(rect, top, rect.height - top, ("footer", hidden), lambda canvas: _footer(canvas, hidden))
-    )
-    return Patch.stack(strips)
-
-
-def _header(canvas: Canvas, title: str, count: str) -> None:
-    x = canvas.px(PADDING + 2)
-    taken = canvas.text_width(count, theme.DETAIL) + canvas.px(GAP)
-    title = canvas.fit(title, theme.TITLE, canvas.width - 2 * x - taken)
-    canvas.text(x, canvas.px(17), title, theme.TITLE, theme.TEXT)
-    canvas.text(canvas.width - x - taken + canvas.px(GAP), canvas.px(17), count, theme.DETAIL, theme.QUIET)
-
-
-def _footer(canvas: Canvas, hidden: tuple[int, int]) -> None:
-    x = canvas.px(PADDING + 2)
     notes = (f"{hidden[0]} above" if hidden[0] else "", f"+{hidden[1]} more" if hidden[1] else "")
-    text = canvas.fit(" · ".join(note for note in notes if note), theme.DETAIL, canvas.width - 2 * x)
-    canvas.text(x, canvas.height - canvas.px(PADDING), text, theme.DETAIL, theme.QUIET)
+    text = canvas.type.fit(" · ".join(note for note in notes if note), theme.DETAIL, right - x)
+    canvas.text(x, canvas.height - px(theme.PADDING), text, theme.DETAIL, theme.QUIET)
+    return canvas.patch()
 
 
-def _row(pen: Pen, canvas: Canvas, item: ChecklistItem, row: ListRow) -> None:
-    px = canvas.px
-    side = px(TILE)
+def _draw_row(canvas: Canvas, item: ChecklistItem, row: Row, top: int) -> None:
+    px, side = canvas.px, canvas.px(theme.TILE)
     if item.current:
-        area = Rect(px(3), 0, canvas.width - 2 * px(3), row.height)
-        canvas.rounded(area, 5.0 * pen.unit, theme.ACCENT, 0.16)
-        canvas.rounded(Rect(px(2), px(4), px(3), row.height - 2 * px(4)), 1.5 * pen.unit, theme.ACCENT, 1.0)
-    x = px(PADDING + 2)
+        area = Rect(px(3), top, canvas.width - 2 * px(3), row.height)
+        canvas.rounded(area, 5.0 * canvas.unit, theme.ACCENT, 0.16)
+        bar = Rect(px(2), top + px(4), px(3), row.height - 2 * px(4))
+        canvas.rounded(bar, 1.5 * canvas.unit, theme.ACCENT, 1.0)
+    x = px(theme.PADDING + 2)
     if item.number is not None:
-        label = str(item.number)
-        right = x + px(NUMBER) - px(3)
-        face = theme.LABEL if item.current else theme.DETAIL
-        canvas.text(right - canvas.text_width(label, face), px(19), label, face, theme.QUIET)
-        x += px(NUMBER)
-    pen.tile(canvas, item.picture, x, px(3), side, 0.5 if item.done else 1.0)
+        label, face = str(item.number), theme.LABEL if item.current else theme.DETAIL
+        right = x + px(theme.NUMBER) - px(3)
+        canvas.text(right - canvas.type.width(label, face), top + px(19), label, face, theme.QUIET)
+        x += px(theme.NUMBER)
+    canvas.tile(item.picture, x, top + px(3), side, 0.5 if item.done else 1.0)
     if item.target_picture is not None:
-        small = px(TARGET)
-        left = canvas.width - px(PADDING) - small
-        pen.tile(canvas, item.target_picture, left, px(5), small, 0.4 if item.done else 1.0)
-    _row_text(canvas, item, row, x + side + px(GAP))
+        small = px(theme.TARGET)
+        left = canvas.width - px(theme.PADDING) - small
+        canvas.tile(item.target_picture, left, top + px(5), small, 0.4 if item.done else 1.0)
+    _draw_text(canvas, item, row, x + side + px(theme.GAP), top)
 
 
-def _row_text(canvas: Canvas, item: ChecklistItem, row: ListRow, x: int) -> None:
+def _draw_text(canvas: Canvas, item: ChecklistItem, row: Row, x: int, top: int) -> None:
     px = canvas.px
     face = theme.ITEM_CURRENT if item.current else theme.ITEM
-    if canvas.text_width(item.text, face) > row.text_width:
+    if canvas.type.width(item.text, face) > row.text_width:
         face = theme.Face(theme.DETAIL.size, face.weight)
-    line = canvas.fit(item.text, face, row.text_width)
-    baseline = px(13) if row.detail else px(19)
+    line = canvas.type.fit(item.text, face, row.text_width)
+    baseline = top + (px(13) if row.detail else px(19))
     drawn = canvas.text(x, baseline, line, face, theme.DONE if item.done else theme.TEXT)
     if item.done and drawn > 0:
         y = baseline - px(4.5)
         canvas.shape([(x - px(1), y), (x + drawn + px(1), y)], theme.TEXT, line=max(1.0, 1.2 * px(1)))
     for i, detail in enumerate(row.detail):
-        canvas.text(x, px(26 + LINE * i), detail, theme.DETAIL, theme.DONE if item.done else theme.QUIET)
+        baseline = top + px(26 + theme.LINE * i)
+        canvas.text(x, baseline, detail, theme.DETAIL, theme.DONE if item.done else theme.QUIET)

@@ -3,27 +3,29 @@
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hud import checklist, panels
+from hud import minimap as maps
+from hud import panels
 from hud.canvas import Patch, Rect
+from hud.checklist import count_text, draw_checklist
 from hud.errors import FrameError
-from hud.layout import Layout, arrange, pointer_rect
-from hud.minimap import Kind, draw_base, draw_mark, marks
+from hud.layout import Layout, arrange, pointer_rect, unit_of
 from hud.options.minimap import FLOORPLAN
-from hud.pen import Pen
 from hud.state import HudState, MiniMap
 from hud.stencils import Pictures, Stencils
+from hud.theme import POINTER
 
-POINTER_STEPS = 72  # drawn directions of the pointer, 5 degrees apart
+Draw = Callable[..., Patch]
 
 
 class Compositor:
-    """Draws HUD states over frames and remembers the panels that it drew last.
+    """Draws HUD states over frames, and keeps each panel until what it says has changed.
 
-    The result depends on the arguments alone; the memory (one entry per panel) only saves time.
+    The result depends on the arguments alone; what is kept only saves time.
 
     Args:
         pictures: RGBA pictures, uint8 (s, s, 4), straight alpha, by the keys of states; the floor plan may be any
@@ -41,8 +43,7 @@ class Compositor:
                 raise FrameError(
                     f"picture {key!r} must be uint8 (s, s, 4), got {picture.dtype} {picture.shape}"
                 )
-        self._stencils = Stencils(dict(pictures))
-        self._pen = Pen(self._stencils, 1.0)
+        self._stencils = Stencils(dict(pictures), 1.0)
         self._layout: tuple[object, Layout] | None = None
         self._patches: dict[str, tuple[object, Patch]] = {}
 
@@ -62,44 +63,44 @@ class Compositor:
         if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
             raise FrameError(f"frame must be uint8 (H, W, 3), got {frame.dtype} {frame.shape}")
         layout = self.layout(state, frame.shape[1], frame.shape[0])
+        contents = _contents(state, layout)
         out = np.array(frame, dtype=np.uint8, order="C", copy=True)
-        if self._pen.unit != layout.unit:
-            self._pen = Pen(self._stencils, layout.unit)
-        pen = self._pen
-        for name, rect in layout.panels().items():
-            key, draw = _part(name, rect, state, layout)
-            patch = self._patch(name, (layout.unit, rect.width, rect.height, key), draw, pen)
+        for name, rect in layout.panels.items():
+            draw, *what = contents[name]
+            patch = self._patch(name, draw, Rect(0, 0, rect.width, rect.height), *what)
             if name == "message" and state.message is not None and state.message.opacity < 1.0:
                 patch = patch.faded(state.message.opacity)
             patch.lay_over(out, rect.x, rect.y)
-        if state.minimap is not None and layout.minimap is not None:
-            for mark in marks(layout.minimap, state.minimap, layout.unit):
-                stamp = self._stamp(mark.kind, mark.step, pen)
+        if state.minimap is not None:
+            for mark in maps.marks(layout.panels["minimap"], state.minimap, self._stencils.unit):
+                stamp = self._patch(f"{mark.kind} {mark.step}", maps.draw_mark, mark.kind, mark.step)
                 stamp.lay_over(out, mark.x, mark.y)
         return out
 
     def layout(self, state: HudState, width: int, height: int) -> Layout:
-        """Where the panels of `state` go in a frame of this size.
+        """Where the panels of `state` go in a frame of `width` x `height` px.
 
         Raises:
             FrameError: The frame is too small.
         """
+        unit = unit_of(width, height)
+        if self._stencils.unit != unit:
+            self._stencils = Stencils(self._stencils.pictures, unit)
+            self._patches.clear()
         key = (width, height, _without_what_moves(state))
         if self._layout is None or self._layout[0] != key:
-            self._layout = (key, arrange(key[2], width, height, self._stencils.face))
+            self._layout = (key, arrange(key[2], width, height, self._stencils.type))
         found = self._layout[1]
         if state.pointer is None:
             return found
-        return dataclasses.replace(found, pointer=pointer_rect(state.pointer.angle, found.free, found.unit))
+        pointer = pointer_rect(state.pointer.angle, found.free, round(POINTER * unit))
+        return dataclasses.replace(found, panels={**found.panels, "pointer": pointer})
 
-    def _stamp(self, kind: Kind, step: int, pen: Pen) -> Patch:
-        return self._patch(f"{kind} {step}", pen.unit, lambda pen: draw_mark(pen, kind, step), pen)
-
-    def _patch(self, name: str, key: object, draw: Callable[[Pen], Patch], pen: Pen) -> Patch:
+    def _patch(self, name: str, draw: Draw, *what: object) -> Patch:
+        """What `draw` makes of `what`; the one drawn last under this name if it is the same."""
         known = self._patches.get(name)
-        if known is None or known[0] != key:
-            known = (key, draw(pen))
-            self._patches[name] = known
+        if known is None or known[0] != what:
+            known = self._patches[name] = (what, draw(self._stencils, *what))
         return known[1]
 
 
@@ -119,44 +120,44 @@ def compose(frame: NDArray[np.uint8], state: HudState, pictures: Pictures) -> ND
 
 def _without_what_moves(state: HudState) -> HudState:
     """The state less what changes from frame to frame without moving a panel."""
-    shown = state.message is not None and state.message.opacity > 0.0
+    message = state.message
+    if message is not None:
+        message = dataclasses.replace(message, opacity=1.0) if message.opacity > 0.0 else None
     return dataclasses.replace(
         state,
         markers=(),
         clock=None if state.clock is None else 0.0,
         delivered=0,
-        message=dataclasses.replace(state.message, opacity=1.0)
-        if state.message is not None and shown
-        else None,
+        message=message,
         pointer=None,
         minimap=None if state.minimap is None else MiniMap("", state.minimap.bounds, (0.0, 0.0), 0.0),
     )
 
 
-def _part(name: str, rect: Rect, state: HudState, layout: Layout) -> tuple[object, Callable[[Pen], Patch]]:
-    """What the panel `name` depends on, and how to draw it."""
-    if name == "checklist":
-        items = state.checklist[layout.first : layout.stop]
-        hidden = (layout.first, len(state.checklist) - layout.stop)
-        args = (state.checklist_title, items, layout.rows, hidden, checklist.count_text(state.checklist))
-        return args, lambda pen: checklist.draw_checklist(pen, rect, *args)
-    if name == "bins":
-        shown, more = state.bins[: len(layout.bin_rows)], len(state.bins) - len(layout.bin_rows)
-        return (shown, more), lambda pen: panels.draw_bins(pen, rect, shown, layout.bin_rows, more)
-    if name == "inventory":
-        return state.inventory, lambda pen: panels.draw_inventory(pen, rect, state.inventory)
-    if name == "message" and (message := state.message) is not None:
-        lines = layout.message_lines
-        return (message.kind, lines), lambda pen: panels.draw_message(pen, rect, message, lines)
-    if name == "progress":
-        counts = (state.delivered, state.total)
-        return counts, lambda pen: panels.draw_progress(pen, rect, *counts)
-    if name == "minimap" and (minimap := state.minimap) is not None:
-        base = (minimap.picture, minimap.bounds)
-        return base, lambda pen: draw_base(pen, rect, *base)
-    if name == "clock" and state.clock is not None:
-        text = panels.clock_text(state.clock)
-        return text, lambda pen: panels.draw_clock(pen, rect, text)
-    angle = 0.0 if state.pointer is None else state.pointer.angle
-    step = round(angle / (2.0 * math.pi) * POINTER_STEPS) % POINTER_STEPS
-    return step, lambda pen: panels.draw_pointer(pen, rect, 2.0 * math.pi * step / POINTER_STEPS)
+def _contents(state: HudState, layout: Layout) -> dict[str, tuple[Any, ...]]:
+    """By panel: the function that draws it, and what it takes besides stencils and rectangle."""
+    hidden = (layout.first, len(state.checklist) - layout.stop)
+    header = (state.checklist_title, count_text(state.checklist))
+    bins = state.bins[: len(layout.bin_rows)]
+    found: dict[str, tuple[Any, ...]] = {
+        "progress": (panels.draw_progress, state.delivered, state.total),
+        "checklist": (
+            draw_checklist,
+            header,
+            state.checklist[layout.first : layout.stop],
+            layout.rows,
+            hidden,
+        ),
+        "bins": (panels.draw_bins, bins, layout.bin_rows, len(state.bins) - len(bins)),
+        "inventory": (panels.draw_inventory, state.inventory),
+    }
+    if state.message is not None:
+        found["message"] = (panels.draw_message, state.message.kind, layout.message_lines)
+    if state.clock is not None:
+        found["clock"] = (panels.draw_clock, panels.clock_text(state.clock))
+    if state.minimap is not None:
+        found["minimap"] = (maps.draw_base, state.minimap.picture, state.minimap.bounds)
+    if state.pointer is not None:
+        step = round(state.pointer.angle / (2.0 * math.pi) * panels.POINTER_STEPS) % panels.POINTER_STEPS
+        found["pointer"] = (panels.draw_pointer, step)
+    return found

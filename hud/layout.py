@@ -7,53 +7,51 @@ task list                            bins
 """
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from hud import theme
 from hud.canvas import Rect
 from hud.errors import FrameError
-from hud.measure import Measure
-from hud.rows import CHIP_HEIGHT, CHIP_WIDTH, POINTER, SMALLEST, BinRow, ListRow
-from hud.state import HudState
+from hud.state import BinEntry, ChecklistItem, HudState, Message, MiniMap
 from hud.text import Typeface
+
+CONTEXT = 2  # rows above the current one that stay in sight
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of a list: its height, px, the px that its text may take, and its detail, broken into lines."""
+
+    height: int
+    text_width: int
+    detail: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Rectangles of the panels in a frame, and what fits into them.
+    """Rectangles of the panels in a frame, px, and what fits into them.
 
     Attributes:
-        unit: Frame px per theme px.
-        checklist: Task list, or None when it is empty.
-        first: Index of the first row shown.
-        stop: One past the last row shown.
-        rows: Those rows.
-        message_lines: The message, broken into lines.
-        bin_rows: One per bin that is shown.
+        panels: Those that are shown, by name, in the order in which they are drawn.
         free: The part of the view between the panels.
+        first: Index of the first row of the task list that is shown.
+        rows: The rows of the task list that are shown.
+        bin_rows: The rows of the list of bins that are shown, from the first one on.
+        message_lines: The message, broken into lines.
     """
 
-    width: int
-    height: int
-    unit: float
-    progress: Rect | None
-    clock: Rect | None
-    message: Rect | None
-    checklist: Rect | None
-    bins: Rect | None
-    inventory: Rect
-    pointer: Rect | None
+    panels: Mapping[str, Rect]
     free: Rect
     first: int
-    stop: int
-    rows: tuple[ListRow, ...]
+    rows: tuple[Row, ...]
+    bin_rows: tuple[Row, ...]
     message_lines: tuple[str, ...]
-    bin_rows: tuple[BinRow, ...]
-    minimap: Rect | None = None
 
-    def panels(self) -> dict[str, Rect]:
-        """Rectangles of the panels that are shown, by name."""
-        names = ("progress", "clock", "message", "checklist", "bins", "inventory", "minimap", "pointer")
-        return {name: rect for name in names if (rect := getattr(self, name)) is not None}
+    @property
+    def stop(self) -> int:
+        """One past the index of the last row of the task list that is shown."""
+        return self.first + len(self.rows)
 
 
 def unit_of(width: int, height: int) -> float:
@@ -62,66 +60,193 @@ def unit_of(width: int, height: int) -> float:
     Raises:
         FrameError: The frame is too small to be read.
     """
-    if width < SMALLEST[0] or height < SMALLEST[1]:
+    smallest = theme.MIN_FRAME
+    if width < smallest[0] or height < smallest[1]:
         raise FrameError(
-            f"frame of {width} x {height} px is too small for the HUD; use {SMALLEST[0]} x {SMALLEST[1]}"
+            f"frame of {width} x {height} px is too small for the HUD; use {smallest[0]} x {smallest[1]}"
         )
     return min(width / 640.0, height / 480.0)
 
 
-def arrange(state: HudState, width: int, height: int, face: Typeface) -> Layout:
-    """Lay out the panels of `state` in a frame of `width` x `height` px.
+def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Layout:
+    """Lay out the panels of `state`, without its pointer.
 
-    Raises:
-        FrameError: The frame is too small to be read.
+    Args:
+        state: What is shown.
+        width: Of the frame, px.
+        height: Of the frame, px.
+        typeface: Of the frame's scale.
     """
-    unit = unit_of(width, height)
-    panels = Measure(width, height, unit, face)
-    checklist, first, rows = panels.checklist(state)
-    minimap = panels.minimap(state.minimap)
-    bins, bin_rows = panels.bins(state, minimap)
-    progress = Rect(panels.margin, panels.margin, panels.px(CHIP_WIDTH), panels.px(CHIP_HEIGHT))
-    clock = Rect(
-        width - panels.margin - panels.px(CHIP_WIDTH), panels.margin, progress.width, progress.height
-    )
-    inventory = panels.inventory()
-    message, lines = panels.message(state.message)
-    free = panels.free(inventory)
-    return Layout(
-        width=width,
-        height=height,
-        unit=unit,
-        progress=progress if state.total > 0 else None,
-        clock=clock if state.clock is not None else None,
-        message=message,
-        checklist=checklist,
-        bins=bins,
-        inventory=inventory,
-        pointer=None if state.pointer is None else pointer_rect(state.pointer.angle, free, unit),
-        free=free,
-        first=first,
-        stop=first + len(rows),
-        rows=rows,
-        message_lines=lines,
-        bin_rows=bin_rows,
-        minimap=minimap,
-    )
+    grid = _Grid(width, height, typeface)
+    checklist, first, rows = grid.checklist(state.checklist)
+    minimap = grid.minimap(state.minimap)
+    bins, bin_rows = grid.bins(state.bins, minimap)
+    message, lines = grid.message(state.message)
+    inventory = grid.inventory()
+    wanted = {
+        "progress": grid.chip(grid.margin) if state.total > 0 else None,
+        "clock": grid.chip(width - grid.margin - grid.chip_width) if state.clock is not None else None,
+        "message": message,
+        "checklist": checklist,
+        "bins": bins,
+        "inventory": inventory,
+        "minimap": minimap,
+    }
+    panels = {name: rect for name, rect in wanted.items() if rect is not None}
+    return Layout(panels, grid.free(inventory), first, rows, bin_rows, lines)
 
 
-def pointer_rect(angle: float, free: Rect, unit: float) -> Rect:
-    """A square at the edge of the free view in direction `angle`, rad, counter-clockwise from the right."""
-    side = round(POINTER * unit)
+def pointer_rect(angle: float, free: Rect, side: int) -> Rect:
+    """A square of `side` px at the edge of the free view in a direction, rad, counter-clockwise from the right."""
     half_width, half_height = (free.width - side) / 2.0, (free.height - side) / 2.0
     dx, dy = math.cos(angle), -math.sin(angle)
     reach = min(
         half_width / abs(dx) if abs(dx) > 1e-9 else math.inf,
         half_height / abs(dy) if abs(dy) > 1e-9 else math.inf,
     )
-    x = free.x + half_width + reach * dx
-    y = free.y + half_height + reach * dy
-    return Rect(
-        min(max(round(x), free.x), free.right - side),
-        min(max(round(y), free.y), free.bottom - side),
-        side,
-        side,
-    )
+    x, y = round(free.x + half_width + reach * dx), round(free.y + half_height + reach * dy)
+    return Rect(min(max(x, free.x), free.right - side), min(max(y, free.y), free.bottom - side), side, side)
+
+
+def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, int]:
+    """Which rows of a list to show: the current one, up to two before it, and as many after it as fit.
+
+    Args:
+        heights: Height of each row, px.
+        current: Index of the current row; it is shown even when it is higher than `room`.
+        room: Height that there is, px.
+
+    Returns:
+        First row, and one past the last; neither neighbour would still fit.
+    """
+    first, stop, used = current, current + 1, heights[current]
+    while first > max(0, current - CONTEXT) and used + heights[first - 1] <= room // 2:
+        first -= 1
+        used += heights[first]
+    while stop < len(heights) and used + heights[stop] <= room:
+        used += heights[stop]
+        stop += 1
+    while first > 0 and used + heights[first - 1] <= room:
+        first -= 1
+        used += heights[first]
+    return first, stop
+
+
+def _current_row(items: Sequence[ChecklistItem]) -> int:
+    """Index of the row that must be visible: the current one, or the first, or the last when all are done."""
+    last = len(items) - 1 if items[-1].number is not None else 0
+    return next((i for i, item in enumerate(items) if item.current), last)
+
+
+class _Grid:
+    """Sizes of a frame's panels, px."""
+
+    def __init__(self, width: int, height: int, typeface: Typeface) -> None:
+        self._width, self._height = width, height
+        self._type, px = typeface, typeface.px
+        self._px = px
+        self.margin, self._gap = px(theme.MARGIN), px(theme.GAP)
+        self.chip_width, self._chip_height = px(theme.CHIP_WIDTH), px(theme.CHIP_HEIGHT)
+        wide = width / unit_of(width, height) >= 760
+        self._list_width = min(math.floor(theme.LIST_SHARE * width), px(theme.MAX_LIST_WIDTH))
+        self._bins_width = px(theme.BINS_WIDTH_WIDE if wide else theme.BINS_WIDTH)
+        self._bins_left = width - self.margin - self._bins_width
+        self._top = self.margin + self._chip_height + self._gap
+        self._column_height = height - px(theme.LIST_BOTTOM) - self._top
+        self._left = self.margin + self._list_width + self._gap  # of what is between the two lists
+        self._between = self._bins_left - self._gap - self._left
+
+    def chip(self, x: int) -> Rect:
+        """A small panel in an upper corner."""
+        return Rect(x, self.margin, self.chip_width, self._chip_height)
+
+    def checklist(self, items: tuple[ChecklistItem, ...]) -> tuple[Rect | None, int, tuple[Row, ...]]:
+        """Rectangle of the task list, its first row and the rows it shows; never more than fit."""
+        if not items:
+            return None, 0, ()
+        rows = tuple(self._list_row(item) for item in items)
+        heights = [row.height for row in rows]
+        fixed = self._px(theme.HEADER) + self._px(theme.PADDING)
+        if fixed + sum(heights) > self._column_height:
+            fixed += self._px(theme.FOOTER)
+        first, stop = visible_rows(heights, _current_row(items), self._column_height - fixed)
+        height = fixed + sum(heights[first:stop])
+        return Rect(self.margin, self._top, self._list_width, height), first, rows[first:stop]
+
+    def _list_row(self, item: ChecklistItem) -> Row:
+        """More lines of detail where one is too short for what is still to be done."""
+        taken = 2 * theme.PADDING + 2 + theme.TILE + theme.GAP + (0 if item.number is None else theme.NUMBER)
+        if item.target_picture is not None:
+            taken += theme.TARGET + 3
+        width = self._list_width - self._px(taken)
+        detail = self._type.paragraph(item.detail, theme.DETAIL, width, 1 if item.done else 3)
+        return Row(self._px(theme.ROW + theme.LINE * max(0, len(detail) - 1)), width, detail)
+
+    def minimap(self, minimap: MiniMap | None) -> Rect | None:
+        """As wide as the list of bins, in the lower right corner, in the proportions of the house."""
+        if minimap is None:
+            return None
+        inset = 2 * self._px(theme.MAP_INSET)
+        xmin, ymin, xmax, ymax = minimap.bounds
+        inner = round((self._bins_width - inset) * (ymax - ymin) / (xmax - xmin))
+        height = min(max(inner, 1), self._px(theme.MAX_MAP_HEIGHT)) + inset
+        return Rect(self._bins_left, self._height - self.margin - height, self._bins_width, height)
+
+    def bins(self, entries: tuple[BinEntry, ...], below: Rect | None) -> tuple[Rect | None, tuple[Row, ...]]:
+        """Rectangle of the list of bins and its rows; places get fewer lines when many bins must fit."""
+        if not entries:
+            return None, ()
+        px = self._px
+        room = self._column_height if below is None else below.y - self._gap - self._top
+        width = self._bins_width - px(2 * theme.PADDING + theme.TILE + theme.GAP)
+        fixed = px(theme.HEADER) + px(theme.PADDING)
+        rows: tuple[Row, ...] = ()
+        for lines in (3, 2, 1, 0):
+            places = [
+                self._type.paragraph(b.place, theme.DETAIL, width, lines) if lines else () for b in entries
+            ]
+            heights = [px(max(theme.TILE, theme.LINE * (1 + len(p))) + theme.GAP) for p in places]
+            rows = tuple(Row(height, width, place) for height, place in zip(heights, places, strict=True))
+            if fixed + sum(heights) <= room:
+                break
+        while len(rows) > 1 and fixed + sum(row.height for row in rows) > room:
+            rows = rows[:-1]
+        height = fixed + sum(row.height for row in rows)
+        return Rect(self._bins_left, self._top, self._bins_width, height), rows
+
+    def inventory(self) -> Rect:
+        """Two slots at the bottom, apart from each other and centred in the frame."""
+        px = self._px
+        width = min(2 * px(theme.SLOT_WIDTH) + px(theme.BETWEEN_HANDS), self._between)
+        height = px(theme.SLOT_HEIGHT)
+        return Rect(
+            self._centred(width, self._left, self._between),
+            self._height - self.margin - height,
+            width,
+            height,
+        )
+
+    def message(self, message: Message | None) -> tuple[Rect | None, tuple[str, ...]]:
+        """One line between the chips when the text fits there, else up to three lines between the lists."""
+        if message is None or message.opacity <= 0.0 or not message.text.strip():
+            return None, ()
+        face, extra = theme.BAR, self._px(theme.MESSAGE_ICON + 2 * theme.PADDING)
+        left = self.margin + self.chip_width + self._gap
+        span = self._width - 2 * left
+        line = self._type.fit(message.text, face, span - extra)
+        lines: tuple[str, ...] = (line,)
+        if line != " ".join(message.text.split()):
+            left, span = self._left, self._between
+            lines = self._type.wrap(message.text, face, span - extra, theme.MESSAGE_LINES)
+        width = min(span, extra + max(self._type.width(text, face) for text in lines))
+        height = self._chip_height + (len(lines) - 1) * self._px(theme.LINE + 3)
+        return Rect(self._centred(width, left, span), self.margin, width, height), lines
+
+    def free(self, inventory: Rect) -> Rect:
+        """The view between the lists, below the tallest message and above the inventory."""
+        top = self._top + (theme.MESSAGE_LINES - 1) * self._px(theme.LINE + 3)
+        return Rect(self._left, top, self._between, inventory.y - self._gap - top)
+
+    def _centred(self, width: int, left: int, span: int) -> int:
+        """First column of something `width` wide: as near to the middle of the frame as `span` px from `left` allow."""
+        return min(max((self._width - width) // 2, left), left + span - width)

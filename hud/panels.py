@@ -1,103 +1,108 @@
-"""Drawing of the panels that say little at a time: values in, a patch out. The task list is in `hud.checklist`."""
+"""Drawing of the small panels: values in, a patch out. The task list is in `hud.checklist`."""
 
 import math
 
 from hud import theme
 from hud.canvas import Canvas, Patch, Rect
-from hud.pen import Pen
-from hud.rows import EMPTY_WIDTH, GAP, HEADER, LINE, PADDING, SLOT_WIDTH, SLOT_WIDTH_LONG, TILE, BinRow
-from hud.state import BinEntry, InventorySlot, Message, MessageKind
+from hud.layout import Row
+from hud.state import BinEntry, InventorySlot, MessageKind
+from hud.stencils import Stencils
 from hud.text import ELLIPSIS
+
+POINTER_STEPS = 72  # drawn directions of the pointer, 5 degrees apart
 
 
 def draw_bins(
-    pen: Pen, rect: Rect, bins: tuple[BinEntry, ...], rows: tuple[BinRow, ...], hidden: int
+    stencils: Stencils, rect: Rect, bins: tuple[BinEntry, ...], rows: tuple[Row, ...], hidden: int
 ) -> Patch:
-    """The list of bins: picture, name and place."""
-    canvas = pen.panel(rect)
+    """The list of bins: picture, name and place; how many are hidden stands beside the title."""
+    canvas = Canvas.panel(stencils, rect)
     px = canvas.px
-    x = px(PADDING + 2)
+    x = px(theme.PADDING + 2)
     canvas.text(x, px(17), f"Bins (+{hidden})" if hidden else "Bins", theme.TITLE, theme.TEXT)
-    top = px(HEADER)
-    text_x = x + px(TILE + GAP)
+    top = px(theme.HEADER)
+    text_x = x + px(theme.TILE + theme.GAP)
     for entry, row in zip(bins, rows, strict=False):
-        pen.tile(canvas, entry.picture, x, top + px(1), px(TILE))
-        width = rect.width - text_x - px(PADDING)
-        lift = 0 if row.place else px(5)
+        canvas.tile(entry.picture, x, top + px(1), px(theme.TILE))
+        width = rect.width - text_x - px(theme.PADDING)
+        lift = 0 if row.detail else px(5)
         face = theme.LABEL
-        if canvas.text_width(entry.label, face) > width:
+        if canvas.type.width(entry.label, face) > width:
             face = theme.Face(face.size - 1, face.weight)
-        canvas.text(text_x, top + px(11) + lift, canvas.fit(entry.label, face, width), face, theme.TEXT)
-        for i, line in enumerate(row.place):
-            canvas.text(text_x, top + px(11 + LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
+        canvas.text(text_x, top + px(11) + lift, canvas.type.fit(entry.label, face, width), face, theme.TEXT)
+        for i, line in enumerate(row.detail):
+            canvas.text(text_x, top + px(11 + theme.LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
         top += row.height
     return canvas.patch()
 
 
-def draw_inventory(pen: Pen, rect: Rect, slots: tuple[InventorySlot, InventorySlot]) -> Patch:
+def draw_inventory(stencils: Stencils, rect: Rect, slots: tuple[InventorySlot, InventorySlot]) -> Patch:
     """Two hands, at the left and the right end: a picture and a name each, or a word that it is empty."""
-    canvas = pen.canvas(rect.width, rect.height)
+    canvas = Canvas(stencils, rect.width, rect.height)
     for slot, hand, at_the_left in zip(slots, ("Left hand", "Right hand"), (True, False), strict=True):
-        _hand(pen, canvas, slot, hand, at_the_left)
+        _draw_hand(canvas, slot, hand, at_the_left)
     return canvas.patch()
 
 
-def _hand(pen: Pen, canvas: Canvas, slot: InventorySlot, hand: str, at_the_left: bool) -> None:
+def _draw_hand(canvas: Canvas, slot: InventorySlot, hand: str, at_the_left: bool) -> None:
     px = canvas.px
     held = slot.label is not None
     side = canvas.height - 2 * px(5)
-    inset = px(5) + side + px(GAP) if held else px(PADDING + 1)
+    inset = px(5) + side + px(theme.GAP) if held else px(theme.PADDING + 1)
     face, colour = (theme.LABEL, theme.TEXT) if held else (theme.DETAIL, theme.QUIET)
     lines: tuple[str, ...] = ()
     # A long name gets a wider slot at the cost of the view between the hands.
-    for size in (SLOT_WIDTH, SLOT_WIDTH_LONG) if held else (EMPTY_WIDTH,):
-        width = min(px(size), (canvas.width - px(GAP)) // 2)
-        room = width - px(PADDING) - inset
-        lines = (hand, "empty") if slot.label is None else canvas.wrap(slot.label, face, room, 2)
+    for size in (theme.SLOT_WIDTH, theme.SLOT_WIDTH_LONG) if held else (theme.SLOT_WIDTH_EMPTY,):
+        width = min(px(size), (canvas.width - px(theme.GAP)) // 2)
+        room = width - px(theme.PADDING) - inset
+        lines = (hand, "empty") if slot.label is None else canvas.type.wrap(slot.label, face, room, 2)
         if not any(line.endswith(ELLIPSIS) for line in lines):
             break
     left = 0 if at_the_left else canvas.width - width
     area = Rect(left, 0, width, canvas.height)
-    canvas.rounded(area, 8.0 * pen.unit, theme.PANEL, theme.PANEL_OPACITY)
+    canvas.rounded(area, 8.0 * canvas.unit, theme.PANEL, theme.PANEL_OPACITY)
     edge, opacity = (theme.ACCENT, 0.9) if held else (theme.EDGE, theme.EDGE_OPACITY)
-    canvas.rounded(area, 8.0 * pen.unit, edge, opacity, line=max(1.0, pen.unit * (1.5 if held else 1.0)))
+    canvas.rounded(
+        area, 8.0 * canvas.unit, edge, opacity, line=max(1.0, canvas.unit * (1.5 if held else 1.0))
+    )
     if held:
-        pen.tile(canvas, slot.picture, left + px(5), px(5), side)
-    first = canvas.height // 2 + px(4.5) - px(LINE) * (len(lines) - 1) // 2
+        canvas.tile(slot.picture, left + px(5), px(5), side)
+    first = canvas.height // 2 + px(4.5) - px(theme.LINE) * (len(lines) - 1) // 2
     for number, line in enumerate(lines):
-        canvas.text(left + inset, first + number * px(LINE), canvas.fit(line, face, room), face, colour)
+        canvas.text(
+            left + inset, first + number * px(theme.LINE), canvas.type.fit(line, face, room), face, colour
+        )
 
 
-def draw_message(pen: Pen, rect: Rect, message: Message, lines: tuple[str, ...]) -> Patch:
+def draw_message(stencils: Stencils, rect: Rect, kind: MessageKind, lines: tuple[str, ...]) -> Patch:
     """The message bar at full opacity: a symbol in the colour of its tone, and the text."""
-    canvas = pen.panel(rect)
+    canvas = Canvas.panel(stencils, rect)
     px = canvas.px
-    tone = theme.TONES[message.kind]
-    cx, cy, r = px(PADDING) + px(10), rect.height / 2.0, 9.0 * pen.unit
+    tone = theme.TONES[kind]
+    cx, cy, r = px(theme.PADDING) + px(10), rect.height / 2.0, 9.0 * canvas.unit
     canvas.circle(cx, cy, r, tone)
-    stroke = max(1.0, 1.8 * pen.unit)
-    u = pen.unit
-    if message.kind is MessageKind.SUCCESS:
+    u, stroke = canvas.unit, max(1.0, 1.8 * canvas.unit)
+    if kind is MessageKind.SUCCESS:
         canvas.shape(
             [(cx - 4 * u, cy), (cx - u, cy + 3.5 * u), (cx + 4.5 * u, cy - 3.5 * u)], theme.TEXT, stroke
         )
-    elif message.kind is MessageKind.REFUSAL:
+    elif kind is MessageKind.REFUSAL:
         canvas.shape([(cx, cy - 5 * u), (cx, cy + 1 * u)], theme.TEXT, stroke * 1.2)
         canvas.circle(cx, cy + 4.5 * u, 1.4 * u, theme.TEXT)
     else:
         canvas.shape([(cx, cy - 1 * u), (cx, cy + 5 * u)], theme.PANEL, stroke * 1.2)
         canvas.circle(cx, cy - 4.5 * u, 1.4 * u, theme.PANEL)
     for i, line in enumerate(lines):
-        canvas.text(px(PADDING + 26), px(19) + i * px(LINE + 3), line, theme.BAR, theme.TEXT)
+        canvas.text(px(theme.PADDING + 26), px(19) + i * px(theme.LINE + 3), line, theme.BAR, theme.TEXT)
     return canvas.patch()
 
 
-def draw_progress(pen: Pen, rect: Rect, delivered: int, total: int) -> Patch:
+def draw_progress(stencils: Stencils, rect: Rect, delivered: int, total: int) -> Patch:
     """How many objects are where they belong, as a number and as a bar."""
-    canvas = pen.panel(rect)
+    canvas = Canvas.panel(stencils, rect)
     px = canvas.px
-    text = canvas.fit(f"{delivered} / {total}", theme.CHIP, rect.width - px(8))
-    canvas.text((rect.width - canvas.text_width(text, theme.CHIP)) // 2, px(17), text, theme.CHIP, theme.TEXT)
+    text = canvas.type.fit(f"{delivered} / {total}", theme.CHIP, rect.width - px(8))
+    canvas.text((rect.width - canvas.type.width(text, theme.CHIP)) // 2, px(17), text, theme.CHIP, theme.TEXT)
     track = Rect(px(10), rect.height - px(7), rect.width - 2 * px(10), max(2, px(3)))
     canvas.rounded(track, track.height / 2, theme.EDGE, 0.25)
     done = round(track.width * min(delivered, total) / max(total, 1))
@@ -114,11 +119,11 @@ def clock_text(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
 
 
-def draw_clock(pen: Pen, rect: Rect, text: str) -> Patch:
+def draw_clock(stencils: Stencils, rect: Rect, text: str) -> Patch:
     """Elapsed time beside a small dial."""
-    canvas = pen.panel(rect)
-    px, u = canvas.px, pen.unit
-    width = canvas.text_width(text, theme.CHIP)
+    canvas = Canvas.panel(stencils, rect)
+    px, u = canvas.px, canvas.unit
+    width = canvas.type.width(text, theme.CHIP)
     x = (rect.width - width - px(18)) // 2
     cx, cy = x + 6.5 * u, rect.height / 2.0
     canvas.circle(cx, cy, 6.5 * u, theme.QUIET)
@@ -128,15 +133,12 @@ def draw_clock(pen: Pen, rect: Rect, text: str) -> Patch:
     return canvas.patch()
 
 
-def draw_pointer(pen: Pen, rect: Rect, angle: float) -> Patch:
-    """A disc with an arrow in direction `angle`, rad, counter-clockwise from the right."""
-    canvas = pen.canvas(rect.width, rect.height)
-    centre, u = rect.width / 2.0, pen.unit
+def draw_pointer(stencils: Stencils, rect: Rect, step: int) -> Patch:
+    """A disc with an arrow; `step` of `POINTER_STEPS` directions, counter-clockwise from the right."""
+    canvas = Canvas(stencils, rect.width, rect.height)
+    centre, u = rect.width / 2.0, canvas.unit
     canvas.circle(centre, centre, 16.5 * u, theme.TEXT, 0.9)
     canvas.circle(centre, centre, 15.0 * u, theme.PANEL, 0.9)
-    c, s = math.cos(angle), -math.sin(angle)
     outline = ((11.0, 0.0), (-5.0, -8.0), (-2.0, 0.0), (-5.0, 8.0))
-    canvas.shape(
-        [(centre + u * (a * c - b * s), centre + u * (a * s + b * c)) for a, b in outline], theme.ACCENT
-    )
+    canvas.arrow(centre, 2.0 * math.pi * step / POINTER_STEPS, outline, u, theme.ACCENT)
     return canvas.patch()

@@ -115,17 +115,17 @@ class MiniMap:
         bounds: xmin, ymin, xmax, ymax, m.
         position: Where the person stands, m.
         heading: Where the person looks, rad, 0 along +x, counter-clockwise.
-        way: Points along the way to the goal, m.
-        things: Places that stand out, m.
-        goal: Where the way ends, m, or None.
+        path: Points along the path to the goal, m.
+        objects: Floor positions of the objects that have a flagpole, m.
+        goal: Where the path ends, m, or None.
     """
 
     picture: str
     bounds: tuple[float, float, float, float]
     position: Vec2
     heading: float
-    way: tuple[Vec2, ...] = ()
-    things: tuple[Vec2, ...] = ()
+    path: tuple[Vec2, ...] = ()
+    objects: tuple[Vec2, ...] = ()
     goal: Vec2 | None = None
 
 

@@ -1,7 +1,7 @@
-"""What panels are drawn with, made once and kept: outlines, lines of text, pictures, panel backgrounds.
+"""What panels are drawn with: coverage of text and shapes, and pictures in their size.
 
-Drawing the same things again is most of the work of a HUD. Everything here depends on its arguments alone, so that
-keeping it changes no pixel; each kind is kept in a table of limited size.
+Making them is most of the work of drawing a panel, so they are kept, in tables of limited size. Everything here
+depends on its arguments alone, so keeping it changes no pixel.
 """
 
 import functools
@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hud.text import Typeface
+from hud.theme import Face
 
 Floats = NDArray[np.float32]
 Pictures = Mapping[str, NDArray[np.uint8]]
 
 
 class Stencil(NamedTuple):
-    """Coverage 0..1, shape (h, w), and the column and row of its upper left corner, px, relative to an origin."""
+    """Coverage 0 to 1, shape (h, w), and the column and row of its upper left corner, px, relative to an origin."""
 
     mask: Floats
     x: int
@@ -28,30 +29,30 @@ class Stencil(NamedTuple):
 
 
 class Scaled(NamedTuple):
-    """A picture in its size: colours times opacity, 0..1, shape (3, s, s), and opacity, 0..1, shape (s, s)."""
+    """A picture in its size: colours times opacity, 0 to 1, shape (3, s, s), and opacity, 0 to 1, shape (s, s)."""
 
     colours: Floats
     opacity: Floats
 
 
 class Stencils:
-    """A typeface, pictures, and what was made of them so far.
+    """Text and pictures at one scale.
 
     Args:
         pictures: RGBA pictures, uint8 (s, s, 4), straight alpha, by key. Must not change.
+        unit: Frame px per theme px.
     """
 
-    def __init__(self, pictures: Pictures) -> None:
-        self.face = Typeface()
+    def __init__(self, pictures: Pictures, unit: float) -> None:
         self.pictures = pictures
+        self.unit = unit
+        self.type = Typeface(unit)
         self.text = functools.lru_cache(512)(self._text)
         self.scaled = functools.lru_cache(128)(self._scaled)
-        self.rounded = functools.lru_cache(64)(rounded)
-        self.disc = functools.lru_cache(64)(disc)
 
-    def _text(self, text: str, size: int, weight: int) -> Stencil:
+    def _text(self, text: str, face: Face) -> Stencil:
         """A line of text; the origin is where its baseline begins."""
-        mask, baseline = self.face.stamp(text, size, weight)
+        mask, baseline = self.type.rasterise(text, face)
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         if not len(rows):
             return Stencil(np.zeros((0, 0), np.float32), 0, 0)
@@ -71,6 +72,7 @@ class Stencils:
         return Scaled(np.ascontiguousarray(planes[:3]), np.ascontiguousarray(planes[3]))
 
 
+@functools.lru_cache(64)
 def rounded(width: int, height: int, radius: float, line: float) -> Floats:
     """Coverage (height, width) of a rounded rectangle, or with `line` > 0 of its outline of that width, px."""
     ys, xs = np.mgrid[0:height, 0:width].astype(np.float32) + np.float32(0.5)
@@ -83,6 +85,7 @@ def rounded(width: int, height: int, radius: float, line: float) -> Floats:
     return np.asarray(mask, dtype=np.float32)
 
 
+@functools.lru_cache(64)
 def disc(x: float, y: float, radius: float) -> Stencil:
     """A smooth-edged disc with its middle at column `x`, row `y`, px."""
     left, top, side = math.floor(x - radius) - 1, math.floor(y - radius) - 1, math.ceil(2 * radius) + 3

@@ -22,7 +22,7 @@ QUIET: Final[Rgb] = (216, 222, 230)
 DONE: Final[Rgb] = (206, 211, 218)
 ACCENT: Final[Rgb] = (240, 228, 66)
 PROGRESS: Final[Rgb] = (86, 180, 233)
-TILE: Final[Rgb] = (232, 236, 241)
+TILE_COLOUR: Final[Rgb] = (232, 236, 241)
 
 TONES: Final = MappingProxyType(
     {
@@ -48,3 +48,41 @@ DETAIL: Final = Face(12, 400)
 LABEL: Final = Face(12, 600)
 BAR: Final = Face(14, 500)
 CHIP: Final = Face(14, 600)
+
+MIN_FRAME: Final = (320, 240)  # px; text in smaller frames cannot be read
+
+MARGIN: Final = 8  # between the panels and the edge of the frame
+GAP: Final = 6
+PADDING: Final = 6
+PANEL_RADIUS: Final = 8.0
+LINE: Final = 14  # height of a line of text
+TILE: Final = 24  # side of a picture
+
+CHIP_HEIGHT: Final = 28
+CHIP_WIDTH: Final = 76
+
+LIST_SHARE: Final = 0.3  # of the frame's width
+MAX_LIST_WIDTH: Final = 230
+LIST_BOTTOM: Final = 64  # kept free below the lists, so that objects at the feet are seen
+HEADER: Final = 24
+FOOTER: Final = 17
+ROW: Final = 32
+NUMBER: Final = 19
+TARGET: Final = 20  # side of the picture of the receptacle
+
+BINS_WIDTH: Final = 148
+BINS_WIDTH_WIDE: Final = 164  # on frames that are wider than 4 : 3
+
+SLOT_WIDTH: Final = 118
+SLOT_WIDTH_LONG: Final = 133  # for names that would be cut
+SLOT_WIDTH_EMPTY: Final = (
+    86  # an empty hand takes less, so that objects at the feet are seen between the hands
+)
+SLOT_HEIGHT: Final = 40
+BETWEEN_HANDS: Final = 64
+
+MESSAGE_LINES: Final = 3
+MESSAGE_ICON: Final = 26
+POINTER: Final = 36
+MAP_INSET: Final = 4
+MAX_MAP_HEIGHT: Final = 150  # leaves the bins room in a house that is deeper than wide

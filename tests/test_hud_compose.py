@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hud import checklist, markers, minimap, sample, theme
+from hud import markers, minimap, sample, theme
 from hud.canvas import Canvas, Rect
 from hud.compose import Compositor, compose
 from hud.conditions import condition
@@ -16,6 +16,7 @@ from hud.errors import FrameError
 from hud.messages import message
 from hud.panels import clock_text
 from hud.state import ChecklistItem, HudState, InventorySlot, Marker, Message, MessageKind, Pointer
+from hud.stencils import Stencils
 from mjsim.model.catalogue import Catalogue
 
 SIZES = ((640, 480), (1280, 720), (1920, 1080))
@@ -67,24 +68,28 @@ def test_what_a_compositor_drew_before_does_not_matter() -> None:
                 assert np.array_equal(kept.compose(frame, state), compose(frame, state, pictures))
 
 
-def test_a_step_forward_draws_no_more_rows_than_it_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[str] = []
-    row = checklist._row
+def test_a_panel_is_drawn_again_only_when_it_says_something_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Rect] = []
+    panel = Canvas.panel
 
-    def spy(*args: object, item: ChecklistItem, **rest: object) -> None:
-        drawn.append(item.text)
-        row(*args, item=item, **rest)  # type: ignore[arg-type]
+    def spy(stencils: Stencils, rect: Rect) -> Canvas:
+        drawn.append(rect)
+        return panel(stencils, rect)
 
-    monkeypatch.setattr(checklist, "_row", spy)
+    monkeypatch.setattr(Canvas, "panel", spy)
     kept = Compositor(sample.pictures())
     frame = sample.backdrop(640, 480)
-    for steps in range(20, 24):
+    kept.compose(frame, optimal(24, 20))
+    panels = kept.layout(optimal(24, 20), 640, 480).panels
+    changes: tuple[tuple[dict[str, Any], list[str]], ...] = (
+        ({}, []),
+        ({"clock": 500.0}, ["clock"]),
+        ({"clock": 500.0, "delivered": 3}, ["progress"]),
+    )
+    for change, expected in changes:
         drawn.clear()
-        kept.compose(frame, optimal(24, steps))
-    assert 2 <= len(drawn) <= 4, "the step done, the next one, and those that came into sight"
-    drawn.clear()
-    kept.compose(frame, dataclasses.replace(optimal(24, 23), clock=500.0))
-    assert not drawn
+        kept.compose(frame, dataclasses.replace(optimal(24, 20), **change))
+        assert [(r.width, r.height) for r in drawn] == [(panels[n].width, panels[n].height) for n in expected]
 
 
 PARTS = {
@@ -194,11 +199,11 @@ PAIRS = {
     "breadcrumb, pin at the goal": (byte(markers.RED), byte(markers.SKY)),
     "flag, its lower band": (byte(markers.YELLOW), byte(markers.NAVY)),
     "bands of a pole": (byte(markers.WHITE), byte(markers.NAVY)),
-    "map: way, goal": (minimap.WAY, minimap.GOAL),
-    "map: thing, its rim": (minimap.THING, theme.PANEL),
+    "map: path, goal": (minimap.PATH, minimap.GOAL),
+    "map: object, its rim": (minimap.OBJECT, theme.PANEL),
     "map: goal, its rim": (minimap.GOAL, theme.PANEL),
     "map: person, its rim": (theme.ACCENT, theme.PANEL),
-    "map: person, way": (theme.ACCENT, minimap.WAY),
+    "map: person, path": (theme.ACCENT, minimap.PATH),
     "current step, panel": (theme.ACCENT, theme.PANEL),
     "progress, panel": (theme.PROGRESS, theme.PANEL),
 }
@@ -218,8 +223,7 @@ def test_tones_differ_by_more_than_their_colour() -> None:
     shapes = []
     for kind in MessageKind:
         state = dataclasses.replace(optimal(), message=Message("Same text", kind))
-        rect = Compositor({}).layout(state, 640, 480).message
-        assert rect is not None
+        rect = Compositor({}).layout(state, 640, 480).panels["message"]
         patch = compose(frame, state, {})[rect.y : rect.bottom, rect.x : rect.x + 32].astype(np.float64)
         tone = np.array(theme.TONES[kind], dtype=np.float64)
         shapes.append(np.abs(patch - tone).max(axis=2) < 12)
@@ -258,8 +262,7 @@ def test_a_message_fades_towards_the_frame() -> None:
         )
         for o in (1.0, 0.5, 0.0)
     ]
-    rect = Compositor({}).layout(optimal(), 640, 480).message
-    assert rect is not None
+    rect = Compositor({}).layout(optimal(), 640, 480).panels["message"]
     area = np.s_[rect.y : rect.bottom, rect.x : rect.right]
     assert np.array_equal(drawn[2][area], frame[area])
     assert np.abs(drawn[1][area] - (drawn[0][area] + frame[area]) / 2).max() <= 3
@@ -271,8 +274,7 @@ def test_pictures_appear_where_the_row_is() -> None:
     row = ChecklistItem("x", "x", picture="object:a")
     state = HudState("", (row,), (), (InventorySlot(), InventorySlot()))
     drawn = compose(plain((640, 480), 0), state, {"object:a": solid})
-    rect = Compositor({}).layout(state, 640, 480).checklist
-    assert rect is not None
+    rect = Compositor({}).layout(state, 640, 480).panels["checklist"]
     ys, xs = np.nonzero((drawn == (255, 0, 255)).all(axis=2))
     assert len(ys) > 300
     assert rect.x <= xs.min() and xs.max() < rect.right and rect.y <= ys.min() and ys.max() < rect.bottom
@@ -301,8 +303,7 @@ def test_names_of_what_the_hands_hold_are_never_cut(
 @pytest.mark.parametrize("angle", [0.0, 1.5707963, 3.1415926, -1.5707963])
 def test_the_pointer_sits_at_the_edge_it_points_to(angle: float) -> None:
     layout = Compositor({}).layout(dataclasses.replace(optimal(), pointer=Pointer(angle)), 640, 480)
-    free, rect = layout.free, layout.pointer
-    assert rect is not None
+    free, rect = layout.free, layout.panels["pointer"]
     middle: Rect = free
     dx = rect.x + rect.width / 2 - (middle.x + middle.width / 2)
     dy = rect.y + rect.height / 2 - (middle.y + middle.height / 2)

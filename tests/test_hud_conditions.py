@@ -289,10 +289,10 @@ def test_the_map_tells_no_more_than_the_condition(base: str) -> None:
     assert found is not None
     assert (found.bounds, found.position, found.heading) == (view.bounds, view.position, view.heading)
     loose = {o.position[:2] for o in view.objects if o.status == "loose"}
-    assert set(found.things) == (loose if base == "highlight" else set())
-    assert len(found.things) == len(set(found.things))
+    assert set(found.objects) == (loose if base == "highlight" else set())
+    assert len(found.objects) == len(set(found.objects))
     crumbs = [m.position[:2] for m in state.markers if m.role == "breadcrumb"]
-    assert list(found.way) == crumbs and (len(crumbs) > 0) is (base == "optimal")
+    assert list(found.path) == crumbs and (len(crumbs) > 0) is (base == "optimal")
     assert found.goal == (view.goal[:2] if base == "optimal" and view.goal else None)
 
 

@@ -14,9 +14,8 @@ from hud.canvas import Rect
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.errors import FrameError
-from hud.layout import Layout
+from hud.layout import Layout, unit_of, visible_rows
 from hud.messages import TEXTS, message
-from hud.rows import window
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, MiniMap, Pointer
 from hud.task import Alternative
 from hud.text import Typeface
@@ -92,7 +91,7 @@ def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(
     state: HudState, size: tuple[int, int]
 ) -> None:
     found = layout(state, size)
-    panels = found.panels()
+    panels = found.panels
     for name, rect in panels.items():
         assert rect.x >= 0 and rect.y >= 0 and rect.right <= size[0] and rect.bottom <= size[1], name
         assert rect.width > 0 and rect.height > 0, name
@@ -132,19 +131,16 @@ def test_the_current_row_is_shown_and_texts_stay_in_their_rows(
     state: HudState, size: tuple[int, int]
 ) -> None:
     found = layout(state, size)
-    face = Typeface()
-    detail = max(1, round(theme.DETAIL.size * found.unit))
+    typeface = Typeface(unit_of(*size))
     current = [i for i, item in enumerate(state.checklist) if item.current]
     assert all(found.first <= i < found.stop for i in current)
     assert len(found.rows) == found.stop - found.first
-    assert (found.checklist is None) is (not state.checklist)
+    assert ("checklist" not in found.panels) is (not state.checklist)
     for row in found.rows:
         for line in row.detail:
-            assert face.width(line, detail, theme.DETAIL.weight) <= row.text_width
-    if found.message is not None:
-        size_px = max(1, round(theme.BAR.size * found.unit))
-        for line in found.message_lines:
-            assert face.width(line, size_px, theme.BAR.weight) <= found.message.width
+            assert typeface.width(line, theme.DETAIL) <= row.text_width
+    for line in found.message_lines:
+        assert typeface.width(line, theme.BAR) <= found.panels["message"].width
 
 
 @settings(max_examples=25, deadline=None)
@@ -153,7 +149,7 @@ def test_every_state_can_be_drawn_and_changes_only_its_panels(state: HudState, s
     frame = sample.backdrop(*size)
     compositor = Compositor(sample.pictures(48))
     outside = np.ones(frame.shape[:2], dtype=bool)
-    for rect in compositor.layout(state, *size).panels().values():
+    for rect in compositor.layout(state, *size).panels.values():
         outside[rect.y : rect.bottom, rect.x : rect.right] = False
     drawn = compositor.compose(frame, state)
     assert np.array_equal(drawn[outside], frame[outside])
@@ -163,7 +159,7 @@ def test_every_state_can_be_drawn_and_changes_only_its_panels(state: HudState, s
 def test_a_window_holds_the_current_row_and_wastes_no_room(heights: list[int], data: st.DataObject) -> None:
     current = data.draw(st.integers(0, len(heights) - 1))
     room = data.draw(st.integers(40, 400))
-    first, stop = window(heights, current, room)
+    first, stop = visible_rows(heights, current, room)
     used = sum(heights[first:stop])
     assert 0 <= first <= current < stop <= len(heights)
     assert used <= room
@@ -184,7 +180,7 @@ def test_a_plan_of_48_steps_is_windowed_around_the_current_step() -> None:
 def test_the_view_stays_mostly_free_at_the_hardest_level(size: tuple[int, int], share: float) -> None:
     for name in ("none", "highlight", "optimal"):
         view = sample.task(24, steps=21, message=message("hands_full"))
-        covered = sum(r.width * r.height for r in layout(condition(name)(view), size).panels().values())
+        covered = sum(r.width * r.height for r in layout(condition(name)(view), size).panels.values())
         assert covered <= share * size[0] * size[1]
 
 
@@ -206,11 +202,7 @@ def test_messages_are_never_cut(key: str, size: tuple[int, int]) -> None:
 def test_places_and_details_of_the_sample_are_never_cut(size: tuple[int, int]) -> None:
     for name in ("none", "highlight", "optimal"):
         found = layout(condition(name)(sample.task(24, steps=9)), size)
-        lines = [
-            line
-            for row in (*found.rows, *found.bin_rows)
-            for line in getattr(row, "detail", getattr(row, "place", ()))
-        ]
+        lines = [line for row in (*found.rows, *found.bin_rows) for line in row.detail]
         assert lines and not any("…" in line for line in lines)
 
 

@@ -19,8 +19,8 @@ def apply(view: TaskView, state: HudState) -> HudState:
         bounds=view.bounds,
         position=view.position,
         heading=view.heading,
-        way=_places(state, "breadcrumb"),
-        things=tuple(flagpoles(state).values()),
+        path=_places(state, "breadcrumb"),
+        objects=tuple(flagpoles(state).values()),
         goal=goals[0] if goals else None,
     )
     return dataclasses.replace(state, minimap=minimap)
