@@ -1,23 +1,27 @@
 """Where a person can stand: free space outside the obstacles inflated by the person's radius.
 
-The exact free space is a set of polygons, one per island, in order of decreasing area; it answers every
-question. The grid is its raster, for pictures and cross-checks.
+An occupancy grid answers first. A cell that lies wholly on one island, or wholly off all of them, decides for
+all of its points; in a cell that an outline crosses, the exact polygons do.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from shapely.geometry import MultiPoint, MultiPolygon, Polygon
+from scipy.ndimage import label
+from shapely.geometry import MultiPolygon, Polygon
 
 from planner.errors import NavMeshError, NotNavigableError
+from planner.grid import Frame, crossed_cells
 
 TOLERANCE = 1e-4  # depth in m that may be cut off an inflated obstacle; far below what matters to a walker
 SNAP_CLEARANCE = 1e-6  # m; keeps a snapped point off the boundary in spite of rounding
 ARC_SEGMENTS = 8  # per quarter circle: paths 0.01 % longer or shorter than around true circles
+BLOCKED, MIXED = -1, -2  # cells that lie on no island, and cells that an outline crosses
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,21 +34,20 @@ class NavMesh:
     Attributes:
         bounds: (x_min, y_min, x_max, y_max), m.
         agent_radius: By how much obstacles are inflated, m.
-        resolution: Size of a grid cell, m.
+        frame: Where the grid's cells lie.
         islands: Connected polygons of free space, largest first.
         solid: Inflated obstacles, shrunk by `TOLERANCE`: what a path may not touch.
-        grid: Island of each cell's centre, -1 where it is not navigable, shape (rows, columns) int32; the
-            centre of row r, column c is (x_min + (c + 0.5) resolution, y_min + (r + 0.5) resolution).
+        cells: Island on which a whole cell lies, `BLOCKED` or `MIXED`, shape (rows, columns) int32.
     """
 
     bounds: tuple[float, float, float, float]
     agent_radius: float
-    resolution: float
+    frame: Frame
     islands: tuple[Polygon, ...]
     solid: MultiPolygon
-    grid: NDArray[np.int32]
-    _loose: NDArray[np.object_] = field(repr=False)
-    _snappable: NDArray[np.object_] = field(repr=False)
+    cells: NDArray[np.int32]
+    _inner: NDArray[np.object_] = field(repr=False)  # islands less `SNAP_CLEARANCE`
+    _outer: NDArray[np.object_] = field(repr=False)  # islands and their tolerance
 
     @classmethod
     def build(
@@ -72,37 +75,30 @@ class NavMesh:
             raise NavMeshError(f"agent_radius must be >= 0 m, got {agent_radius}")
         if not (math.isfinite(resolution) and resolution > 0):
             raise NavMeshError(f"resolution must be > 0 m, got {resolution}")
-        hulls = [_hull(k, points) for k, points in enumerate(obstacles)]
-        inflated = shapely.unary_union(shapely.buffer(hulls, agent_radius, quad_segs=ARC_SEGMENTS))
-        pieces = [p for p in shapely.get_parts(box.difference(inflated)) if isinstance(p, Polygon)]
-        snappable = [(p, shapely.buffer(p, -SNAP_CLEARANCE, join_style="mitre")) for p in pieces]
-        kept = sorted(((p, s) for p, s in snappable if s.area > 0), key=lambda pair: -pair[0].area)
-        if not kept:
+        inflated = shapely.unary_union(
+            shapely.buffer(_hulls(obstacles), agent_radius, quad_segs=ARC_SEGMENTS)
+        )
+        islands = np.array(sorted(_polygons(box.difference(inflated)), key=lambda p: -p.area), dtype=object)
+        inner = shapely.buffer(islands, -SNAP_CLEARANCE, join_style="mitre")
+        islands, inner = (polygons[shapely.area(inner) > 0] for polygons in (islands, inner))
+        if not len(islands):
             raise NotNavigableError(
-                f"{len(hulls)} obstacles inflated by {agent_radius} m leave nothing navigable in "
+                f"{len(obstacles)} obstacles inflated by {agent_radius} m leave nothing navigable in "
                 f"{box.bounds}; give wider bounds or a smaller agent_radius"
             )
-        islands = tuple(p for p, _ in kept)
-        loose = np.array(
-            [shapely.buffer(p, 0.5 * TOLERANCE, join_style="mitre") for p in islands], dtype=object
-        )
-        shapely.prepare(loose)
-        solid = MultiPolygon(
-            [
-                p
-                for p in shapely.get_parts(shapely.buffer(inflated, -TOLERANCE, join_style="mitre"))
-                if isinstance(p, Polygon) and not p.is_empty
-            ]
-        )
+        outer = shapely.buffer(islands, 0.5 * TOLERANCE, join_style="mitre")
+        shapely.prepare(islands)
+        shapely.prepare(outer)
+        frame = Frame.covering(box.bounds, resolution)
         return cls(
             bounds=box.bounds,
             agent_radius=float(agent_radius),
-            resolution=float(resolution),
-            islands=islands,
-            solid=solid,
-            grid=_raster(loose, box.bounds, resolution),
-            _loose=loose,
-            _snappable=np.array([s for _, s in kept], dtype=object),
+            frame=frame,
+            islands=tuple(islands),
+            solid=MultiPolygon(_polygons(shapely.buffer(inflated, -TOLERANCE, join_style="mitre"))),
+            cells=_cells(frame, islands, outer),
+            _inner=inner,
+            _outer=outer,
         )
 
     @property
@@ -110,11 +106,27 @@ class NavMesh:
         """Area of the largest island, m²."""
         return float(self.islands[0].area)
 
+    @cached_property
+    def topdown_map(self) -> NDArray[np.int32]:
+        """The floor from above: island of each cell's centre, 0 for the largest, -1 where nobody can stand.
+
+        Shape (rows, columns), read-only. Row r, column c is about the point (x_min + (c + 0.5) resolution,
+        y_min + (r + 0.5) resolution), so row 0 is at the smallest y: draw it with the origin at the lower left.
+        `frame` holds these numbers, and all centres as `frame.centres()`.
+        """
+        islands = self.cells.copy()
+        mixed = self.cells == MIXED
+        islands[mixed] = _islands_at(self._outer, self.frame.centres()[mixed])
+        islands.setflags(write=False)
+        return islands
+
     def island_of(self, point: ArrayLike) -> int | None:
         """Index into `islands` of the island that holds a point (2,), m; None if it is not navigable."""
         x, y = _point(point)
-        hits = np.flatnonzero(shapely.intersects_xy(self._loose, x, y))
-        return int(hits[0]) if hits.size else None
+        island = self._cell(x, y)
+        if island == MIXED:
+            island = int(_islands_at(self._outer, np.array([[x, y]]))[0])
+        return None if island == BLOCKED else island
 
     def is_navigable(self, point: ArrayLike) -> bool:
         """Whether a person can stand at a point (2,), m, on any island."""
@@ -135,9 +147,10 @@ class NavMesh:
             NotNavigableError: The island is farther away than `max_distance`.
         """
         x, y = _point(point)
-        if shapely.intersects_xy(self._loose[island], x, y):
+        cell = self._cell(x, y)
+        if cell == island or (cell == MIXED and shapely.intersects_xy(self._outer[island], x, y)):
             return np.array([x, y])
-        line = shapely.shortest_line(self._snappable[island], shapely.Point(x, y))
+        line = shapely.shortest_line(self._inner[island], shapely.Point(x, y))
         nearest = np.asarray(line.coords[0], dtype=np.float64)
         gap = math.hypot(nearest[0] - x, nearest[1] - y)
         if gap > max_distance:
@@ -147,26 +160,66 @@ class NavMesh:
             )
         return nearest
 
-    def sample(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """A point drawn uniformly from the largest island, (2,), m."""
-        x_min, y_min, x_max, y_max = self.islands[0].bounds
-        shapely.prepare(self.islands[0])
-        while True:  # rejection: ends, as the island has an area
-            point = rng.uniform((x_min, y_min), (x_max, y_max))
-            if shapely.contains_xy(self.islands[0], point[0], point[1]):
-                return point
+    def sample(self, rng: np.random.Generator, count: int | None = None) -> NDArray[np.float64]:
+        """Points drawn uniformly from the largest island, m: (2,), or (count, 2) as `count` calls would draw."""
+        island = self.islands[0]
+        x_min, y_min, x_max, y_max = island.bounds
+        drawn = [np.empty((0, 2))]
+        missing = 1 if count is None else count
+        while missing:  # rejection: ends, as the island has an area
+            points = rng.uniform((x_min, y_min), (x_max, y_max), (missing, 2))
+            columns, rows = self.frame.columns_rows(points)
+            cells = self.cells[rows, columns]
+            inside, mixed = cells == 0, cells == MIXED
+            inside[mixed] = shapely.contains_xy(island, points[mixed])
+            drawn.append(points[inside])
+            missing -= len(drawn[-1])
+        points = np.concatenate(drawn)
+        return points[0] if count is None else points
 
     def outline(self) -> NDArray[np.float64]:
         """Edges of the navigable floor: x, y of one end and of the other, m, shape (e, 4).
 
         A point is navigable if a ray from it crosses an odd number of them.
         """
-        rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(self._loose)]
-        return np.ascontiguousarray(np.concatenate([np.hstack([r[:-1], r[1:]]) for r in rings]))
+        return _outline(self._outer)
 
-    def cell_centres(self) -> NDArray[np.float64]:
-        """Centres of the grid's cells, (rows, columns, 2), m."""
-        return _centres(self.bounds, self.resolution)
+    def _cell(self, x: float, y: float) -> int:
+        """Entry of `cells` for a point, m; that of the nearest cell outside the grid."""
+        x_min, y_min, size, rows, columns = self.frame
+        row, column = int((y - y_min) / size), int((x - x_min) / size)
+        return int(self.cells[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)])
+
+
+def _cells(frame: Frame, islands: NDArray[np.object_], outer: NDArray[np.object_]) -> NDArray[np.int32]:
+    """`NavMesh.cells`: cells next to each other that no outline crosses are all alike."""
+    crossed, _ = crossed_cells(frame, np.concatenate([_outline(islands), _outline(outer)]))
+    mixed = np.zeros((frame.rows, frame.columns), dtype=np.bool_)
+    mixed.ravel()[crossed] = True
+    components, _ = label(~mixed)
+    _, first = np.unique(components, return_index=True)
+    islands_of_components = _islands_at(outer, frame.centres().reshape(-1, 2)[first])
+    cells: NDArray[np.int32] = islands_of_components[components]
+    cells[mixed] = MIXED
+    cells.setflags(write=False)
+    return cells
+
+
+def _islands_at(outer: NDArray[np.object_], points: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Island of each point (m, 2), m, by the exact polygons; `BLOCKED` where there is none."""
+    found = np.full(len(points), BLOCKED, dtype=np.int32)
+    for index in reversed(range(len(outer))):
+        found[shapely.intersects_xy(outer[index], points)] = index
+    return found
+
+
+def _outline(polygons: NDArray[np.object_]) -> NDArray[np.float64]:
+    rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(polygons)]
+    return np.ascontiguousarray(np.concatenate([np.hstack([r[:-1], r[1:]]) for r in rings]))
+
+
+def _polygons(geometry: shapely.Geometry) -> list[Polygon]:
+    return [p for p in shapely.get_parts(geometry) if isinstance(p, Polygon) and not p.is_empty]
 
 
 def _point(point: ArrayLike) -> tuple[float, float]:
@@ -185,30 +238,13 @@ def _box(bounds: Sequence[float]) -> Polygon:
     return shapely.box(*b)
 
 
-def _hull(index: int, points: ArrayLike) -> shapely.Geometry:
-    array = np.asarray(points, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 2 or len(array) == 0 or not np.isfinite(array).all():
-        raise NavMeshError(
-            f"obstacle {index} must be finite vertices of shape (k, 2), got shape {array.shape}"
-        )
-    return MultiPoint(array).convex_hull
-
-
-def _centres(bounds: tuple[float, float, float, float], resolution: float) -> NDArray[np.float64]:
-    x_min, y_min, x_max, y_max = bounds
-    columns, rows = (max(1, math.ceil(side / resolution - 1e-9)) for side in (x_max - x_min, y_max - y_min))
-    x = x_min + (np.arange(columns) + 0.5) * resolution
-    y = y_min + (np.arange(rows) + 0.5) * resolution
-    return np.stack(np.meshgrid(x, y), axis=-1)
-
-
-def _raster(
-    islands: NDArray[np.object_], bounds: tuple[float, float, float, float], resolution: float
-) -> NDArray[np.int32]:
-    centres = _centres(bounds, resolution)
-    grid = np.full(centres.shape[:2], -1, dtype=np.int32)
-    for index in reversed(range(len(islands))):
-        inside = shapely.intersects_xy(islands[index], centres[..., 0], centres[..., 1])
-        grid[inside] = index
-    grid.setflags(write=False)
-    return grid
+def _hulls(obstacles: Sequence[ArrayLike]) -> NDArray[np.object_]:
+    arrays = [np.asarray(points, dtype=np.float64) for points in obstacles]
+    for index, array in enumerate(arrays):
+        if array.ndim != 2 or array.shape[1] != 2 or len(array) == 0 or not np.isfinite(array).all():
+            raise NavMeshError(
+                f"obstacle {index} must be finite vertices of shape (k, 2), got shape {array.shape}"
+            )
+    owners = np.repeat(np.arange(len(arrays)), [len(array) for array in arrays])
+    points = shapely.points(np.concatenate([np.empty((0, 2)), *arrays]))
+    return np.asarray(shapely.convex_hull(shapely.multipoints(points, indices=owners)), dtype=object)

@@ -1,4 +1,4 @@
-"""Visibility graph over the reflex vertices of free space, and the kernels that test visibility.
+"""Visibility graph over the reflex vertices of free space: the exact part of a shortest-path search.
 
 A shortest path among polygons bends only at reflex vertices of free space and is tangent to the obstacle at
 each, so only tangent sight lines are edges (de Berg et al., Computational Geometry, chapter 15).
@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 from shapely.geometry.polygon import orient
 
 from mjsim.kernels import kernel
+from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
 
 
@@ -23,13 +24,13 @@ class VisibilityGraph:
     Attributes:
         vertices: Reflex vertices, (v, 6): x, y, then the ring's previous and next vertex, m.
         island: Island of each vertex, (v,) int64.
-        walls: Edges of the solid obstacles, (w, 4): x, y of one end and of the other, m.
+        walls: Edges of the solid obstacles.
         indptr, indices, weights: Rows of the vertex-vertex graph, as in a `csr_array`; weights in m.
     """
 
     vertices: NDArray[np.float64]
     island: NDArray[np.int64]
-    walls: NDArray[np.float64]
+    walls: SegmentGrid
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
     weights: NDArray[np.float64]
@@ -40,7 +41,7 @@ class VisibilityGraph:
         found = [_reflex_vertices(island) for island in navmesh.islands]
         vertices = np.concatenate([np.empty((0, 6)), *found])
         island = np.repeat(np.arange(len(found)), [len(f) for f in found])
-        walls = _edges(navmesh.solid)
+        walls = SegmentGrid.build(navmesh.frame, _edges(navmesh.solid))
         rows, columns = vertex_pairs(vertices, island, walls, TOLERANCE)
         weights = np.hypot(*(vertices[rows, :2] - vertices[columns, :2]).T)
         count = len(vertices)
@@ -82,27 +83,6 @@ def _edges(geometry: shapely.Geometry) -> NDArray[np.float64]:
 
 
 @kernel
-def is_visible(ax: float, ay: float, bx: float, by: float, walls: NDArray[np.float64]) -> bool:
-    """Whether the closed segment from a to b touches no wall."""
-    x0, x1 = min(ax, bx), max(ax, bx)
-    y0, y1 = min(ay, by), max(ay, by)
-    for k in range(walls.shape[0]):
-        cx, cy, dx, dy = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3]
-        if max(cx, dx) < x0 or min(cx, dx) > x1 or max(cy, dy) < y0 or min(cy, dy) > y1:
-            continue
-        side_c = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        side_d = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
-        if (side_c > 0.0 and side_d > 0.0) or (side_c < 0.0 and side_d < 0.0):
-            continue
-        side_a = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
-        side_b = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
-        if (side_a > 0.0 and side_b > 0.0) or (side_a < 0.0 and side_b < 0.0):
-            continue
-        return False
-    return True
-
-
-@kernel
 def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) -> bool:
     """Whether a line from (x, y) passes a vertex with both of the vertex's neighbours on one side."""
     ux, uy = vertex[0] - x, vertex[1] - y
@@ -115,7 +95,7 @@ def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) ->
 
 @kernel
 def vertex_pairs(
-    vertices: NDArray[np.float64], island: NDArray[np.int64], walls: NDArray[np.float64], slack: float
+    vertices: NDArray[np.float64], island: NDArray[np.int64], walls: SegmentGrid, slack: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs i < j of vertices that see each other along a line tangent at both."""
     rows, columns = [0], [0]
@@ -138,7 +118,7 @@ def point_vertices(
     point_island: NDArray[np.int64],
     vertices: NDArray[np.float64],
     island: NDArray[np.int64],
-    walls: NDArray[np.float64],
+    walls: SegmentGrid,
     slack: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
     """For each point the vertices it sees along tangents: row starts, vertex indices, distances."""
@@ -159,7 +139,7 @@ def point_vertices(
 
 @kernel
 def direct_distances(
-    a: NDArray[np.float64], b: NDArray[np.float64], walls: NDArray[np.float64]
+    a: NDArray[np.float64], b: NDArray[np.float64], walls: SegmentGrid
 ) -> NDArray[np.float64]:
     """Straight distance from each a to each b, infinite where a wall is between, (len(a), len(b)), m."""
     result = np.full((a.shape[0], b.shape[0]), np.inf)

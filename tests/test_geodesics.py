@@ -61,8 +61,8 @@ def brute_force(field, radius, points):
 
 def grid_distance(mesh, a, b):
     """Shortest 8-connected path between cell centres, from a and b to the cells around them."""
-    centres, h = mesh.cell_centres(), mesh.resolution
-    index = np.arange(mesh.grid.size).reshape(mesh.grid.shape)
+    centres, h = mesh.frame.centres(), mesh.frame.resolution
+    index = np.arange(mesh.cells.size).reshape(mesh.cells.shape)
     solid = mesh.solid
     shapely.prepare(solid)
     pairs = [(index[:, :-1], index[:, 1:]), (index[:-1], index[1:])]
@@ -73,7 +73,7 @@ def grid_distance(mesh, a, b):
     for k in (len(nodes) - 2, len(nodes) - 1):
         near = np.flatnonzero(np.hypot(*(nodes[:-2] - nodes[k]).T) < 1.5 * h)
         rows, columns = np.r_[rows, near], np.r_[columns, np.full(len(near), k)]
-    usable = np.r_[mesh.grid.ravel() == 0, True, True]
+    usable = np.r_[mesh.topdown_map.ravel() == 0, True, True]
     keep = usable[rows] & usable[columns]
     rows, columns = rows[keep], columns[keep]
     keep = ~shapely.intersects(solid, shapely.linestrings(np.stack([nodes[rows], nodes[columns]], axis=1)))
@@ -128,6 +128,16 @@ def test_a_grid_search_brackets_the_exact_distance(seed):
     assert Geodesics(mesh).shortest_path(a, b).geodesic_distance <= grid + 1e-9
     roomy = Geodesics(wider).shortest_path(a, b)
     assert grid <= 1.0824 * roomy.geodesic_distance + 2 * h * len(roomy.points)
+
+
+def test_in_the_apartment_grid_paths_are_up_to_a_tenth_longer(navmesh):
+    geodesics = Geodesics(navmesh)
+    rng = np.random.default_rng(0)
+    for _ in range(8):
+        a, b = navmesh.sample(rng, 2)
+        exact, grid = geodesics.shortest_path(a, b).geodesic_distance, grid_distance(navmesh, a, b)
+        assert exact <= grid + 1e-9
+        assert grid <= 1.1 * exact
 
 
 @settings(max_examples=40, deadline=None)

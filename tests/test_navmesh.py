@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 import scipy.ndimage
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.errors import NavMeshError, NotNavigableError
-from planner.navmesh import NavMesh
+from planner.navmesh import BLOCKED, TOLERANCE, NavMesh
 
 RADIUS = 0.25
 coordinate = st.floats(0.0, 4.0, allow_nan=False)
@@ -52,7 +53,7 @@ def test_area_is_what_is_left_of_the_floor():
     mesh = NavMesh.build([box(1, 1, 2, 3)], BOUNDS, agent_radius=RADIUS)
     inflated = 1 * 2 + 2 * (1 + 2) * RADIUS + math.pi * RADIUS**2
     assert mesh.area == pytest.approx(16 - inflated, rel=1e-3)
-    assert (mesh.grid == 0).sum() * mesh.resolution**2 == pytest.approx(mesh.area, rel=0.01)
+    assert (mesh.topdown_map == 0).sum() * mesh.frame.resolution**2 == pytest.approx(mesh.area, rel=0.01)
 
 
 def test_order_of_an_obstacles_vertices_does_not_matter():
@@ -70,10 +71,10 @@ def test_a_closed_room_is_an_island_of_its_own():
     assert mesh.island_of((2.0, 2.0)) == 1
     assert mesh.island_of((1.0, 2.0)) is None
     assert mesh.area == mesh.islands[0].area > mesh.islands[1].area
-    labels, count = scipy.ndimage.label(mesh.grid >= 0)
+    labels, count = scipy.ndimage.label(mesh.topdown_map >= 0)
     assert count == 2
     for label in (1, 2):
-        assert len(set(mesh.grid[labels == label])) == 1
+        assert len(set(mesh.topdown_map[labels == label])) == 1
     # Snapping leads out of the closet to where people walk, unless that is asked for.
     out = mesh.snap((2.0, 2.0), max_distance=5.0)
     assert mesh.island_of(out) == 0
@@ -101,10 +102,48 @@ def test_nothing_navigable_is_nearer_than_the_snapped_point(field, point):
     mesh = NavMesh.build(field, BOUNDS, agent_radius=0.2, resolution=0.1)
     snapped = mesh.snap(point, max_distance=math.inf)
     assert mesh.island_of(snapped) == 0
-    centres = mesh.cell_centres()[mesh.grid == 0]
+    centres = mesh.frame.centres()[mesh.topdown_map == 0]
     if len(centres):
         nearest = np.hypot(*(centres - point).T).min()
         assert math.dist(snapped, point) <= nearest + 2e-4
+
+
+def island_by_polygons(mesh, points):
+    """Island of each point (m, 2) by distances to the polygons alone, and which points are too close to tell."""
+    gaps = shapely.distance(np.array(mesh.islands)[:, None], shapely.points(points)[None])
+    near = gaps < 0.5 * TOLERANCE
+    return np.where(near.any(axis=0), near.argmax(axis=0), -1), (abs(gaps - 0.5 * TOLERANCE) < 4e-5).any(
+        axis=0
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(field=fields, seed=st.integers(0, 2**32 - 1), resolution=st.sampled_from((0.03, 0.1, 0.45)))
+def test_the_grid_answers_as_the_polygons_do(field, seed, resolution):
+    mesh = NavMesh.build(field, BOUNDS, agent_radius=0.2, resolution=resolution)
+    rng = np.random.default_rng(seed)
+    corners = np.concatenate([shapely.get_coordinates(island) for island in mesh.islands])
+    edges = corners[rng.integers(len(corners), size=60)] + rng.normal(0, resolution / 20, (60, 2))
+    points = np.concatenate([rng.uniform(-0.5, 4.5, (60, 2)), edges])
+    expected, unclear = island_by_polygons(mesh, points)
+    for point, island in zip(points[~unclear], expected[~unclear], strict=True):
+        assert mesh.island_of(point) == (island if island >= 0 else None), point
+        if island >= 0:
+            assert np.array_equal(mesh.snap(point, island=island), point)
+    centres = mesh.frame.centres()
+    expected, unclear = island_by_polygons(mesh, centres.reshape(-1, 2))
+    assert np.array_equal(mesh.topdown_map.ravel()[~unclear], expected[~unclear])
+    cells = shapely.box(*(centres - resolution / 2).T, *(centres + resolution / 2).T).T
+    for index, island in enumerate(mesh.islands):
+        assert shapely.contains(island, cells[mesh.cells == index]).all()
+        assert not shapely.intersects(island, cells[mesh.cells == BLOCKED]).any()
+
+
+def test_many_samples_are_those_of_many_calls():
+    mesh = NavMesh.build([box(1, 1, 2, 3)], BOUNDS)
+    one, many = np.random.default_rng(0), np.random.default_rng(0)
+    assert np.array_equal([mesh.sample(one) for _ in range(50)], mesh.sample(many, 50))
+    assert one.random() == many.random()
 
 
 @settings(max_examples=60, deadline=None)

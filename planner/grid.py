@@ -1,0 +1,142 @@
+"""A grid over the floor, and which of its cells a line segment crosses."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.kernels import kernel
+
+MARGIN = 1e-3  # m; a segment is listed in cells that it misses by less, so that rounding never loses a touch
+
+
+class Frame(NamedTuple):
+    """Where a grid's cells lie: row r, column c spans x_min + [c, c + 1] resolution, y_min + [r, r + 1] resolution.
+
+    Attributes:
+        x_min, y_min: Corner of the first cell, m.
+        resolution: Size of a cell, m.
+        rows: Number of cells along y.
+        columns: Number of cells along x.
+    """
+
+    x_min: float
+    y_min: float
+    resolution: float
+    rows: int
+    columns: int
+
+    @classmethod
+    def covering(cls, bounds: tuple[float, float, float, float], resolution: float) -> "Frame":
+        """The frame that covers bounds (x_min, y_min, x_max, y_max), m."""
+        x_min, y_min, x_max, y_max = bounds
+        columns, rows = (
+            max(1, math.ceil(side / resolution - 1e-9)) for side in (x_max - x_min, y_max - y_min)
+        )
+        return cls(float(x_min), float(y_min), float(resolution), rows, columns)
+
+    def centres(self) -> NDArray[np.float64]:
+        """Centres of the cells, (rows, columns, 2), m."""
+        x = self.x_min + (np.arange(self.columns) + 0.5) * self.resolution
+        y = self.y_min + (np.arange(self.rows) + 0.5) * self.resolution
+        return np.stack(np.meshgrid(x, y), axis=-1)
+
+    def columns_rows(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Column and row of each point (m, 2), m, or of the nearest cell outside the grid, (2, m)."""
+        steps = (points - (self.x_min, self.y_min)) / self.resolution
+        cells: NDArray[np.int64] = np.clip(steps.astype(np.int64), 0, (self.columns - 1, self.rows - 1))
+        return cells.T
+
+
+class SegmentGrid(NamedTuple):
+    """Line segments, listed by the cells that they cross.
+
+    Attributes:
+        frame: The grid.
+        segments: x, y of one end and of the other, m, (s, 4).
+        starts: First entry of each cell in `listed`, row by row, (rows * columns + 1,).
+        listed: Numbers of the segments in each cell.
+    """
+
+    frame: Frame
+    segments: NDArray[np.float64]
+    starts: NDArray[np.int64]
+    listed: NDArray[np.int64]
+
+    @classmethod
+    def build(cls, frame: Frame, segments: NDArray[np.float64]) -> "SegmentGrid":
+        """List segments (s, 4), m, by cell."""
+        cells, numbers = crossed_cells(frame, segments)
+        starts = np.zeros(frame.rows * frame.columns + 1, np.int64)
+        np.cumsum(np.bincount(cells, minlength=len(starts) - 1), out=starts[1:])
+        return cls(frame, segments, starts, numbers[np.argsort(cells, kind="stable")])
+
+
+@kernel
+def row_span(ay: float, by: float, frame: Frame) -> tuple[int, int]:
+    """First and last row that a segment from y = a to y = b, m, comes near; the nearest row if it is outside."""
+    first = math.floor((min(ay, by) - MARGIN - frame.y_min) / frame.resolution)
+    last = math.floor((max(ay, by) + MARGIN - frame.y_min) / frame.resolution)
+    return min(max(int(first), 0), frame.rows - 1), min(max(int(last), 0), frame.rows - 1)
+
+
+@kernel
+def column_span(ax: float, ay: float, bx: float, by: float, row: int, frame: Frame) -> tuple[int, int]:
+    """First and last column that a segment from a to b, m, comes near in a row, the nearest if it is outside."""
+    low = frame.y_min + row * frame.resolution - MARGIN
+    high = low + frame.resolution + 2.0 * MARGIN
+    start, end = 0.0, 1.0
+    if ay != by:
+        s, t = (low - ay) / (by - ay), (high - ay) / (by - ay)
+        start, end = min(max(min(s, t), 0.0), 1.0), min(max(max(s, t), 0.0), 1.0)
+    x, z = ax + start * (bx - ax), ax + end * (bx - ax)
+    first = math.floor((min(x, z) - MARGIN - frame.x_min) / frame.resolution)
+    last = math.floor((max(x, z) + MARGIN - frame.x_min) / frame.resolution)
+    return min(max(int(first), 0), frame.columns - 1), min(max(int(last), 0), frame.columns - 1)
+
+
+@kernel
+def crossed_cells(frame: Frame, segments: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Cells within `MARGIN` of each segment (s, 4), m: cell numbers, row by row, and the segments' numbers."""
+    cells, numbers = [0], [0]
+    for k in range(len(segments)):
+        ax, ay, bx, by = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
+        first, last = row_span(ay, by, frame)
+        for row in range(first, last + 1):
+            left, right = column_span(ax, ay, bx, by, row, frame)
+            for column in range(left, right + 1):
+                cells.append(row * frame.columns + column)
+                numbers.append(k)
+    return np.array(cells[1:]), np.array(numbers[1:])
+
+
+@kernel
+def is_visible(ax: float, ay: float, bx: float, by: float, walls: SegmentGrid) -> bool:
+    """Whether the closed segment from a to b, m, both on the grid, touches no wall."""
+    frame = walls.frame
+    first, last = row_span(ay, by, frame)
+    for row in range(first, last + 1):
+        left, right = column_span(ax, ay, bx, by, row, frame)
+        start, end = walls.starts[row * frame.columns + left], walls.starts[row * frame.columns + right + 1]
+        for k in range(start, end):
+            if touch(ax, ay, bx, by, walls.segments[walls.listed[k]]):
+                return False
+    return True
+
+
+@kernel
+def touch(ax: float, ay: float, bx: float, by: float, wall: NDArray[np.float64]) -> bool:
+    """Whether the closed segment from a to b and a wall (4,) have a point in common."""
+    cx, cy, dx, dy = wall[0], wall[1], wall[2], wall[3]
+    if max(cx, dx) < min(ax, bx) or min(cx, dx) > max(ax, bx):
+        return False
+    if max(cy, dy) < min(ay, by) or min(cy, dy) > max(ay, by):
+        return False
+    side_c = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    side_d = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+    if (side_c > 0.0 and side_d > 0.0) or (side_c < 0.0 and side_d < 0.0):
+        return False
+    side_a = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
+    side_b = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+    return not ((side_a > 0.0 and side_b > 0.0) or (side_a < 0.0 and side_b < 0.0))
