@@ -1,4 +1,4 @@
-"""Many trials on all cores. Each finished trial is a run directory, so a killed batch goes on where it stopped."""
+"""Many trials on all cores. Each finished trial is a run directory, so a killed batch continues where it stopped."""
 
 import dataclasses
 import functools
@@ -24,22 +24,19 @@ from experiments.trial import TrialConfig, run_trial
 TRIALS = "trials"
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
 
-_Job = tuple[str, TrialConfig, Path]
-
 
 @dataclass(frozen=True)
 class BatchConfig:
     """A full factorial design.
 
     Attributes:
-        objects: Difficulties.
+        objects: Numbers of misplaced objects.
         assistance: Assistance conditions.
         seeds: Seeds.
-        user: Participant, or None for the one that makes the most of each condition.
-        house: House name, or path of a catalogue.
-        planner: Solver of the routing problem.
-        fidelity: How much of the world is physics.
-        regret: Judge every visit.
+        user, house, planner, fidelity, regret: As in `TrialConfig`, the same for all trials.
+
+    Raises:
+        ConfigError: A list is empty or names a value twice.
     """
 
     objects: Sequence[int]
@@ -60,23 +57,23 @@ class BatchConfig:
                 raise ConfigError(f"--{name} names a value twice: {list(values)}")
 
     def trials(self) -> Iterator[TrialConfig]:
-        """Every cell of the design, seeds innermost."""
+        """The trials of the design; the seed changes fastest."""
+        same = {n: getattr(self, n) for n in ("user", "house", "planner", "fidelity", "regret")}
         for objects, assistance, seed in itertools.product(self.objects, self.assistance, self.seeds):
-            yield TrialConfig(
-                objects=objects,
-                assistance=assistance,
-                seed=seed,
-                user=self.user,
-                house=self.house,
-                planner=self.planner,
-                fidelity=self.fidelity,
-                regret=self.regret,
-            )
+            yield TrialConfig(objects, assistance, seed, **same)
 
 
 @dataclass(frozen=True)
 class BatchProgress:
-    """How far a batch has got: trials done now and earlier, failed, and in all; the message of the latest failure."""
+    """Progress of a batch.
+
+    Attributes:
+        done: Trials done in this call.
+        resumed: Trials that an earlier call had done.
+        failed: Trials that failed in this call.
+        total: Trials of the design.
+        failure: What failed in the latest trial, or None.
+    """
 
     done: int
     resumed: int
@@ -86,14 +83,12 @@ class BatchProgress:
 
 
 def trial_name(config: TrialConfig) -> str:
-    """Folder name of a trial: unlike configurations of one batch have unlike names."""
-    user = config.user_name.replace(":", ".").replace("/", ".")
+    """Folder name of a trial; different configurations of one batch have different names."""
     house = Path(config.house).parent.name if "/" in config.house else config.house
-    assistance = config.assistance.replace(":", ".")
-    fidelity = "" if config.fidelity == TrialConfig.fidelity else f"-{config.fidelity}"
-    return (
-        f"{house}-{config.objects:02d}-{assistance}-{user}-{config.planner}{fidelity}-seed{config.seed:04d}"
-    )
+    parts = [house, f"{config.objects:02d}", config.assistance, config.user_name, config.planner]
+    if config.fidelity != TrialConfig.fidelity:
+        parts.append(config.fidelity)
+    return "-".join([*parts, f"seed{config.seed:04d}"]).replace(":", ".").replace("/", ".")
 
 
 def run_batch(
@@ -115,49 +110,46 @@ def run_batch(
         The metrics of every trial of the design that succeeded, in the design's order.
 
     Raises:
-        ConfigError: `workers` is not positive.
-        RecordError: A table cannot be written.
+        ConfigError: `workers` is below 1.
+        OSError: A table cannot be written.
     """
     if workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
-    trials = {trial_name(config): config for config in batch.trials()}
-    folder = out / TRIALS
-    folder.mkdir(parents=True, exist_ok=True)
-    missing = {
-        name: config for name, config in trials.items() if not (folder / name / records.METRICS).is_file()
-    }
-    progress = BatchProgress(done=0, resumed=len(trials) - len(missing), failed=0, total=len(trials))
+    folders = {out / TRIALS / trial_name(config): config for config in batch.trials()}
+    (out / TRIALS).mkdir(parents=True, exist_ok=True)
+    missing = [(path, config) for path, config in folders.items() if not _is_done(path)]
+    progress = BatchProgress(done=0, resumed=len(folders) - len(missing), failed=0, total=len(folders))
     on_progress(progress)
-    # Spawned, not forked: a forked GL or thread-pool state would not survive.
+    # Spawned, not forked: a forked GL context or thread pool does not work.
     pool = ProcessPoolExecutor(
         workers, mp_context=multiprocessing.get_context("spawn"), initializer=_start_worker
     )
     try:
-        jobs = ((name, config, folder / name) for name, config in missing.items())
-        for failure in _results(pool, jobs, workers):
-            if failure is None:
-                progress = dataclasses.replace(progress, done=progress.done + 1, failure=None)
-            else:
-                progress = dataclasses.replace(progress, failed=progress.failed + 1, failure=failure)
+        for failure in _results(pool, iter(missing), workers):
+            field = "done" if failure is None else "failed"
+            count = getattr(progress, field) + 1
+            progress = dataclasses.replace(progress, failure=failure, **{field: count})
             on_progress(progress)
     finally:
         pool.shutdown(cancel_futures=True)
-        rows = [
-            read_json(folder / n / records.METRICS)
-            for n in trials
-            if (folder / n / records.METRICS).is_file()
-        ]
+        rows = [read_json(path / records.METRICS) for path in folders if _is_done(path)]
         if rows:
             write_tables(out, rows)
     return rows
 
 
-def _results(pool: ProcessPoolExecutor, jobs: Iterator[_Job], workers: int) -> Iterator[str | None]:
+def _is_done(path: Path) -> bool:
+    return (path / records.METRICS).is_file()
+
+
+def _results(
+    pool: ProcessPoolExecutor, jobs: Iterator[tuple[Path, TrialConfig]], workers: int
+) -> Iterator[str | None]:
     """Submit a few trials at a time; yield None for each one that succeeds, else what went wrong."""
     running: dict[Future[str | None], str] = {}
     while True:
-        for name, config, out in itertools.islice(jobs, workers * QUEUED_PER_WORKER - len(running)):
-            running[pool.submit(_run, config, out)] = name
+        for path, config in itertools.islice(jobs, workers * QUEUED_PER_WORKER - len(running)):
+            running[pool.submit(_run, config, path)] = path.name
         if not running:
             return
         finished, _ = wait(running, return_when=FIRST_COMPLETED)
@@ -169,15 +161,15 @@ def _results(pool: ProcessPoolExecutor, jobs: Iterator[_Job], workers: int) -> I
 
 @functools.cache
 def _house(name: str) -> House:
-    """One house per process, however many trials it runs there."""
+    """Loaded once per process."""
     return House.load(name)
 
 
 def _run(config: TrialConfig, out: Path) -> str | None:
-    """Run a trial; None if it succeeds, else what went wrong, as text: not every exception survives pickling."""
+    """Run a trial; None if it succeeds, else the error as text, because not every exception can be pickled."""
     try:
         run_trial(config, out, topdown=False, house=_house(config.house))
-    except Exception as error:  # whatever goes wrong in one trial, the others go on
+    except Exception as error:  # an error in one trial must not stop the others
         return _failure(error)
     return None
 
@@ -187,7 +179,7 @@ def _failure(error: BaseException) -> str:
 
 
 def _start_worker() -> None:
-    """Leave Ctrl-C to the parent, and do not outlive it when it is killed."""
+    """Leave Ctrl-C to the parent process, and exit when it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:

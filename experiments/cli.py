@@ -14,27 +14,27 @@ DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
 
 A person walks through a disorganized apartment in first person, picks up misplaced objects, at most two at a time,
-and puts each into its bin, helped by a heads-up display that an optimal planner drives."""
+and puts each into its bin. A heads-up display, driven by an optimal planner, assists."""
 
 EPILOG = """\
 examples:
   mjsim run --objects 6 --assistance optimal --seed 0 --out runs/demo
-      film one assisted clean-up, with metrics, event log and floor plan beside it
+      film one assisted trial, with metrics, event log and floor plan
   mjsim batch --objects 6,12 --assistance none,highlight,optimal --seeds 0:10 --out runs/batch
-      run a factorial design on all cores; run it again to go on after an interruption
+      run a factorial design on all cores; the same command continues after an interruption
   mjsim house --objects 12 --seed 3 --out house.xml
-      write a disorganized house that stock MuJoCo loads
+      write a disorganized house as MJCF for stock MuJoCo
   mjsim plan problem.json
-      solve a pickup-and-delivery problem, proven optimal where that is possible
+      solve a pickup-and-delivery problem, with a proof of optimality where possible
   mjsim doctor
-      show versions and whether off-screen rendering works"""
+      show versions, and whether off-screen rendering works"""
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """The command line.
 
     Args:
-        command: Leave out all other commands: `mjsim plan` need not load the renderer to answer at once.
+        command: The only command to load, so that `mjsim plan` starts fast; None for all.
     """
     top = argparse.ArgumentParser(
         prog="mjsim",
@@ -67,14 +67,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def exit_code(error: Exception) -> int | None:
-    """The exit code of an error whose message says what to do; None for any other."""
-    # Loaded only now, as `mjsim plan` is to answer at once: importing mjsim loads Gymnasium.
+    """The exit code of an error whose message is enough for the user; None for a bug, which needs its traceback."""
+    # Imported only on errors, so that `mjsim plan` starts fast.
     from experiments.errors import ExperimentError
     from hud.errors import HudError
     from mjsim.errors import MjsimError, PhysicsError
     from planner.errors import PlannerError
 
-    if isinstance(error, PhysicsError):
+    if isinstance(error, PhysicsError | OSError):  # a full disk, or a folder that cannot be written
         return FAILED
     return USAGE_ERROR if isinstance(error, ExperimentError | MjsimError | PlannerError | HudError) else None
 

@@ -1,4 +1,4 @@
-"""The folder of a run: it appears whole or not at all."""
+"""The folder of a run: complete, or not there at all."""
 
 import shutil
 import tempfile
@@ -17,9 +17,9 @@ def is_run(directory: Path) -> bool:
 
 @contextmanager
 def run_directory(path: Path) -> Iterator[Path]:
-    """Yield a working folder that becomes `path` on success, in one rename.
+    """Yield a working folder that is renamed to `path` on success.
 
-    An earlier run at `path` is replaced; anything else there is left alone.
+    An earlier run at `path` is replaced; anything else there is never touched.
 
     Raises:
         RecordError: `path` exists and is not a run, so replacing it could destroy something.
@@ -40,12 +40,12 @@ def run_directory(path: Path) -> Iterator[Path]:
 
 
 def keep_failed(folder: Path, out: Path) -> Path:
-    """Keep the working folder of a run that failed, beside where the run was to be, as `<out>.failed`.
+    """Move the working folder of a failed run to `<out>.failed`.
 
-    An earlier one is replaced; anything else of that name is left alone, and the folder gets a number.
+    An earlier failed run there is replaced; if something else has that name, a number is added.
 
     Returns:
-        Where it is now.
+        The new path.
     """
     kept, number = out.with_name(f"{out.name}.failed"), 1
     while kept.exists() and not is_run(kept):

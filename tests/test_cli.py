@@ -72,6 +72,44 @@ def test_bad_input_is_named_in_one_line_and_leaves_nothing(arguments, fault, tmp
     assert not (tmp_path / "out").exists()
 
 
+def test_a_folder_that_cannot_be_written_is_named_in_one_line(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    out = tmp_path / "file" / "out"
+    assert main(["run", "--objects", "2", "--no-video", "--out", str(out)]) == 1
+    message = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message.startswith("mjsim: ") and str(tmp_path / "file") in message
+
+
+@pytest.mark.parametrize(
+    ("command", "defaults"),
+    [
+        (
+            "run",
+            [
+                "misplaced objects, 1 to 40 (default: 6)",
+                "(default: optimal)",
+                "frame size, px (default: 640x480)",
+            ],
+        ),
+        ("batch", ["(default: 0:10)", "(default: none,highlight,optimal)", "(default: apartment)"]),
+        (
+            "replay",
+            [
+                "(default: 0.0)",
+                "(default: first-person)",
+                "position of a free camera, m (default: it circles",
+            ],
+        ),
+    ],
+)
+def test_the_help_names_the_default_of_every_option(command, defaults, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert all(default in text for default in defaults)
+    assert "None" not in text and "False" not in text
+
+
 def test_a_house_for_stock_mujoco(tmp_path, capsys):
     assert main(["house", "--objects", "12", "--seed", "3", "--out", str(tmp_path / "house.xml")]) == 0
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "house.xml"))

@@ -17,59 +17,60 @@ from rich.progress import (
 
 from experiments.batch import BatchConfig, BatchProgress, run_batch
 from experiments.commands.options import (
-    add_fidelity,
-    add_house,
-    add_planner,
-    add_regret,
-    add_user,
+    add_command,
+    add_trial_options,
     assistance_help,
     int_list,
     text_list,
+    trial_options,
 )
 
 DESCRIPTION = """\
-Run every combination of --objects, --assistance and --seeds, without video, one process per core. Each trial is a run
-directory under OUT/trials; OUT/trials.parquet and OUT/trials.csv hold a row per trial. Finished trials are not
-run again: after an interruption, or to enlarge the design, give the command once more.
-
-Records are the same to the last bit whatever --workers is."""
+Run a trial for every combination of --objects, --assistance and --seeds, without video, one process per core. Each
+trial is a run directory under OUT/trials; OUT/trials.parquet and OUT/trials.csv hold one row per trial. Finished trials
+are not run again: give the command once more to continue after an interruption, or with more values to extend the
+design. The records do not depend on --workers."""
 
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
-    parser: argparse.ArgumentParser = commands.add_parser(
+    parser = add_command(
+        commands,
         "batch",
-        help="run a factorial design on all cores; resumes",
+        run,
+        summary="run a factorial design on all cores; resumes",
         description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "--objects", type=int_list, default=[6], metavar="N,..", help="difficulties, e.g. 6,12,18,24"
+        "--objects",
+        type=int_list,
+        default="6",
+        metavar="N,..",
+        help="numbers of misplaced objects, each 1 to 40, such as 6,12,18,24",
     )
     parser.add_argument(
         "--assistance",
         type=text_list,
-        default=["none", "highlight", "optimal"],
+        default="none,highlight,optimal",
         metavar="NAME,..",
-        help=f"{assistance_help()} (none,highlight,optimal)",
+        help=assistance_help(),
     )
     parser.add_argument(
         "--seeds",
         type=int_list,
-        default=list(range(10)),
+        default="0:10",
         metavar="A:B",
-        help="seeds, e.g. 0:10 or 1,2,5 (0:10)",
+        help="seeds, such as 1,2,5 or 0:10, which ends with 9",
     )
-    add_user(parser)
-    add_house(parser)
-    add_planner(parser)
-    add_fidelity(parser)
-    add_regret(parser)
+    add_trial_options(parser)
     parser.add_argument(
-        "--workers", type=int, default=os.cpu_count(), metavar="N", help="processes (one per core)"
+        "--workers",
+        type=int,
+        default=os.cpu_count(),
+        metavar="N",
+        help="processes (default: one per core, %(default)s here)",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the batch")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -78,13 +79,9 @@ def run(arguments: argparse.Namespace) -> int:
         objects=arguments.objects,
         assistance=arguments.assistance,
         seeds=arguments.seeds,
-        user=arguments.user,
-        house=arguments.house,
-        planner=arguments.planner,
-        fidelity=arguments.fidelity,
-        regret=arguments.regret,
+        **trial_options(arguments),
     )
-    console = Console(stderr=True)
+    console = Console(stderr=True, highlight=False)
     columns = (
         TextColumn("trials"),
         BarColumn(),
@@ -100,21 +97,10 @@ def run(arguments: argparse.Namespace) -> int:
         def show(progress: BatchProgress) -> None:
             nonlocal failed
             failed = progress.failed
-            bars.update(
-                bar, total=progress.total, completed=progress.resumed + progress.done + progress.failed
-            )
+            bars.update(bar, total=progress.total, completed=progress.resumed + progress.done + failed)
             if progress.failure:
-                bars.console.print(
-                    f"failed: {progress.failure}", style="red", highlight=False, soft_wrap=True
-                )
+                bars.console.print(f"failed: {progress.failure}", style="red", soft_wrap=True)
 
-        rows = run_batch(
-            batch,
-            arguments.out,
-            workers=arguments.workers,
-            on_progress=show,
-        )
-    console.print(
-        f"{len(rows)} trials in {arguments.out}/trials.parquet and .csv; {failed} failed", highlight=False
-    )
+        rows = run_batch(batch, arguments.out, workers=arguments.workers, on_progress=show)
+    console.print(f"{len(rows)} trials in {arguments.out}/trials.parquet and .csv; {failed} failed")
     return 1 if failed else 0

@@ -9,17 +9,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from experiments.commands.options import int_list
+from experiments.commands.options import add_command, int_list
 from experiments.errors import ConfigError
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
 DESCRIPTION = """\
-Run a benchmark of the source checkout and print what it measured. Figures are ratios where they can be, so that they
-hold on another machine as well. A module in benchmarks/ is a benchmark when it defines measure() -> dict of JSON values
-and lines(result) -> lines of text; measure may take the keywords quick, houses, count, hours, workers, only, seeds and
-objects, and picture(result, path) may draw the result."""
-OPTIONS = ("quick", "houses", "count", "hours", "workers", "only", "seeds", "objects")
+Run a benchmark of the source checkout and print what it measured, as ratios where possible, so that the figures hold on
+other machines as well. A benchmark is a module in benchmarks/ that defines measure() -> dict of JSON values, and
+lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, hours, workers, only, seeds
+and objects; the options of the same name set them. picture(result, path) may draw the result."""
 
 
 def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
@@ -63,32 +62,17 @@ def load(path: Path) -> ModuleType:
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "bench",
-        help="run a benchmark of the source checkout",
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = add_command(
+        commands, "bench", run, summary="run a benchmark of the source checkout", description=DESCRIPTION
     )
-    parser.add_argument(
-        "name", metavar="NAME", help=f"benchmark: {', '.join(benchmark_names()) or 'none here'}"
-    )
+    names = ", ".join(benchmark_names()) or "none here"
+    parser.add_argument("name", metavar="NAME", help=f"benchmark: {names}")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.add_argument("--quick", action="store_true", help="a smaller run, where the benchmark has one")
-    parser.add_argument("--houses", type=positive, metavar="N", help="houses, where the benchmark has many")
-    parser.add_argument("--count", type=positive, metavar="N", help="cases, where the benchmark counts them")
-    parser.add_argument(
-        "--hours", type=positive_number, metavar="H", help="simulated hours, where the benchmark counts them"
-    )
-    parser.add_argument("--workers", type=positive, metavar="N", help="processes, where it uses several")
-    parser.add_argument("--only", type=natural, metavar="N", help="one session alone, to look at it again")
-    parser.add_argument(
-        "--seeds", type=positive, metavar="N", help="houses of each difficulty, where the benchmark has them"
-    )
-    parser.add_argument(
-        "--objects", type=int_list, metavar="N,..", help="difficulties, where the benchmark has them"
-    )
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the result as well")
-    parser.set_defaults(run=run)
+    group = parser.add_argument_group("size of the benchmark, where it has such an option")
+    for name, kind, metavar, text in OPTIONS:
+        group.add_argument(f"--{name}", type=kind, metavar=metavar, help=text)
+    group.add_argument("--quick", action="store_true", help="a smaller run")
 
 
 def positive(text: str) -> int:
@@ -116,13 +100,24 @@ def positive_number(text: str) -> float:
     return value
 
 
+OPTIONS = (
+    ("houses", positive, "N", "number of houses"),
+    ("count", positive, "N", "number of cases"),
+    ("hours", positive_number, "H", "simulated hours"),
+    ("workers", positive, "N", "processes"),
+    ("only", natural, "N", "run only the session with this number"),
+    ("seeds", positive, "N", "houses for each number of objects"),
+    ("objects", int_list, "N,..", "numbers of objects"),
+)
+
+
 def options(module: ModuleType, arguments: argparse.Namespace) -> dict[str, Any]:
-    """Options that were given, as keywords of the benchmark's `measure`.
+    """The given options, as keywords of the benchmark's `measure`.
 
     Raises:
         ConfigError: The benchmark has no such option.
     """
-    values = {name: getattr(arguments, name) for name in OPTIONS}
+    values = {name: getattr(arguments, name) for name in ("quick", *(name for name, *_ in OPTIONS))}
     given = {name: value for name, value in values.items() if value is not None and value is not False}
     for name in given:
         if name not in inspect.signature(module.measure).parameters:

@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.console import Console
 
-from experiments.commands.options import add_frame
+from experiments.commands.options import add_command, add_frame, film_config
 from experiments.first_person import FilmConfig
 from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
 from experiments.trial import TrialConfig
@@ -28,23 +28,19 @@ conditions in four situations, as OUT/contact_sheet.png."""
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "gallery",
-        help="make the pictures of the documentation",
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = add_command(
+        commands, "gallery", run, summary="make the pictures of the documentation", description=DESCRIPTION
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the pictures")
     add_frame(parser, size=(960, 720), profile="quality")
     parser.add_argument(
         "--contact-sheet",
         action="store_true",
-        help="make the contact sheet alone: frames of 640x480 in profile fast, as in a run",
+        help="make only the contact sheet, from frames of 640x480 in profile fast, as in a run",
     )
     parser.add_argument(
-        "--frames", action="store_true", help="also write the frames of the contact sheet, in their full size"
+        "--frames", action="store_true", help="also write the frames of the contact sheet, in full size"
     )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -57,8 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         console.print(str(arguments.out / name), soft_wrap=True)
 
     if not arguments.contact_sheet:
-        film = FilmConfig(arguments.size[0], arguments.size[1], arguments.profile)
-        for name, frame in take_pictures(SHOTS, film).items():
+        for name, frame in take_pictures(SHOTS, film_config(arguments)).items():
             write(f"{name}.png", frame)
     frames = {}
     for condition in CONDITIONS:

@@ -8,27 +8,27 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.commands.options import add_frame, assistance_help
+from experiments.commands.options import add_command, add_frame, assistance_help, film_config
 from experiments.errors import ConfigError, ReplayError
-from experiments.first_person import FilmConfig
 from experiments.replaying.overview import CAMERAS, FIRST_PERSON
 from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
 
 DESCRIPTION = """\
-Simulate a recorded run again and verify, at every control step, that the state of the physics is the recorded one to
-the last bit. DIR is a run directory, or what a run left whose physics failed (OUT.failed). Prints the number of steps
-verified and exits with 0, or names the first bad step and exits with 1.
+Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one
+bit for bit. DIR is a run directory, or what a run left behind whose physics failed (OUT.failed). Prints the number of
+verified steps and exits with 0, or names the first step that differs and exits with 1.
 
 With --video, the replay is filmed: as it was, or in another size, from another camera, with another HUD."""
 
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
-    parser: argparse.ArgumentParser = commands.add_parser(
+    parser = add_command(
+        commands,
         "replay",
-        help="replay and verify a recorded run; film it in another view",
+        run,
+        summary="replay and verify a recorded run; film it in another view",
         description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="run directory")
     parser.add_argument(
@@ -37,26 +37,28 @@ def add_parser(commands: Any) -> None:
         type=float,
         default=0.0,
         metavar="T",
-        help="start at the last checkpoint at or before T seconds (0)",
+        help="simulated seconds: start at the last checkpoint at or before T",
     )
     parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="film the replay")
+    parser.add_argument("--camera", choices=CAMERAS, default=FIRST_PERSON, help="the view that is filmed")
     parser.add_argument(
-        "--camera", choices=CAMERAS, default=FIRST_PERSON, help=f"where to look from ({FIRST_PERSON})"
-    )
-    parser.add_argument(
-        "--eye", type=point, metavar="X,Y,Z", help="where a free camera stands, m (it circles the house)"
+        "--eye",
+        type=point,
+        metavar="X,Y,Z",
+        help="position of a free camera, m (default: it circles the house)",
     )
     parser.add_argument(
         "--target",
         type=point,
         metavar="X,Y,Z",
-        help="what a free camera looks at, m (the middle of the floor)",
+        help="point that a free camera looks at, m (default: the middle of the floor)",
     )
     parser.add_argument(
-        "--assistance", metavar="NAME", help=f"show the glasses of another {assistance_help()} (as recorded)"
+        "--assistance",
+        metavar="NAME",
+        help=f"show the HUD of another {assistance_help()} (default: as recorded)",
     )
     add_frame(parser)
-    parser.set_defaults(run=run)
 
 
 def point(text: str) -> tuple[float, float, float]:
@@ -73,29 +75,21 @@ def point(text: str) -> tuple[float, float, float]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Replay with a progress bar; 1 if something is not as recorded."""
+    """Replay with a progress bar; 1 if something differs from the record."""
     film = None
     if arguments.video is not None:
-        width, height = arguments.size
         film = ReplayFilm(
             path=arguments.video,
-            config=FilmConfig(width, height, arguments.profile),
+            config=film_config(arguments),
             camera=arguments.camera,
             eye=arguments.eye,
             target=arguments.target,
         )
     elif arguments.camera != FIRST_PERSON or arguments.eye or arguments.target:
         raise ConfigError("a camera needs a film; name the file with --video FILE.mp4")
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("replay"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("steps"),
-        TimeElapsedColumn(),
-    )
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("steps"), TimeElapsedColumn())
     try:
-        with Progress(*columns, console=console) as bars:
+        with Progress("replay", *columns, console=Console(stderr=True)) as bars:
             bar = bars.add_task("replay", total=None)
             report = replay(
                 arguments.directory,
@@ -122,5 +116,5 @@ def _summary(report: ReplayReport) -> str:
     if report.failure:
         text += f", and so does the replay: {report.failure}"
     for difference in report.differences:
-        text += f"\nwithout consequence: {difference}"
+        text += f"\nwithout effect: {difference}"
     return text
