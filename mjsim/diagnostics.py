@@ -1,4 +1,4 @@
-"""What this machine offers to the simulator: versions, and what OpenGL draws with."""
+"""What this machine offers to the simulator: versions, conflicting packages, and what OpenGL draws with."""
 
 import platform
 from collections.abc import Mapping
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from mjsim.conflicts import Conflict, package_conflicts
 from mjsim.errors import RenderError
 from mjsim.render.context import EGL_PACKAGES, GlInfo, gl_info
 
@@ -15,12 +16,13 @@ DISTRIBUTIONS = ("mujoco", "dm-control", "numpy", "ortools", "opencv-python-head
 
 @dataclass(frozen=True)
 class EnvironmentReport:
-    """Versions and graphics of this machine.
+    """Versions, conflicts and graphics of this machine.
 
     Attributes:
         python: Version of the interpreter.
         platform: Operating system and processor.
         versions: Distribution -> version, or None where it is not installed.
+        conflicts: Other packages of the names that ours have.
         egl_vendors: Names of the EGL vendor files found.
         gl: What draws, or None where no context can be made.
         problem: Why there is no context, or None.
@@ -30,6 +32,7 @@ class EnvironmentReport:
     python: str
     platform: str
     versions: Mapping[str, str | None]
+    conflicts: tuple[Conflict, ...]
     egl_vendors: tuple[str, ...]
     gl: GlInfo | None
     problem: str | None
@@ -37,8 +40,9 @@ class EnvironmentReport:
 
     @property
     def usable(self) -> bool:
-        """Whether everything needed is installed and frames can be drawn."""
-        return self.gl is not None and None not in self.versions.values()
+        """Whether everything needed is installed, nothing of it is hidden, and frames can be drawn."""
+        hidden = any(conflict.hidden for conflict in self.conflicts)
+        return self.gl is not None and None not in self.versions.values() and not hidden
 
     def lines(self) -> tuple[str, ...]:
         """The report as lines of text, advice last."""
@@ -50,7 +54,7 @@ class EnvironmentReport:
         else:
             kind = "software" if self.gl.software else "hardware"
             rows.append(f"OpenGL: {self.gl.renderer}, {self.gl.vendor}, {self.gl.version} ({kind})")
-        return (*rows, *self.advice)
+        return (*rows, *(conflict.message for conflict in self.conflicts), *self.advice)
 
 
 def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport:
@@ -71,6 +75,7 @@ def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport
         python=platform.python_version(),
         platform=f"{platform.system()} {platform.machine()}",
         versions=versions,
+        conflicts=package_conflicts(),
         egl_vendors=vendors,
         gl=gl,
         problem=problem,

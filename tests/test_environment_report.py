@@ -1,16 +1,20 @@
 """The report tells what a machine has, and what to do when drawing is impossible."""
 
 import dataclasses
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import mujoco
 import numpy as np
+import pytest
 
+from mjsim.conflicts import Conflict
 from mjsim.diagnostics import advise, egl_vendors, environment_report
 from mjsim.render.context import GlInfo, is_software
 
+CHECKOUT = Path(__file__).resolve().parents[1]
 GPU = GlInfo("NVIDIA Corporation", "NVIDIA H100/PCIe/SSE2", "4.6.0", False)
 CPU = GlInfo("Mesa", "llvmpipe (LLVM 15.0.6, 256 bits)", "4.5", True)
 
@@ -65,3 +69,53 @@ def test_missing_distribution_makes_the_report_unusable():
     report = dataclasses.replace(environment_report(), versions={"mujoco": None})
     assert not report.usable
     assert "mujoco not installed" in report.lines()
+
+
+def _install_fake(folder: Path, package: str) -> None:
+    (folder / package).mkdir()
+    (folder / package / "__init__.py").touch()
+    info = folder / "gadgets-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: gadgets\nVersion: 1.0\n")
+    (info / "RECORD").write_text(f"{package}/__init__.py,,\ngadgets-1.0.dist-info/METADATA,,\n")
+
+
+def _command_line(words: str, path: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "mjsim", *words.split()],
+        env={**os.environ, "PYTHONPATH": path, "PYTHONSAFEPATH": "1"},
+        capture_output=True,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("package", ["planner", "hud"])
+def test_doctor_names_a_distribution_that_hides_a_package(tmp_path: Path, package: str):
+    _install_fake(tmp_path, package)
+    done = _command_line("doctor", f"{tmp_path}:{CHECKOUT}")
+    assert done.returncode == 1
+    assert f"imports {package} from {tmp_path.resolve() / package} instead of" in done.stdout
+    assert f"the distribution gadgets installs a package {package} too: pip uninstall gadgets" in done.stdout
+
+
+def test_doctor_names_a_distribution_that_hides_nothing_yet(tmp_path: Path):
+    _install_fake(tmp_path, "hud")
+    done = _command_line("doctor", f"{CHECKOUT}:{tmp_path}")
+    assert done.returncode == 0, done.stdout
+    assert "gadgets" in done.stdout and "instead of" not in done.stdout
+
+
+def test_a_folder_called_experiments_ahead_of_ours_is_named_at_every_command(tmp_path: Path):
+    (tmp_path / "experiments").mkdir()
+    (tmp_path / "experiments" / "__init__.py").touch()
+    done = _command_line("doctor", f"{tmp_path}:{CHECKOUT}")
+    assert done.returncode == 1
+    assert f"imports experiments from {tmp_path.resolve() / 'experiments'} instead of" in done.stderr
+
+
+def test_a_hidden_package_makes_the_report_unusable():
+    report = environment_report()
+    assert report.conflicts == ()
+    shared = Conflict("hud", False, "gadgets installs hud too")
+    assert dataclasses.replace(report, conflicts=(shared,)).usable
+    assert not dataclasses.replace(report, conflicts=(shared._replace(hidden=True),)).usable

@@ -7,7 +7,8 @@ from mjsim.diagnostics import environment_report
 
 DESCRIPTION = """\
 Show versions, the EGL vendor and the GL renderer, whether rendering happens in software, and what to install when
-something is missing. Exits with 1 when frames cannot be rendered."""
+something is missing. Names other software whose packages are called planner, hud or experiments as ours are.
+Exits with 1 when frames cannot be rendered, something is missing, or Python imports another package than ours."""
 
 
 def add_parser(commands: Any) -> None:

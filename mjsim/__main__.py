@@ -1,0 +1,18 @@
+"""The command line, as `mjsim` or `python -m mjsim`."""
+
+import importlib
+import sys
+
+from mjsim.conflicts import hidden_package
+
+
+def main() -> int:
+    """Run the command line; say so if other software hides the package that it lives in."""
+    if conflict := hidden_package("experiments"):
+        print(f"mjsim: {conflict.message}", file=sys.stderr)
+        return 1
+    return int(importlib.import_module("experiments.cli").main())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
