@@ -29,7 +29,6 @@ class House:
         catalogue: Rooms, categories, receptacles and object models.
         navmesh: Navigability from the compiled model's own geoms.
         geodesics: Shortest paths on it, for planning and guidance: a little away from the walls.
-        body_geodesics: Shortest paths of somebody who brushes along the walls; no walk is shorter.
         rooms: Which room a point lies in.
         receptacles: Receptacle key -> geometry.
         bounds: (x_min, y_min, x_max, y_max) of the floor, m.
@@ -38,7 +37,6 @@ class House:
     catalogue: Catalogue
     navmesh: NavMesh
     geodesics: Geodesics
-    body_geodesics: Geodesics
     rooms: RoomMap
     receptacles: Mapping[str, ReceptacleGeometry]
     bounds: tuple[float, float, float, float]
@@ -61,11 +59,16 @@ class House:
             catalogue=catalogue,
             navmesh=navmesh,
             geodesics=Geodesics(navmesh),
-            body_geodesics=Geodesics(NavMesh.build(floor.obstacles, floor.bounds, agent_radius=TRUNK_RADIUS)),
             rooms=model.rooms,
             receptacles=model.receptacles,
             bounds=floor.bounds,
         )
+
+    @cached_property
+    def body_geodesics(self) -> Geodesics:
+        """Shortest paths of somebody who brushes along the walls; no walk is shorter."""
+        floor = compiled_house(self.catalogue).floor
+        return Geodesics(NavMesh.build(floor.obstacles, floor.bounds, agent_radius=TRUNK_RADIUS))
 
     def sample_episode(self, *, objects: int, seed: int) -> Episode:
         """Sample a disorganized house (PAPER section 4).
@@ -83,8 +86,8 @@ class House:
     def _known(self) -> KnownHouse:
         # A fixed seed: viewpoints are a property of the house, not of a trial.
         rng = np.random.default_rng(0)
-        floor = np.array([self.navmesh.sample(rng) for _ in range(VIEWPOINT_CANDIDATES)])
-        rooms = np.array([self.rooms.room_at(point) for point in floor])
+        floor = self.navmesh.sample(rng, VIEWPOINT_CANDIDATES)
+        rooms = np.array(self.rooms.keys)[self.rooms.distances(floor).argmin(axis=1)]
         return KnownHouse(
             navmesh=self.navmesh,
             geodesics=self.geodesics,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from mjsim.errors import AssetError
 from mjsim.model.rooms import RoomMap
@@ -75,7 +75,7 @@ def _outline_points(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> ND
         ball = np.eye(3) * size[0]
         return np.vstack([_ellipsoid(centre - axis, ball), _ellipsoid(centre + axis, ball)])
     if kind == _GEOM.mjGEOM_CYLINDER:
-        rim = _circle() @ (rotation[:, :2] * size[0]).T
+        rim = _CIRCLE @ (rotation[:, :2] * size[0]).T
         return np.vstack([centre - axis + rim, centre + axis + rim])
     raise AssetError(
         f"static geom {_name(model, geom)} is of type {_GEOM(kind).name}, whose outline is not known; "
@@ -88,23 +88,18 @@ def _ellipsoid(centre: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArra
     # The shadow of a ball under a linear map to the plane is the ellipse that the map's SVD gives.
     directions, lengths, _ = np.linalg.svd(axes[:2])
     outline = np.zeros((CIRCLE_SIDES, 3))
-    outline[:, :2] = _circle() @ (directions * lengths).T
+    outline[:, :2] = _CIRCLE @ (directions * lengths).T
     reach = np.array([[0.0, 0.0, np.linalg.norm(axes[2])]])
     return np.asarray(np.vstack([outline, reach, -reach]) + centre)
 
 
-def _circle() -> NDArray[np.float64]:
-    """A polygon (k, 2) around the unit circle, touching it at the middles of its sides."""
-    angles = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES
-    radius = 1.0 / np.cos(np.pi / CIRCLE_SIDES)
-    return np.asarray(radius * np.column_stack([np.cos(angles), np.sin(angles)]))
-
-
 def _hull(model: mujoco.MjModel, geom: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if extent[-1] < 1e-9:
-        raise AssetError(f"static geom {_name(model, geom)} has no area seen from above; give it a thickness")
-    return np.ascontiguousarray(points[ConvexHull(points).vertices])
+    try:
+        return np.ascontiguousarray(points[ConvexHull(points).vertices])
+    except QhullError as error:
+        raise AssetError(
+            f"static geom {_name(model, geom)} has no area seen from above; give it a thickness"
+        ) from error
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:
@@ -113,3 +108,6 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
 
 
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_ANGLES = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES
+# A polygon around the unit circle, touching it at the middles of its sides, (k, 2).
+_CIRCLE = 1.0 / np.cos(np.pi / CIRCLE_SIDES) * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])

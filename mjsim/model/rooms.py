@@ -69,11 +69,11 @@ class RoomMap:
         )
 
     def distances(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Distance from a point to each rectangle, m, shape (k,); 0 inside."""
-        offsets = np.asarray(xy, dtype=np.float64)[:2] - self.centers
-        local = np.einsum("kji,kj->ki", self.axes, offsets)
+        """Distance from points (..., 2), m, to each rectangle, m, shape (..., k); 0 inside."""
+        offsets = np.asarray(xy, dtype=np.float64)[..., None, :2] - self.centers
+        local = np.einsum("kji,...kj->...ki", self.axes, offsets)
         outside = np.maximum(np.abs(local) - self.half_sizes, 0.0)
-        return np.asarray(np.hypot(outside[:, 0], outside[:, 1]))
+        return np.asarray(np.hypot(outside[..., 0], outside[..., 1]))
 
     def room_at(self, xy: ArrayLike) -> str:
         """Key of the room that contains the point (x, y), m, or else of the nearest one."""
