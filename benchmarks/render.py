@@ -29,6 +29,7 @@ from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info,
 from mjsim.render.cameras import View
 from mjsim.render.context import current_context
 from mjsim.render.markers import add_markers
+from mjsim.render.rasteriser import buffer_settings
 from mjsim.world import World
 
 SIZES = ((320, 240), (640, 480), (1280, 720))
@@ -184,7 +185,7 @@ def raw_renderer(
 ) -> Iterator[Callable[[CameraPose], None]]:
     """Draws the whole scene with the markers by `mjr_render` alone: no update, no reading, no reduction."""
     model = subject.scene.model
-    drawn = tuple(round(side * profile.supersampling) for side in size)
+    drawn = round(size[0] * profile.supersampling), round(size[1] * profile.supersampling)
     scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 1000)
     option = mujoco.MjvOption()
     option.geomgroup[:] = [1, 1, 1, 0, 0, 0]
@@ -200,7 +201,7 @@ def raw_renderer(
     ):
         scene.flags[flag] = on
     add_markers(scene, subject.state.markers)
-    with current_context(), quality_of(model, drawn, profile.samples, profile.shadow_size):
+    with current_context(), buffer_settings(model, drawn, profile.samples, profile.shadow_size):
         context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
     rectangle = mujoco.MjrRect(0, 0, *drawn)
 
@@ -222,7 +223,7 @@ def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[st
     authored = model.light_castshadow.copy()
     if shadows_of_all_lights:
         model.light_castshadow[:] = 1
-    with quality_of(model, (640, 480), samples=4, shadow_size=4096), off_screen():
+    with buffer_settings(model, (640, 480), samples=4, shadow_size=4096), off_screen():
         default = mujoco.Renderer(model, 480, 640)
     option = mujoco.MjvOption()
     theirs: list[float] = []
@@ -266,19 +267,6 @@ def off_screen() -> Iterator[None]:
         yield
     finally:
         backend.GLContext = kept
-
-
-@contextmanager
-def quality_of(model: Any, size: tuple[int, ...], samples: int, shadow_size: int) -> Iterator[None]:
-    """Lend a model buffer sizes, which contexts read when they are made."""
-    general, quality = model.vis.global_, model.vis.quality
-    kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
-    general.offwidth, general.offheight = size
-    quality.offsamples, quality.shadowsize = samples, shadow_size
-    try:
-        yield
-    finally:
-        general.offwidth, general.offheight, quality.offsamples, quality.shadowsize = kept
 
 
 def timed(clock: Callable[[], float], work: Callable[[], Any]) -> float:

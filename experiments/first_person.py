@@ -1,8 +1,7 @@
 """First-person frames with the HUD over them, and films of them."""
 
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,12 +75,10 @@ class FirstPersonRenderer:
         """Free the GL context."""
         self._renderer.close()
 
-    def __enter__(self) -> "FirstPersonRenderer":
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -5,7 +5,7 @@ import queue
 import threading
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
+from typing import Self
 
 import av
 import numpy as np
@@ -60,12 +60,10 @@ class VideoWriter:
         self._thread.join()
         self._raise_failure()
 
-    def __enter__(self) -> "VideoWriter":
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _raise_failure(self) -> None:

@@ -14,10 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjsim.errors import RenderError
-from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info, stage
+from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info, rasteriser
 from mjsim.render.cameras import View
 from mjsim.render.culling import outside
-from mjsim.render.xray import screen_rectangle
 
 # A room seen along +x: back wall at x = 4, a low partition at x = 2 on the right (y < 0), a tilted camera as well.
 ROOM = """<mujoco>
@@ -326,32 +325,6 @@ def test_unusable_markers_are_named(room, renderer):
     assert not red(renderer.rgb(room[1], "ahead")).any()  # a refused frame leaves nothing behind
 
 
-@settings(max_examples=60, deadline=None)
-@given(
-    st.tuples(st.floats(-4, 4), st.floats(-4, 4), st.floats(-2, 4)),
-    st.floats(0.02, 1.0),
-    st.floats(-np.pi, np.pi),
-)
-def test_the_rectangle_of_a_marker_holds_its_sphere(centre, radius, heading):
-    pose = CameraPose.looking_at((0, 0, 1), (np.cos(heading), np.sin(heading), 0.8), 1.2)
-    view, size = View.of(pose), (64, 48)
-    box = screen_rectangle(view, [Marker(centre, size=(radius,))], size)
-    to_centre = np.array(centre) - pose.position
-    directions = rays(pose, *size)
-    along = (directions @ to_centre) / np.linalg.norm(directions, axis=2)
-    hit = (
-        (along > 0)
-        & (to_centre @ to_centre - along**2 < radius**2)
-        & (np.linalg.norm(to_centre) > radius + 0.1)
-    )
-    rows, columns = np.nonzero(hit[::-1])
-    if len(rows):
-        assert box is not None
-        left, bottom, width, height = box
-        assert left <= columns.min() and columns.max() < left + width
-        assert bottom <= rows.min() and rows.max() < bottom + height
-
-
 # --- the apartment ----------------------------------------------------------------------------------------
 
 
@@ -385,7 +358,7 @@ def test_leaving_out_what_is_beside_the_view_changes_no_pixel(scene, monkeypatch
         kept = made.frame(data, pose, markers, depth=True, segmentation=True)
         left_out = []
         monkeypatch.setattr(
-            stage, "outside", lambda *a: left_out.append(outside(*a).mean()) or np.zeros(model.ngeom, bool)
+            rasteriser, "outside", lambda *a: left_out.append(outside(*a).mean()) or np.zeros(model.ngeom, bool)
         )
         whole = made.frame(data, pose, markers, depth=True, segmentation=True)
     assert left_out[0] > 0.3  # or nothing was tested

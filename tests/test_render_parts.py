@@ -13,8 +13,8 @@ import pytest
 
 from mjsim.render import FAST, CameraPose, Renderer, RenderProfile
 from mjsim.render.cameras import View
-from mjsim.render.occlusion import Occluders
-from mjsim.render.stage import Stage, reduced
+from mjsim.render.occlusion import BoxOccluders
+from mjsim.render.rasteriser import Rasteriser, reduced
 
 # Seen from the origin along +x: a wall of 2 x 2 m at x = 2 and small things behind it.
 WALL = """<mujoco>
@@ -37,7 +37,7 @@ def hidden(view: View | None = None, *, wall: str = "", edge: float = 3.0) -> se
     everything = np.ones(model.ngeom, bool)
     view = view or View(np.zeros(3), AHEAD, 0.7)
     rotations = data.geom_xmat.reshape(-1, 3, 3)
-    mask = Occluders(model, model.geom_group < 3).hidden(view, 1.3, data.geom_xpos, rotations, everything)
+    mask = BoxOccluders(model, model.geom_group < 3).hidden(view, 1.3, data.geom_xpos, rotations, everything)
     return {model.geom(i).name for i in np.flatnonzero(mask)}
 
 
@@ -77,9 +77,9 @@ def test_leaving_out_changes_no_pixel_of_the_apartment(scene, navmesh, monkeypat
             poses.append(CameraPose.looking_at(eye, eye + gaze, 1.2))
         kept = made.frames(data, poses, depth=True, segmentation=True)
         left_out = []
-        unseen = Stage._unseen
+        unseen = Rasteriser._unseen
         monkeypatch.setattr(
-            Stage,
+            Rasteriser,
             "_unseen",
             lambda self, *a: left_out.append(unseen(self, *a).mean()) or np.zeros(scene.model.ngeom, bool),
         )

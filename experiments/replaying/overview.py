@@ -14,7 +14,7 @@ from mjsim.model.avatar import EYE_HEIGHT, TRUNK_RADIUS
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.render import CameraPose, Renderer
-from mjsim.render.stage import TOP_DOWN_GROUPS
+from mjsim.render.rasteriser import TOP_DOWN_GROUPS
 from mjsim.world import World
 
 FIRST_PERSON, TOP_DOWN, FREE = "first-person", "top-down", "free"

@@ -13,7 +13,7 @@ from mjsim.model.house import compiled_house
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
-from mjsim.render.stage import MAX_SIDE, TOP_DOWN_GROUPS, DirectionalLight, Stage, checked_size
+from mjsim.render.rasteriser import MAX_SIDE, TOP_DOWN_GROUPS, DirectionalLight, Rasteriser
 
 _PAPER = 244  # grey level where there is no house
 # Above any house of one storey.
@@ -83,14 +83,11 @@ def render_floorplan(
         far=2 * _HEIGHT,
         orthographic=True,
     )
-    stage = Stage(model, checked_size(width), checked_size(height), _PROFILE, TOP_DOWN_GROUPS, _LIGHTS)
-    try:
-        with current_context():
-            stage.update(data)
-            rgb = stage.colour(view)
-            rgb[stage.geometry(view)[0] < 0] = _PAPER
-    finally:
-        stage.close()
+    rasteriser = Rasteriser(model, width, height, _PROFILE, TOP_DOWN_GROUPS, _LIGHTS)
+    with rasteriser, current_context():
+        rasteriser.update(data)
+        rgb = rasteriser.colour(view)
+        rgb[rasteriser.geometry(view)[0] < 0] = _PAPER
     return FloorPlan(rgb, (xmin, ymin, xmax, ymax), pixels_per_metre)
 
 

@@ -1,4 +1,4 @@
-"""World-locked digital objects: decorative geoms that are added to a scene for one frame."""
+"""World-locked digital objects: decorative geoms that are added to a scene for one frame, seen through walls or not."""
 
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -12,10 +12,13 @@ from mjsim.render.cameras import View
 from mjsim.render.culling import outside
 
 MAX_MARKERS = 1024
-# Most of a marker's colour is its own light and a little is lit, so that it reads as a solid but shines alike
-# in every room.
-_GLOW = 0.62
+# Most of a marker's colour is emitted and a little is lit, so that it reads as a solid but looks alike in every room.
+_EMITTED = 0.62
 _LIT = 0.32
+# Of an x-ray marker where something hides it.
+_HIDDEN_OPACITY = 0.3
+# Both passes draw a visible marker at the same depth up to rounding.
+_DEPTH_TOLERANCE = 1e-4
 _NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _SHAPES = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -33,7 +36,7 @@ class MarkerLike(Protocol):
         position: Centre in the house frame, m.
         size: Radius; radius and half-length; half-sizes, m.
         rgba: Colour and opacity, components 0 to 1.
-        x_ray: Whether it also shows faintly through walls.
+        x_ray: Whether it also shows, dimmed, through walls.
     """
 
     @property
@@ -57,21 +60,55 @@ def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False
     if len(markers) > MAX_MARKERS:
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
     for marker in markers:
-        geom = scene.geoms[scene.ngeom]
         rgba = np.array(_numbers(marker, "rgba", 4), dtype=np.float32)
         rgba[:3] *= 1.0 if flat else _LIT
         if flat:
             rgba[3] = 1.0
-        size = geom_size(marker)
-        position = np.array(_numbers(marker, "position", 3))
-        mujoco.mjv_initGeom(geom, _SHAPES[marker.shape], size, position, np.eye(3).ravel(), rgba)
-        # Left as it was by initialisation, so that a slot may still name a geom of another scene.
-        geom.objtype, geom.objid = _NO_OBJECT, -1
-        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
-        geom.emission = 1.0 if flat else _GLOW / _LIT
-        geom.specular = geom.shininess = geom.reflectance = 0.0
-        geom.segid = -1
-        scene.ngeom += 1
+        size, position = geom_size(marker), np.array(_numbers(marker, "position", 3))
+        geom = add_decorative_geom(scene, _SHAPES[marker.shape], size, position, rgba)
+        geom.emission = 1.0 if flat else _EMITTED / _LIT
+
+
+def add_decorative_geom(
+    scene: Any,
+    shape: mujoco.mjtGeom,
+    size: NDArray[np.float64],
+    position: NDArray[np.float64],
+    rgba: NDArray[np.float32],
+) -> Any:
+    """Append an upright geom that belongs to no model, does not shine and takes no part in segmentation; returns it.
+
+    Args:
+        scene: With room for one more geom.
+        shape: Kind of geom.
+        size: In MuJoCo's convention for the shape, m, shape (3,).
+        position: Centre, m, shape (3,).
+        rgba: Colour and opacity, 0 to 1, shape (4,).
+    """
+    geom = scene.geoms[scene.ngeom]
+    mujoco.mjv_initGeom(geom, shape, size, position, np.eye(3).ravel(), rgba)
+    # Initialisation leaves these as they were, so that a slot may still name a geom of another scene.
+    geom.objtype, geom.objid = _NO_OBJECT, -1
+    geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+    geom.emission = geom.specular = geom.shininess = geom.reflectance = 0.0
+    geom.segid = -1
+    scene.ngeom += 1
+    return geom
+
+
+def blend_hidden(
+    frame: NDArray[np.uint8],
+    colour: NDArray[np.uint8],
+    scene_depth: NDArray[np.float32],
+    marker_depth: NDArray[np.float32],
+) -> None:
+    """Blend `colour` into `frame` (both (h, w, 3)) in place where a marker lies behind the scene.
+
+    Depths are reversed: 1 at the near plane, 0 where nothing was drawn, shape (h, w).
+    """
+    hidden = (marker_depth > 0) & (marker_depth < scene_depth * (1 - _DEPTH_TOLERANCE))
+    mixed = frame[hidden] * (1 - _HIDDEN_OPACITY) + colour[hidden] * _HIDDEN_OPACITY
+    frame[hidden] = np.round(mixed).astype(np.uint8)
 
 
 def in_view(view: View, aspect: float, markers: Sequence[MarkerLike]) -> list[MarkerLike]:

@@ -20,7 +20,7 @@ _TESTED = 12
 _MARGIN = 0.01
 
 
-class Occluders:
+class BoxOccluders:
     """The large boxes of a model.
 
     Args:

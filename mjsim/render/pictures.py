@@ -1,5 +1,6 @@
 """Small pictures of objects and receptacles on a transparent background, for lists and inventories."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
-from mjsim.render.stage import FIRST_PERSON_GROUPS, DirectionalLight, Stage
+from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, DirectionalLight, Rasteriser
 
 SUPERSAMPLING = 3
 # Share of the picture's side that its subject fills.
@@ -67,14 +68,10 @@ def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
     if not 1 <= size <= 1024:
         raise RenderError(f"picture sides must be 1 to 1024 pixels, got {size}")
     side = size * SUPERSAMPLING
-    stage = Stage(model, side, side, _PROFILE, lights=_LIGHTS)
-    try:
-        with current_context():
-            stage.update(data)
-            view = _framed(stage, _first_view(model, data), path)
-            colour, mask = stage.colour(view), stage.geometry(view)[0] >= 0
-    finally:
-        stage.close()
+    with Rasteriser(model, side, side, _PROFILE, lights=_LIGHTS) as rasteriser, current_context():
+        rasteriser.update(data)
+        view = _framed(rasteriser, _first_view(model, data), path)
+        colour, mask = rasteriser.colour(view), rasteriser.geometry(view)[0] >= 0
     return _reduce(colour, mask, size)
 
 
@@ -108,10 +105,10 @@ def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
     return (centres - halves).min(axis=0), (centres + halves).max(axis=0)
 
 
-def _framed(stage: Stage, view: View, path: Path) -> View:
+def _framed(rasteriser: Rasteriser, view: View, path: Path) -> View:
     """The view shifted and scaled so that what is seen fills the picture; twice, the second time finely."""
     for _ in range(2):
-        mask = stage.geometry(view)[0] >= 0
+        mask = rasteriser.geometry(view)[0] >= 0
         if not mask.any():
             raise RenderError(
                 f"{path} shows nothing: give it geoms in the groups 0 to 2 that are not transparent"
@@ -122,13 +119,10 @@ def _framed(stage: Stage, view: View, path: Path) -> View:
         up = 1.0 - (rows[0] + rows[-1] + 1) / side
         extent = max(columns[-1] - columns[0], rows[-1] - rows[0]) + 1
         shift = view.rotation[:, 0] * right + view.rotation[:, 1] * up
-        view = View(
+        view = dataclasses.replace(
+            view,
             position=view.position + shift * view.half_height,
-            rotation=view.rotation,
             half_height=view.half_height * extent / side / FILL,
-            near=view.near,
-            far=view.far,
-            orthographic=True,
         )
     return view
 

@@ -2,8 +2,7 @@
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from mjsim.render import context
 from mjsim.render.cameras import CameraPose, View, camera_pose
 from mjsim.render.markers import MarkerLike
 from mjsim.render.profiles import RenderProfile, resolve_profile
-from mjsim.render.stage import FIRST_PERSON_GROUPS, Stage
+from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Rasteriser
 
 EYE = "avatar/eye"
 
@@ -63,17 +62,17 @@ class Renderer:
     ) -> None:
         self._model = model
         self._profile = resolve_profile(profile)
-        self._stage = Stage(model, width, height, self._profile, groups)
+        self._rasteriser = Rasteriser(model, width, height, self._profile, groups)
 
     @property
     def width(self) -> int:
         """Of the frames, pixels."""
-        return self._stage.size[0]
+        return self._rasteriser.size[0]
 
     @property
     def height(self) -> int:
         """Of the frames, pixels."""
-        return self._stage.size[1]
+        return self._rasteriser.size[1]
 
     @property
     def profile(self) -> RenderProfile:
@@ -95,7 +94,7 @@ class Renderer:
         """
         with context.current_context():
             view = self._look(data, camera)
-            return self._stage.colour(view, markers)
+            return self._rasteriser.colour(view, markers)
 
     def depth(
         self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
@@ -109,7 +108,7 @@ class Renderer:
         """
         with context.current_context():
             view = self._look(data, camera)
-            return view.metres(self._stage.geometry(view, markers)[1])
+            return view.metres(self._rasteriser.geometry(view, markers)[1])
 
     def segmentation(self, data: Any, camera: str | CameraPose = EYE) -> NDArray[np.int32]:
         """Geom id per pixel, (height, width), -1 where nothing is; glass counts as solid.
@@ -118,7 +117,7 @@ class Renderer:
             RenderError: As for `rgb`.
         """
         with context.current_context():
-            return self._stage.geometry(self._look(data, camera))[0]
+            return self._rasteriser.geometry(self._look(data, camera))[0]
 
     def frame(
         self,
@@ -157,15 +156,15 @@ class Renderer:
         """
         poses = [camera_pose(self._model, data, camera) for camera in cameras]
         with context.current_context():
-            self._stage.update(data)
+            self._rasteriser.update(data)
             return tuple(self._frame(pose, markers, rgb, depth, segmentation) for pose in poses)
 
     def _frame(
         self, pose: CameraPose, markers: Sequence[MarkerLike], rgb: bool, depth: bool, segmentation: bool
     ) -> Frame:
         view = View.of(pose)
-        colour = self._stage.colour(view, markers) if rgb else None
-        ids, raw = self._stage.geometry(view) if depth or segmentation else (None, None)
+        colour = self._rasteriser.colour(view, markers) if rgb else None
+        ids, raw = self._rasteriser.geometry(view) if depth or segmentation else (None, None)
         metres = view.metres(raw) if depth and raw is not None else None
         return Frame(pose, colour, metres, ids if segmentation else None)
 
@@ -178,20 +177,15 @@ class Renderer:
         return camera_pose(self._model, data, camera)
 
     def _look(self, data: Any, camera: str | CameraPose) -> View:
-        self._stage.update(data)
+        self._rasteriser.update(data)
         return View.of(camera_pose(self._model, data, camera))
 
     def close(self) -> None:
         """Free the GL resources; again does nothing."""
-        self._stage.close()
+        self._rasteriser.close()
 
-    def __enter__(self) -> "Renderer":
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

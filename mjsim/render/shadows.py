@@ -1,7 +1,7 @@
-"""Contact shadows: dark soft spots under loose things near the floor, where shadow maps would cost too much.
+"""Contact shadows: dark soft spots under free objects near the floor, where shadow maps would cost too much.
 
 They are flat boxes with a soft round texture, added to the scene for one frame as markers are. A spot is as wide as the
-thing above it and fades as the thing is lifted; it takes part in neither depth nor segmentation.
+object above it and fades as the object is lifted; it takes part in neither depth nor segmentation.
 """
 
 from typing import Any
@@ -12,19 +12,18 @@ from numpy.typing import NDArray
 
 from mjsim.render.cameras import View
 from mjsim.render.culling import outside
+from mjsim.render.markers import add_decorative_geom
 
 # Material of the house with a round texture whose alpha fades outwards; without it there are no spots.
 MATERIAL = "shadow_round"
-# How far a spot reaches beyond the thing, m: its texture is faint at the edge.
+# How far a spot reaches beyond the object, m: its texture is faint at the edge.
 _BORDER = 0.05
-# Above the lowest point of the thing, m: above the house's rugs and drawn shadows (at most 5 mm, docs/models.md) and
+# Above the lowest point of the object, m: above the house's rugs and drawn shadows (at most 5 mm, docs/models.md) and
 # below the bottom of a plate (7 mm), which would look grey under it.
 _LIFT = 0.006
 _THICKNESS = 1e-4
-# Things higher than this above the floor throw no spot, m.
+# Objects higher than this above the floor throw no spot, m.
 _REACH = 0.3
-
-_NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 
 
 class ContactShadows:
@@ -83,18 +82,11 @@ class ContactShadows:
     def _append(
         self, scene: Any, centre: NDArray[np.float64], half: NDArray[np.float64], strength: float
     ) -> None:
-        geom = scene.geoms[scene.ngeom]
         rgba = (self._rgba * [1.0, 1.0, 1.0, strength]).astype(np.float32)
-        size = np.array([*half, _THICKNESS])
         # A box, because the rasteriser draws translucent planes (rugs, drawn shadows) before everything translucent.
-        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_BOX, size, centre, np.eye(3).ravel(), rgba)
+        box = mujoco.mjtGeom.mjGEOM_BOX
+        geom = add_decorative_geom(scene, box, np.array([*half, _THICKNESS]), centre, rgba)
         geom.matid, geom.texcoord = self._material, 0
-        # Left as it was by initialisation, so that a slot may still name a geom of another scene.
-        geom.objtype, geom.objid = _NO_OBJECT, -1
-        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
-        geom.emission = geom.specular = geom.shininess = geom.reflectance = 0.0
-        geom.segid = -1
-        scene.ngeom += 1
 
     def _boxes(
         self, positions: NDArray[np.float64], rotations: NDArray[np.float64]

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import cv2
 import mujoco
@@ -14,11 +14,10 @@ from mjsim.errors import RenderError
 from mjsim.render import context
 from mjsim.render.cameras import View
 from mjsim.render.culling import outside, without
-from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, in_view
-from mjsim.render.occlusion import Occluders
+from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, blend_hidden, in_view
+from mjsim.render.occlusion import BoxOccluders
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.shadows import ContactShadows
-from mjsim.render.xray import blend_hidden, screen_rectangle
 
 FIRST_PERSON_GROUPS = (0, 1, 2)
 TOP_DOWN_GROUPS = (0, 2)
@@ -36,19 +35,27 @@ class DirectionalLight:
         direction: Where its rays travel, any length.
         diffuse: Strength where it falls upright.
         ambient: Strength everywhere.
-        shadow: Whether it casts shadows (if the profile draws any).
-        position: Centre of its shadow map, m.
     """
 
     direction: tuple[float, float, float]
     diffuse: float
     ambient: float = 0.0
-    shadow: bool = False
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-class Stage:
-    """GL resources of one model. Update and draw under one `current_context` where threads share it."""
+class Rasteriser:
+    """GL resources of one model. Update and draw under one `current_context` where threads share it.
+
+    Args:
+        model: Compiled model.
+        width: Of the frames, px.
+        height: Of the frames, px.
+        profile: Cost and looks.
+        groups: Geom groups that are shown.
+        lights: Replace the model's lights; None for the model's own.
+
+    Raises:
+        RenderError: No OpenGL context can be made, or a side is unusable.
+    """
 
     def __init__(
         self,
@@ -66,7 +73,7 @@ class Stage:
         self._drawn = checked_size(round(width * scale)), checked_size(round(height * scale))
         self._option = _visual_option(groups, profile)
         shown = np.isin(model.geom_group, list(groups))
-        self._occluders = Occluders(model, shown)
+        self._occluders = BoxOccluders(model, shown)
         self._shadows = ContactShadows(model, shown) if profile.contact_shadows else None
         spots = self._shadows.count if self._shadows else 0
         self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + MAX_MARKERS + spots)
@@ -78,7 +85,10 @@ class Stage:
         self._colour = np.empty((self._drawn[1], self._drawn[0], 3), np.uint8)
         self._ids = np.empty((height, width, 3), np.uint8)
         self._depth = np.empty((height, width), np.float32)
-        with context.current_context(), _buffer_settings(model, self._drawn, profile):
+        with (
+            context.current_context(),
+            buffer_settings(model, self._drawn, profile.samples, profile.shadow_size),
+        ):
             self._gl = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
             self._gl.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         self._key: int | None = context.own(self._gl)
@@ -99,11 +109,17 @@ class Stage:
             context.release(self._key)
             self._key = None
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def update(self, data: Any) -> None:
         """Take the geoms' poses and colours from `data`.
 
         Raises:
-            RenderError: The stage is closed, or `data` belongs to another model.
+            RenderError: It is closed, or `data` belongs to another model.
         """
         if self.closed:
             raise RenderError("the renderer is closed; make a new one")
@@ -126,10 +142,11 @@ class Stage:
         try:
             if self._shadows is not None:
                 self._shadows.add(scene, view, self._aspect, self._positions, self._rotations)
-            add_markers(scene, in_view(view, self._aspect, markers))
+            shown = in_view(view, self._aspect, markers)
+            add_markers(scene, shown)
             with context.current_context(), without(scene, self._unseen(view, self._profile)):
-                rectangle = self._draw(scene, self._drawn, self._colour, None)
-                self._add_x_ray(view, [m for m in markers if m.x_ray], rectangle)
+                self._draw(scene, self._drawn, self._colour, None)
+                self._add_x_ray(view, [marker for marker in shown if marker.x_ray])
         finally:
             scene.ngeom = model_geoms
         return reduced(self._colour, self._size)
@@ -179,31 +196,26 @@ class Stage:
         size: tuple[int, int],
         colour: NDArray[np.uint8] | None,
         depth: NDArray[np.float32] | None,
-    ) -> Any:
+    ) -> None:
+        """Draw a scene at a size and read colour (h, w, 3) and depth (h, w) from the bottom row up."""
         rectangle = mujoco.MjrRect(0, 0, *size)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._gl)
         mujoco.mjr_render(rectangle, scene, self._gl)
         mujoco.mjr_readPixels(colour, depth, rectangle, self._gl)
-        return rectangle
 
-    def _add_x_ray(self, view: View, markers: Sequence[MarkerLike], full: Any) -> None:
-        """Blend the hidden parts of see-through markers into the colour buffer (rows from the bottom)."""
-        box = screen_rectangle(view, markers, self._drawn)
-        if box is None:
+    def _add_x_ray(self, view: View, markers: Sequence[MarkerLike]) -> None:
+        """Blend the hidden parts of x-ray markers into the colour buffer, after the scene was drawn."""
+        if not markers:
             return
-        left, bottom, width, height = box
-        part = mujoco.MjrRect(*box)
-        behind, before = np.empty((2, height, width), np.float32)
-        mujoco.mjr_readPixels(None, before, part, self._gl)
+        scene_depth, marker_depth = np.empty((2, *self._colour.shape[:2]), np.float32)
+        mujoco.mjr_readPixels(None, scene_depth, mujoco.MjrRect(0, 0, *self._drawn), self._gl)
         scene = self._xray_scene
         scene.ngeom = 0
         add_markers(scene, markers, flat=True)
         view.aim(scene)
-        mujoco.mjr_render(full, scene, self._gl)
-        colour = np.empty((height, width, 3), np.uint8)
-        mujoco.mjr_readPixels(colour, behind, part, self._gl)
-        target = self._colour[bottom : bottom + height, left : left + width]
-        blend_hidden(target, colour, before, behind)
+        colour = np.empty_like(self._colour)
+        self._draw(scene, self._drawn, colour, marker_depth)
+        blend_hidden(self._colour, colour, scene_depth, marker_depth)
 
 
 def reduced(drawn: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -239,12 +251,12 @@ def _visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
 
 
 @contextmanager
-def _buffer_settings(model: Any, size: tuple[int, int], profile: RenderProfile) -> Iterator[None]:
-    """Lend the model the profile's buffer sizes, which a MuJoCo context only reads from its model."""
+def buffer_settings(model: Any, size: tuple[int, int], samples: int, shadow_size: int) -> Iterator[None]:
+    """Lend the model other buffer sizes, px, which a MuJoCo context only reads from its model."""
     general, quality = model.vis.global_, model.vis.quality
     kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
     general.offwidth, general.offheight = size
-    quality.offsamples, quality.shadowsize = profile.samples, profile.shadow_size
+    quality.offsamples, quality.shadowsize = samples, shadow_size
     try:
         yield
     finally:
@@ -265,8 +277,8 @@ def _set_lights(scene: Any, lights: Sequence[DirectionalLight]) -> None:
         direction = np.array(light.direction, dtype=np.float64)
         target.headlight = 0
         target.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-        target.pos, target.dir = light.position, direction / np.linalg.norm(direction)
+        target.pos, target.dir = np.zeros(3), direction / np.linalg.norm(direction)
         target.attenuation = (1.0, 0.0, 0.0)
         target.ambient, target.diffuse = (light.ambient,) * 3, (light.diffuse,) * 3
         target.specular = (0.0,) * 3
-        target.castshadow = int(light.shadow)
+        target.castshadow = 0
