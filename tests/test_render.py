@@ -358,7 +358,9 @@ def test_leaving_out_what_is_beside_the_view_changes_no_pixel(scene, monkeypatch
         kept = made.frame(data, pose, markers, depth=True, segmentation=True)
         left_out = []
         monkeypatch.setattr(
-            rasteriser, "outside", lambda *a: left_out.append(outside(*a).mean()) or np.zeros(model.ngeom, bool)
+            rasteriser,
+            "outside",
+            lambda *a: left_out.append(outside(*a).mean()) or np.zeros(model.ngeom, bool),
         )
         whole = made.frame(data, pose, markers, depth=True, segmentation=True)
     assert left_out[0] > 0.3  # or nothing was tested
