@@ -9,7 +9,7 @@ import pytest
 from mjsim.actions import IDLE, EventKind, Move, Pick, Place, WorldEvent
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.clearance import ClearanceField
+from mjsim.model.clearance import ClearanceField, clearance_at
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.scene import Scene, compose
 from mjsim.observation import ObjectStatus
@@ -202,13 +202,13 @@ def test_clearance_is_the_distance_to_the_walls(small_catalogue: Catalogue) -> N
     field = ClearanceField.from_model(model, low=0.93, high=1.6)
     # West room: walls at x = 0, y = 0, y = 4 and, beside the doorway, x = 2.95. The crate is too low to count.
     for x, y in ((0.5, 1.0), (1.5, 0.4), (0.3, 3.5), (2.6, 0.7), (1.4, 1.3)):
-        room, away_x, away_y = field.at(x, y)
+        room, away_x, away_y = clearance_at(x, y, field)
         walls = {(1, 0): x, (0, 1): y, (0, -1): 4.0 - y, (-1, 0): 2.95 - x}
         direction = min(walls, key=lambda d: walls[d])
         assert room == pytest.approx(walls[direction], abs=0.04)
         assert (away_x, away_y) == pytest.approx(direction, abs=0.2)
-    assert field.at(3.0, 0.7)[0] < 0.0
-    assert field.at(3.0, 2.0)[0] == pytest.approx(0.5, abs=0.05)
+    assert clearance_at(3.0, 0.7, field)[0] < 0.0
+    assert clearance_at(3.0, 2.0, field)[0] == pytest.approx(0.5, abs=0.05)
 
 
 def test_minimum_jerk_starts_and_ends_at_rest() -> None:

@@ -236,7 +236,7 @@ class Full:
         self.monitor.set_state(state.details.health)
         person.rig.set_state(commands.rig)
         person.grips.set_state(commands.grips)
-        person.hand_velocities = commands.hand_velocities.copy()
+        person.hand_velocities[:] = commands.hand_velocities
         self.carrying.set_state(commands.carrying)
 
     def dislodged(self) -> list[int]:
@@ -282,7 +282,7 @@ class Full:
             self.episode_state.placed(self.time, motion.item, motion.receptacle, success)
 
     def _end_motion(self) -> None:
-        self.person.hand_velocities = np.zeros((2, 3))
+        self.person.hand_velocities[:] = 0.0
         self._motion = None
         self.person.moving_hand = None
 

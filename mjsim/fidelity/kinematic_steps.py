@@ -11,7 +11,8 @@ from mjsim.fidelity.body_state import BODY_SIZE, FORWARD, HEADING, PITCH, X, Y
 from mjsim.fidelity.kinematics import Gait
 from mjsim.fidelity.trunk_contact import Floor
 from mjsim.kernels import kernel
-from mjsim.person.postures import update_hands
+from mjsim.model.clearance import ClearanceField
+from mjsim.person.postures import BodyMotion, Contacts, Hands, Holding, update_hands
 from mjsim.rollout import RolloutArrays
 
 Floats = NDArray[np.float64]
@@ -28,7 +29,7 @@ REST, CARRY, TUCKED, ASIDE = 0, 1, 2, 3  # rows of `KinematicModel.postures`
 
 _PRIME = np.uint64(0x9E3779B97F4A7C15)
 _SHIFT = np.uint64(29)
-_NO_GEOMS, _NO_FRAMES, _NO_BEARERS = np.zeros((0, 2), np.int32), np.zeros((0, 9)), np.zeros(0, np.int32)
+_NO_GEOMS, _NO_FRAMES, _NO_OWNERS = np.zeros((0, 2), np.int32), np.zeros((0, 9)), np.zeros(0, np.int32)
 
 
 class KinematicState(NamedTuple):
@@ -53,7 +54,7 @@ class KinematicModel(NamedTuple):
         loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
         postures: Where an empty left hand belongs (`REST`), and one that holds something while walking (`CARRY`),
             turning (`TUCKED`) or when the other hand reaches (`ASIDE`), m, shape (4, 3).
-        distance, gradient, frame: Clearance at the height of the hands (`mjsim.model.clearance`).
+        clearance: Clearance at the heights of what is carried.
         timestep: Of the physics, s.
         compliance: Compliance offsets of the hands, which touch nothing: all 0, m, shape (2, 2).
         goals: Scratch space for the goals of the hands, m, shape (2, 3).
@@ -64,9 +65,7 @@ class KinematicModel(NamedTuple):
     grips: Floats
     loads: Floats
     postures: Floats
-    distance: Floats
-    gradient: Floats
-    frame: Floats
+    clearance: ClearanceField
     timestep: float
     compliance: Floats
     goals: Floats
@@ -94,12 +93,14 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
     """
     vector = state.vector
     body = vector[BODY:HANDS]
-    hands, speeds = vector[HANDS:HAND_SPEEDS].reshape(2, 3), vector[HAND_SPEEDS:GRASPS].reshape(2, 3)
+    targets, speeds = vector[HANDS:HAND_SPEEDS].reshape(2, 3), vector[HAND_SPEEDS:GRASPS].reshape(2, 3)
     update_hands(
-        body, body[FORWARD :], hands, speeds, model.compliance, model.goals,
-        held_in(vector, 0), held_in(vector, 1), moving, model.postures[posture], model.postures[REST], model.loads,
-        model.distance, model.gradient, model.frame, _NO_GEOMS, _NO_FRAMES, _NO_BEARERS, model.gait.dt,
-    )  # fmt: skip
+        BodyMotion(body, body[FORWARD:], model.clearance),
+        Hands(targets, speeds, model.compliance, model.goals, model.postures[REST], model.loads),
+        Holding(held_in(vector, 0), held_in(vector, 1), moving, model.postures[posture]),
+        Contacts(_NO_GEOMS, _NO_FRAMES, _NO_OWNERS),
+        model.gait.dt,
+    )
     kinematics.advance(body, model.gait, model.floor)
     for _ in range(model.gait.substeps):  # the sum that the physics forms, to the last bit
         vector[TIME] += model.timestep

@@ -30,7 +30,7 @@ from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person.grips import AWAKE
-from mjsim.person.postures import LOWEST, drawn_in
+from mjsim.person.postures import MIN_HEIGHT, BodyMotion, drawn_in
 from mjsim.rollout import RolloutArrays
 
 # An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.
@@ -54,16 +54,13 @@ class KinematicWorld:
         self.person_tree = int(scene.model.body_treeid[self._rig.body])
         self.state = KinematicState(np.zeros(STATE_SIZE), np.zeros((len(scene.index.names), 7)))
         self.asleep = np.zeros(scene.model.ntree, np.int32)
-        distance, gradient, frame = carrying.field
         self.model = KinematicModel(
             gait=Gait.of(scene.model, options),
             floor=compiled_house(scene.catalogue).once(("floor",), lambda: Floor.of(scene.model)),
             grips=_grip_poses(scene),
             loads=carrying.loads,
             postures=np.array([avatar.REST, avatar.CARRY, avatar.TUCKED, avatar.ASIDE]),
-            distance=distance,
-            gradient=gradient,
-            frame=frame,
+            clearance=carrying.clearance,
             timestep=float(scene.model.opt.timestep),
             compliance=np.zeros((2, 2)),
             goals=np.zeros((2, 3)),
@@ -152,10 +149,8 @@ class KinematicWorld:
         forward, left, up = avatar.posture(hand, avatar.CARRY)
         body, model = self._body, self.model
         radius, height = model.loads[item].tolist()
-        point = drawn_in(
-            forward, left, radius, body, body[FORWARD:], model.distance, model.gradient, model.frame
-        )
-        return np.array([*point, max(up, LOWEST + height)])
+        point = drawn_in(forward, left, radius, BodyMotion(body, body[FORWARD:], model.clearance))
+        return np.array([*point, max(up, MIN_HEIGHT + height)])
 
     def walk(self, moves: NDArray[np.float64]) -> RolloutArrays:
         """One control step per row (n, 4): forward and left, m/s, turn and look, rad/s."""

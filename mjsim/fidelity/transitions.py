@@ -21,7 +21,7 @@ def enter(full: Full, kinematic: KinematicWorld) -> None:
     rig.rates[:4], rig.rates[4:] = body[4:FORWARD], hand_speeds
     targets = hands.reshape(2, 3)
     rig.set_state(RigState(body[FORWARD:SERVO], targets, targets, np.concatenate((body[SERVO:], hands))))
-    person.hand_velocities = hand_speeds.reshape(2, 3).copy()
+    person.hand_velocities[:] = hand_speeds.reshape(2, 3)
     full.carrying.reset()
     person.grips.reset()
     for hand, grasp in enumerate(kinematic.grasps):

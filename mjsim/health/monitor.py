@@ -1,7 +1,7 @@
-"""Looks at the physics after every control step: warnings, penetration, weld errors, settling times and escapes.
+"""Checks the physics after every control step: warnings, penetration, weld errors, settling times and anomalies.
 
-`docs/health.md` defines every term. What cannot be trusted any further is a `PhysicsError`; what can be is counted,
-and reported as an event.
+`docs/health.md` defines every term. A state that cannot be trusted any further is a `PhysicsError`; anything less is
+counted, and reported as an event.
 """
 
 import math
@@ -13,14 +13,9 @@ import numpy as np
 
 from mjsim.actions import EventKind
 from mjsim.errors import PhysicsError
-from mjsim.health.anomalies import (
-    MOVED_DISTANCE,
-    AnomalyDetector,
-    AnomalyState,
-    Releases,
-    ReleasesState,
-)
-from mjsim.health.scan import ESCAPING, NOT_FINITE, WARNED, survey
+from mjsim.health.anomalies import CHECK_DISTANCE, AnomalyDetector, AnomalyState
+from mjsim.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan
+from mjsim.health.settling import SettlingState, SettlingTracker
 from mjsim.health.values import QUIET, Health, HealthSample
 from mjsim.model.clearance import carry_clearance
 from mjsim.model.scene import Scene
@@ -28,8 +23,9 @@ from mjsim.options import WorldOptions
 from mjsim.person.grips import Grips
 from mjsim.person.rig import Rig
 
-_KICK = 2.0  # times the walking speed: a light thing that bounces off somebody who walks into it
-_FALL = 5.6  # m/s, from the height at which things are carried
+_KICK = 2.0  # times the walking speed: a light object that bounces off somebody who walks into it
+_FALL = 5.6  # m/s, from the height at which objects are carried
+_NO_GEOMS, _NO_DISTANCES = np.zeros((0, 2), np.int32), np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +37,14 @@ class HealthState:
         settle_times: See `Health.settle_times`.
         sample: The latest control step.
         anomalies: Objects that flew off or passed through something.
-        releases: Objects between release and rest.
+        settling: Objects between release and rest.
     """
 
     extremes: tuple[float, float, float, float]
     settle_times: tuple[float, ...]
     sample: HealthSample
     anomalies: AnomalyState
-    releases: ReleasesState
+    settling: SettlingState
 
 
 class HealthMonitor:
@@ -59,59 +55,72 @@ class HealthMonitor:
     """
 
     def __init__(self, scene: Scene, options: WorldOptions, rig: Rig, grips: Grips) -> None:
-        index = scene.index
-        self._index, self._rig, self._grips = index, rig, grips
-        self._limits = (
-            np.array([MOVED_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
+        index, data = scene.index, rig.data
+        self._rig, self._grips = rig, grips
+        self._anomalies = AnomalyDetector(scene)
+        self._settling = SettlingTracker(scene)
+        limits = np.array([CHECK_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
+        self._arrays = ScanArrays(
+            qpos=data.qpos,
+            qvel=data.qvel,
+            xipos=data.xipos,
+            site_xpos=data.site_xpos,
+            site_xmat=data.site_xmat,
+            warnings=data.warning.number,
+            bodies=index.bodies,
+            dofs=index.dofs,
+            geom_owner=index.geom_owner,
+            trunk=rig.trunk,
+            foot=rig.foot,
+            limits=limits,
+            clearance=carry_clearance(scene),
+            rooms=scene.rooms.rectangles,
+            grip_sites=grips.sites,
+            anchors=self._anomalies.anchors,
+            flags=np.zeros(len(index.names), np.uint8),
+            sample=np.zeros(6),
         )
-        self._marks = np.zeros(len(index.names), np.uint8)
-        self._sample = np.zeros(6)
-        self._field, self._rooms = carry_clearance(scene).arrays, scene.rooms.rectangles
-        self._escapes = AnomalyDetector(scene)
-        self._releases = Releases(scene)
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; the state is that of the beginning."""
+        """Forget everything; the state is that of the episode's beginning."""
         self._deepest = self._deepest_trunk = self._stretched = self._twisted = 0.0
         self._settle_times: list[float] = []
         self.sample = QUIET
-        self._escapes.reset(self._rig.data)
-        self._releases.reset()
+        self._anomalies.reset(self._rig.data)
+        self._settling.reset()
 
     def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
-        """Record this control step.
+        """Take the latest control step into account.
 
         Args:
             held: Object that each hand carries.
 
         Returns:
-            AnomalyDetector of objects, each with the object's number.
+            Ejections and tunnelling, each with the object's number.
 
         Raises:
             PhysicsError: MuJoCo warned, or a position or velocity is not finite.
         """
-        data = self._rig.data
-        escaping = self._survey(data, held)
-        deepest, trunk, left, right, left_angle, right_angle = self._sample.tolist()
+        data, arrays = self._rig.data, self._arrays
+        suspect = self._scan(data, held)
+        deepest, trunk, left, right, left_angle, right_angle = arrays.sample.tolist()
         self._deepest, self._deepest_trunk = max(self._deepest, deepest), max(self._deepest_trunk, trunk)
         # NaN loses every comparison, and so the second place in a maximum.
         self._stretched = max(self._stretched, left, right)
         self._twisted = max(self._twisted, left_angle, right_angle)
-        gripped = self._grips.gripped
-        settle = math.nan
-        if gripped or self._releases.any:
-            settled = self._releases.follow(data, gripped, self._marks)
-            self._settle_times += settled
-            settle = max(settled, default=math.nan)
+        gripped, settling = self._grips.gripped, self._settling
+        settled = settling.update(data, gripped, arrays.flags)
+        self._settle_times += settled
+        settle = max(settled, default=math.nan)
         self.sample = HealthSample(deepest, trunk, (left, right), (left_angle, right_angle), settle)
-        if not escaping and not self._releases.falling:
+        if not suspect and not settling.objects:
             return ()
-        return self._escapes.find(data, self._marks, self._releases, gripped)
+        return self._anomalies.find(data, arrays.flags, settling.objects, gripped)
 
     def resume(self) -> None:
-        """Go on after something else than physics has moved the person and what the hands hold."""
-        self._escapes.resume(self._rig.data)
+        """Go on after the person and what the hands hold were moved without physics."""
+        self._anomalies.move_anchors(self._rig.data)
 
     def get_state(self) -> HealthState:
         """Everything accumulated, as a value."""
@@ -119,8 +128,8 @@ class HealthMonitor:
             extremes=(self._deepest, self._deepest_trunk, self._stretched, self._twisted),
             settle_times=tuple(self._settle_times),
             sample=self.sample,
-            anomalies=self._escapes.get_state(),
-            releases=self._releases.get_state(),
+            anomalies=self._anomalies.get_state(),
+            settling=self._settling.get_state(),
         )
 
     def set_state(self, state: HealthState) -> None:
@@ -128,36 +137,34 @@ class HealthMonitor:
         self._deepest, self._deepest_trunk, self._stretched, self._twisted = state.extremes
         self._settle_times = list(state.settle_times)
         self.sample = state.sample
-        self._escapes.set_state(state.anomalies)
-        self._releases.set_state(state.releases)
+        self._anomalies.set_state(state.anomalies)
+        self._settling.set_state(state.settling)
 
     def snapshot(self) -> Health:
-        """The extremes as a value."""
+        """Extremes and counts since the last reset."""
         return Health(
             max_penetration_m=self._deepest,
             max_trunk_penetration_m=self._deepest_trunk,
             max_weld_error_m=self._stretched,
             max_weld_error_rad=self._twisted,
             settle_times=tuple(self._settle_times),
-            ejections=self._escapes.ejections,
-            tunnellings=self._escapes.tunnellings,
-            warnings=int(self._rig.data.warning.number.sum()),
+            ejections=self._anomalies.ejections,
+            tunnellings=self._anomalies.tunnellings,
+            warnings=int(self._arrays.warnings.sum()),
         )
 
-    def _survey(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:
-        """Whether any object may be escaping; samples and marks everything."""
-        index, rig, contact = self._index, self._rig, data.contact
-        state = survey(
-            data.qpos, data.qvel, data.xipos, data.site_xpos, data.site_xmat, contact.geom, contact.dist,
-            data.warning.number, index.bodies, index.dofs, index.geom_owner, rig.trunk, rig.foot, self._limits,
-            self._grips.pairs, held[0] is not None, held[1] is not None, self._field, self._rooms,
-            self._escapes.anchors, self._marks, self._sample,
-        )  # fmt: skip
-        if state == WARNED:
+    def _scan(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:
+        """Fill sample and flags; whether any object may be ejected or have tunnelled."""
+        geoms, distances = _NO_GEOMS, _NO_DISTANCES
+        if data.ncon:
+            # Strides differ with the number of contacts, and kernels with the strides.
+            geoms, distances = map(np.ascontiguousarray, (data.contact.geom, data.contact.dist))
+        found = scan(self._arrays, geoms, distances, held[0] is not None, held[1] is not None)
+        if found == WARNED:
             raise PhysicsError(_warning_text(data))
-        if state == NOT_FINITE:
-            raise PhysicsError(_not_finite_text(rig.model, data))
-        return bool(state == ESCAPING)
+        if found == NOT_FINITE:
+            raise PhysicsError(_not_finite_text(self._rig.model, data))
+        return bool(found == SUSPECT)
 
 
 def _warning_text(data: mujoco.MjData) -> str:

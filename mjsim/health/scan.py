@@ -1,119 +1,148 @@
 """One pass over the state, the objects, the hands and the contacts after a control step, as a numba kernel."""
 
 import math
-from typing import Any
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
-from mjsim.model.clearance import way_is_clear
+from mjsim.model.clearance import ClearanceField, is_path_clear
 from mjsim.model.rooms import nearest_rectangle
 from mjsim.person.grips import site_angle, site_gap
 
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
 OUTSIDE = 0.3  # m; rooms end at their walls, and doorways lie in between
 
-# What a survey finds.
-WELL, ESCAPING, WARNED, NOT_FINITE = 0, 1, 2, 3
-# Marks of an object: farther than a distance from where it was last looked at, faster than a speed, slower than
-# another, and touched by the person's foot.
-MOVED, FAST, SLOW, PUSHED = 1, 2, 4, 8
+# What a scan finds.
+NORMAL, SUSPECT, WARNED, NOT_FINITE = 0, 1, 2, 3
+# Flags of an object: farther than a distance from its anchor, faster than a speed, slower than another, and touched
+# by the person's foot.
+DISPLACED, FAST, SLOW, PUSHED = 1, 2, 4, 8
+
+
+class ScanArrays(NamedTuple):
+    """What a scan reads and writes, for one simulation: views of its state, its model, and the results.
+
+    Attributes:
+        qpos: Positions, shape (nq,).
+        qvel: Velocities, shape (nv,).
+        xipos: Centres of mass of all bodies, m, shape (nbody, 3).
+        site_xpos: Positions of all sites, m, shape (nsite, 3).
+        site_xmat: Their frames, shape (nsite, 9).
+        warnings: How often MuJoCo has warned, by kind, shape (nwarning,).
+        bodies: Body of each object, shape (n,).
+        dofs: First degree of freedom of each object, shape (n,).
+        geom_owner: Object of each geom, or -1, shape (ngeom,).
+        trunk, foot: The person's trunk and foot, geoms.
+        limits: Squares of the distance from its anchor, m, beyond which an object is `DISPLACED`, of the speed, m/s,
+            beyond which it is `FAST`, and of the speed below which it is `SLOW`, shape (3,).
+        clearance: Clearance at the heights of what is carried.
+        rooms: `RoomMap.rectangles`.
+        grip_sites: `Grips.sites`.
+        anchors: Where each object was when its path was last checked, m, shape (n, 3); moved along where `clearance`
+            shows the path to be clear.
+        flags: Flags of each object, shape (n,); overwritten.
+        sample: The deepest overlap of an object with anything but the person, and that of the trunk with the house,
+            both in m and not negative; how far the weld of either hand is stretched, m, and twisted, rad, NaN for a
+            hand that carries nothing; shape (6,), overwritten.
+    """
+
+    qpos: Floats
+    qvel: Floats
+    xipos: Floats
+    site_xpos: Floats
+    site_xmat: Floats
+    warnings: Ints
+    bodies: Ints
+    dofs: Ints
+    geom_owner: Ints
+    trunk: int
+    foot: int
+    limits: Floats
+    clearance: ClearanceField
+    rooms: tuple[Floats, Floats, Floats]
+    grip_sites: NDArray[np.intp]
+    anchors: Floats
+    flags: NDArray[np.uint8]
+    sample: Floats
 
 
 @kernel
-def survey(
-    qpos: Any, qvel: Any, xipos: Any, site_xpos: Any, site_xmat: Any, geoms: Any, dists: Any, warnings: Any,
-    bodies: Any, dofs: Any, owner: Any, trunk: int, foot: int, limits: Any, pairs: Any, left: bool, right: bool,
-    field: Any, rooms: Any, anchors: Any, marks: Any, sample: Any,
-) -> int:  # fmt: skip
+def scan(arrays: ScanArrays, geoms: Ints, distances: Floats, left: bool, right: bool) -> int:
     """Look at the state, all objects, both hands and all contacts once.
 
     Args:
-        qpos: Positions.
-        qvel: Velocities.
-        xipos: Centres of mass of all bodies, m, (nbody, 3).
-        site_xpos: Positions of all sites, m, (nsite, 3).
-        site_xmat: Their frames, (nsite, 9).
-        geoms: Geoms of each contact, (ncon, 2).
-        dists: Distance of each contact, m, negative where geoms overlap, (ncon,).
-        warnings: How often MuJoCo has warned, by kind.
-        bodies: Body of each object, (n,).
-        dofs: First degree of freedom of each object, (n,).
-        owner: Object of each geom, or -1, (ngeom,).
-        trunk: The person's trunk, a geom.
-        foot: The person's foot, a geom.
-        limits: Squares of the distance, m, beyond which an object counts as `MOVED`, of the speed, m/s, beyond which
-            it is `FAST`, and of the speed below which it is `SLOW`, (3,).
-        pairs: `Grips.pairs`.
+        arrays: What is read and written.
+        geoms: Geoms of each contact, shape (ncon, 2).
+        distances: Distance of each contact, m, negative where geoms overlap, shape (ncon,).
         left: Whether the left hand carries something.
         right: Whether the right one does.
-        field: Arrays of `carry_clearance`.
-        rooms: `RoomMap.rectangles`.
-        anchors: Where each object was last looked at, m, (n, 3); moved along where the way is clear by `field`.
-        marks: Marks of each object, (n,); overwritten.
-        sample: The deepest overlap of an object with anything but the person, and that of the trunk with the house,
-            both in m and not negative; how far the weld of either hand is stretched, m, and twisted, rad, NaN for a
-            hand that carries nothing; (6,), overwritten.
 
     Returns:
-        `WELL`, `ESCAPING` if any object has to be looked at or is fast, `WARNED` or `NOT_FINITE`.
+        `NORMAL`, `SUSPECT` if any object has to be looked at or is fast, `WARNED` or `NOT_FINITE`.
     """
-    for count in warnings:
+    for count in arrays.warnings:
         if count:
             return WARNED
     total = 0.0
-    for value in qpos:
+    for value in arrays.qpos:
         total += value
-    for value in qvel:
+    for value in arrays.qvel:
         total += value
     if not math.isfinite(total):
         return NOT_FINITE
-    state = _mark_objects(qvel, xipos, bodies, dofs, limits, field, rooms, anchors, marks)
-    sample[0], sample[1] = _overlaps(geoms, dists, owner, trunk, foot, marks)
+    state = _flag_objects(arrays)
+    sample, sites = arrays.sample, arrays.grip_sites
+    sample[0], sample[1] = _overlaps(arrays, geoms, distances)
     for hand in range(2):
         sample[2 + hand] = sample[4 + hand] = math.nan
-        if (left if hand == 0 else right) and pairs[hand, 0] >= 0:
-            sample[2 + hand] = site_gap(site_xpos, pairs[hand, 0], pairs[hand, 1])
-            sample[4 + hand] = site_angle(site_xmat, pairs[hand, 0], pairs[hand, 1])
+        if (left if hand == 0 else right) and sites[hand, 0] >= 0:
+            sample[2 + hand] = site_gap(arrays.site_xpos, sites[hand, 0], sites[hand, 1])
+            sample[4 + hand] = site_angle(arrays.site_xmat, sites[hand, 0], sites[hand, 1])
     return state
 
 
 @kernel
-def _mark_objects(
-    qvel: Any, xipos: Any, bodies: Any, dofs: Any, limits: Any, field: Any, rooms: Any, anchors: Any, marks: Any
-) -> int:  # fmt: skip
-    state = WELL
-    for item in range(len(bodies)):
-        body, dof, mark = bodies[item], dofs[item], 0
+def _flag_objects(arrays: ScanArrays) -> int:
+    state, anchors, limits, rooms = NORMAL, arrays.anchors, arrays.limits, arrays.rooms
+    for item in range(len(arrays.bodies)):
+        center, dof, flags = arrays.xipos[arrays.bodies[item]], arrays.dofs[item], 0
         gap = speed = 0.0
         for k in range(3):
-            gap += (xipos[body, k] - anchors[item, k]) ** 2
-            speed += qvel[dof + k] ** 2
+            gap += (center[k] - anchors[item, k]) ** 2
+            speed += arrays.qvel[dof + k] ** 2
         if gap > limits[0]:
-            at = xipos[body]
-            clear = way_is_clear(anchors[item], at, field[0], field[1], field[2])
-            if clear and nearest_rectangle(at[0], at[1], rooms[0], rooms[1], rooms[2]) <= OUTSIDE:
-                anchors[item, 0], anchors[item, 1], anchors[item, 2] = at[0], at[1], at[2]
+            clear = is_path_clear(anchors[item], center, arrays.clearance)
+            if clear and nearest_rectangle(center[0], center[1], rooms[0], rooms[1], rooms[2]) <= OUTSIDE:
+                anchors[item, 0], anchors[item, 1], anchors[item, 2] = center[0], center[1], center[2]
             else:
-                mark |= MOVED
+                flags |= DISPLACED
         if speed > limits[1]:
-            mark |= FAST
-        if mark:
-            state = ESCAPING
+            flags |= FAST
+        if flags:
+            state = SUSPECT
         if speed < limits[2]:
-            mark |= SLOW
-        marks[item] = mark
+            flags |= SLOW
+        arrays.flags[item] = flags
     return state
 
 
 @kernel
-def _overlaps(geoms: Any, dists: Any, owner: Any, trunk: int, foot: int, marks: Any) -> tuple[float, float]:
+def _overlaps(arrays: ScanArrays, geoms: Ints, distances: Floats) -> tuple[float, float]:
+    """Deepest overlap of an object and of the trunk, m; flags what the foot touches."""
+    trunk, foot, owner = arrays.trunk, arrays.foot, arrays.geom_owner
     deepest = deepest_trunk = 0.0
-    for c in range(len(dists)):
+    for c in range(len(distances)):
         first, second = geoms[c, 0], geoms[c, 1]
         if first == trunk or second == trunk:
-            deepest_trunk = max(deepest_trunk, -dists[c])
+            deepest_trunk = max(deepest_trunk, -distances[c])
         elif first == foot or second == foot:
             item = owner[second] if first == foot else owner[first]
-            if item >= 0 and dists[c] < 0.0:
-                marks[item] |= PUSHED
+            if item >= 0 and distances[c] < 0.0:
+                arrays.flags[item] |= PUSHED
         else:
-            deepest = max(deepest, -dists[c])
+            deepest = max(deepest, -distances[c])
     return deepest, deepest_trunk

@@ -1,7 +1,7 @@
 """How far a point at carrying height is from walls and furniture: a signed distance field over the floor."""
 
 import math
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,31 +16,21 @@ from mjsim.model.scene import Scene
 _BORDER = 0.4  # m of grid around the rooms
 
 
-@dataclass(frozen=True, eq=False)
-class ClearanceField:
-    """Signed distance to the static geoms of a band of heights, on a grid.
+class ClearanceField(NamedTuple):
+    """Signed distance to the static geoms of a band of heights, on a grid; also for kernels.
 
     Attributes:
-        origin: Centre (x, y) of cell (0, 0), m.
-        resolution: Cell size, m.
         distance: Distance of each cell's centre, m, positive outside, shape (nx, ny).
         gradient: Direction of increasing distance, shape (nx, ny, 2).
-        frame: Origin x, y and resolution, m, for kernels, shape (3,).
+        origin_x, origin_y: Centre of cell (0, 0), m.
+        resolution: Cell size, m.
     """
 
-    origin: tuple[float, float]
-    resolution: float
     distance: NDArray[np.float64]
     gradient: NDArray[np.float64]
-    frame: NDArray[np.float64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "frame", np.array([*self.origin, self.resolution]))
-
-    @property
-    def arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Distance, gradient and frame, for kernels."""
-        return self.distance, self.gradient, self.frame
+    origin_x: float
+    origin_y: float
+    resolution: float
 
     @classmethod
     def from_model(
@@ -63,24 +53,15 @@ class ClearanceField:
         gradient = np.stack(np.gradient(distance, resolution), axis=-1)
         size = np.linalg.norm(gradient, axis=-1, keepdims=True)
         unit = np.divide(gradient, size, out=np.zeros_like(gradient), where=size > 1e-9)
-        return cls((float(origin[0]), float(origin[1])), resolution, distance, unit)
-
-    def at(self, x: float, y: float) -> tuple[float, float, float]:
-        """Distance at a point, m, interpolated, and the direction (x, y) away from the nearest geom."""
-        return clearance_at(x, y, self.distance, self.gradient, self.frame)
+        return cls(distance, unit, float(origin[0]), float(origin[1]), resolution)
 
 
 @kernel
-def clearance_at(
-    x: float,
-    y: float,
-    distance: NDArray[np.float64],
-    gradient: NDArray[np.float64],
-    frame: NDArray[np.float64],
-) -> tuple[float, float, float]:
-    """What `ClearanceField.at` gives, from the field's arrays."""
-    u = (x - frame[0]) / frame[2]
-    v = (y - frame[1]) / frame[2]
+def clearance_at(x: float, y: float, field: ClearanceField) -> tuple[float, float, float]:
+    """Distance at a point, m, interpolated, and the direction (x, y) away from the nearest geom."""
+    distance, gradient = field.distance, field.gradient
+    u = (x - field.origin_x) / field.resolution
+    v = (y - field.origin_y) / field.resolution
     i = min(max(int(u), 0), distance.shape[0] - 2)
     j = min(max(int(v), 0), distance.shape[1] - 2)
     a, b = min(max(u - i, 0.0), 1.0), min(max(v - j, 0.0), 1.0)
@@ -102,19 +83,13 @@ def carry_clearance(scene: Scene) -> ClearanceField:
 
 
 @kernel
-def way_is_clear(
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
-    distance: NDArray[np.float64],
-    gradient: NDArray[np.float64],
-    frame: NDArray[np.float64],
-) -> bool:
+def is_path_clear(start: NDArray[np.float64], end: NDArray[np.float64], field: ClearanceField) -> bool:
     """Whether nothing static can lie between two points (3,), m, by the field of `carry_clearance` alone."""
     low, high = CARRY_BAND
     if min(start[2], end[2]) < low or max(start[2], end[2]) > high:
         return False
-    room, _, _ = clearance_at(start[0], start[1], distance, gradient, frame)
-    return bool(math.hypot(end[0] - start[0], end[1] - start[1]) < room - 2.0 * frame[2])
+    room, _, _ = clearance_at(start[0], start[1], field)
+    return bool(math.hypot(end[0] - start[0], end[1] - start[1]) < room - 2.0 * field.resolution)
 
 
 def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:

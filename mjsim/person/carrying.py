@@ -1,6 +1,6 @@
-"""Carrying: the posture of the hands, and how they keep what they hold off the house.
+"""Carrying: the hands keep their postures and hold their loads clear of the house (`mjsim.person.postures`).
 
-How a hand does that is in `postures`. What still gets caught, by a blow or from above, slips out of the hand.
+A load that gets caught all the same slips out of the hand.
 """
 
 from dataclasses import dataclass
@@ -13,11 +13,20 @@ from mjsim.model import avatar
 from mjsim.model.clearance import carry_clearance
 from mjsim.model.scene import Scene
 from mjsim.person.person import Person
-from mjsim.person.postures import LOWEST, count_strain, drawn_in, update_hands
+from mjsim.person.postures import (
+    MIN_HEIGHT,
+    BodyMotion,
+    Contacts,
+    Hands,
+    Holding,
+    count_strain,
+    drawn_in,
+    update_hands,
+)
 from mjsim.person.slots import object_corners
 
-_NO_CONTACTS = (np.zeros((0, 2), np.int32), np.zeros((0, 9)))
-_HOUSE, _PERSON = -1, -2  # who bears a geom, where no object does
+_NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
+_HOUSE, _PERSON = -1, -2  # owners of geoms that belong to no object
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,51 +47,54 @@ class Carrying:
 
     Attributes:
         loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
-        field: Clearance at the heights of what is carried: arrays of a `ClearanceField`, for kernels.
+        clearance: Clearance at the heights of what is carried.
     """
 
     def __init__(self, person: Person) -> None:
-        scene = person.scene
+        scene, rig = person.scene, person.rig
         self._person = person
-        self.field = carry_clearance(scene).arrays
+        self.clearance = carry_clearance(scene)
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
-        self._bearer = _bearers(scene)
-        self._rest = np.array(avatar.REST)
+        self._owners = _geom_owners(scene)
+        self._no_contacts = Contacts(_NO_GEOMS, _NO_FRAMES, self._owners)
         self._postures = {p: np.array(p) for p in (avatar.CARRY, avatar.TUCKED, avatar.ASIDE)}
-        self._goals = np.zeros((2, 3))
-        self._compliance = np.zeros((2, 2))
+        self._body = BodyMotion(rig.pose, rig.motion, self.clearance)
+        self._hands = Hands(
+            rig.hand_targets,
+            person.hand_velocities,
+            compliance=np.zeros((2, 2)),
+            goals=np.zeros((2, 3)),
+            rest=np.array(avatar.REST),
+            loads=self.loads,
+        )
         self._strained = np.zeros(2, np.int64)
 
     def reset(self) -> None:
         """Forget all contacts."""
-        self._compliance[:] = 0.0
+        self._hands.compliance[:] = 0.0
         self._strained[:] = 0
 
     def get_state(self) -> CarryingState:
         """Compliance offsets and strain of the hands as a value."""
-        return CarryingState(self._compliance.copy(), self._strained.copy())
+        return CarryingState(self._hands.compliance.copy(), self._strained.copy())
 
     def set_state(self, state: CarryingState) -> None:
         """Go on from what `get_state` gave."""
-        self._compliance[:] = state.compliance
+        self._hands.compliance[:] = state.compliance
         self._strained[:] = state.strained
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
-        """Set the targets of the hands that no motion moves, and guard the walking command.
+        """Set the targets of the hands that no motion moves, and keep the walking command off contacts.
 
         Args:
             held_posture: Where a hand that holds something belongs, such as `avatar.CARRY`.
         """
-        person, rig = self._person, self._person.rig
+        person = self._person
         left, right = (-1 if item is None else item for item in person.held)
         moving = -1 if person.moving_hand is None else person.moving_hand
-        geoms, frames = self._contacts() if left >= 0 or right >= 0 else _NO_CONTACTS
-        posture = self._postures[held_posture]
-        update_hands(
-            rig.pose, rig.motion, rig.hand_targets, person.hand_velocities, self._compliance, self._goals,
-            left, right, moving, posture, self._rest, self.loads, *self.field,
-            geoms, frames, self._bearer, person.dt,
-        )  # fmt: skip
+        holding = Holding(left, right, moving, self._postures[held_posture])
+        contacts = self._contacts() if left >= 0 or right >= 0 else self._no_contacts
+        update_hands(self._body, self._hands, holding, contacts, person.dt)
 
     def place_for(
         self, hand: int, item: int, held_posture: tuple[float, float, float] = avatar.CARRY
@@ -90,29 +102,35 @@ class Carrying:
         """Where a hand best holds object `item` now, clear of the house: body frame, m, (3,)."""
         radius, height = self.loads[item].tolist()
         forward, side, up = avatar.posture(hand, held_posture)
-        rig = self._person.rig
-        return np.array(
-            [*drawn_in(forward, side, radius, rig.pose, rig.motion, *self.field), max(up, LOWEST + height)]
-        )
+        return np.array([*drawn_in(forward, side, radius, self._body), max(up, MIN_HEIGHT + height)])
 
-    def _contacts(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-        """Geoms (k, 2) and frames (k, 9) of all contacts."""
-        contact = self._person.data.contact
+    def _contacts(self) -> Contacts:
+        """All contacts of the physics."""
+        data = self._person.data
+        if not data.ncon:
+            return self._no_contacts
+        contact = data.contact
         # Strides differ with the number of contacts, and kernels with the strides.
-        return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame)
+        geoms, frames = np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame)
+        return Contacts(geoms, frames, self._owners)
 
     def slipped(self) -> tuple[int, ...]:
-        """Hands that have for too long been stretched off their loads, or held back by them; counts this step."""
-        person, rig, options = self._person, self._person.rig, self._person.options
+        """Hands whose loads have been strained for too long: stretched off the grip, or held back; counts this step."""
+        person, options = self._person, self._person.options
         left, right = person.held
         if left is None and right is None:
             self._strained[:] = 0
             return ()
-        patience = options.grip_patience / person.dt
         found = count_strain(
-            rig.pose, rig.hand_targets, person.data.site_xpos, person.grips.pairs, left is not None,
-            right is not None, options.grip_error, patience, self._strained,
-        )  # fmt: skip
+            person.rig.pose,
+            person.rig.hand_targets,
+            person.data.site_xpos,
+            person.grips.sites,
+            (left is not None, right is not None),
+            options.grip_error,
+            options.grip_patience / person.dt,
+            self._strained,
+        )
         return tuple(hand for hand in (LEFT, RIGHT) if found & (1 << hand))
 
 
@@ -125,7 +143,7 @@ def _load(person: Person, item: int) -> tuple[float, float]:
     return float(np.hypot(about[:, 0], about[:, 1]).max()), float(-about[:, 2].min())
 
 
-def _bearers(scene: Scene) -> NDArray[np.int32]:
+def _geom_owners(scene: Scene) -> NDArray[np.int32]:
     """Object that each geom belongs to, `_HOUSE` or `_PERSON`, shape (ngeom,)."""
     model, owner = scene.model, scene.index.geom_owner
     static = model.body_weldid[model.geom_bodyid] == 0

@@ -1,16 +1,16 @@
 """Hands hold objects by welds between a hand's site and a grip site of the object."""
 
+import itertools
 import math
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import AssetError
 from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
-from mjsim.person.rig import Rig
+from mjsim.person.rig import Rig, find_id
 
 AWAKE = -11  # in `MjData.tree_asleep`: for ten steps of the physics at least
 
@@ -19,38 +19,29 @@ GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and 
 
 
 class Grips:
-    """Closes, opens and watches the welds of the pool that `avatar.attach_avatar` declared."""
+    """Closes, opens and measures the welds that `avatar.attach_avatar` declared: hand x object x grip x stiffness.
+
+    Attributes:
+        gripped: Objects that are welded to a hand, left before right.
+        sites: Site of each hand and of the grip that it holds, -1 where it holds none, shape (2, 2).
+    """
 
     def __init__(self, scene: Scene, data: mujoco.MjData, rig: Rig) -> None:
         self._data = data
         self._trees = scene.index.trees
         self._hand_sites = rig.grip_sites
-        names = scene.index.names
-        self._sites = np.array(
-            [
-                [_id(scene.model, mujoco.mjtObj.mjOBJ_SITE, f"{n}/grip_{k}") for k in avatar.GRIPS]
-                for n in names
-            ],
-            np.intp,
-        )
-        self._welds = np.array(
-            [
-                [
-                    [
-                        [
-                            _id(scene.model, mujoco.mjtObj.mjOBJ_EQUALITY, avatar.grip_name(h, n, k, kind))
-                            for kind in (avatar.GENTLE, avatar.FIRM)
-                        ]
-                        for k in avatar.GRIPS
-                    ]
-                    for n in names
-                ]
-                for h in avatar.HANDS
-            ],
-            np.intp,
-        )
-        self._closed: list[tuple[int, int] | None] = [None, None]
-        self.pairs = np.full((2, 2), -1, np.intp)
+        model, names, kinds = scene.model, scene.index.names, (avatar.GENTLE, avatar.FIRM)
+        sites = [
+            find_id(model, mujoco.mjtObj.mjOBJ_SITE, f"{name}/grip_{grip}")
+            for name, grip in itertools.product(names, avatar.GRIPS)
+        ]
+        welds = [
+            find_id(model, mujoco.mjtObj.mjOBJ_EQUALITY, avatar.grip_name(*key))
+            for key in itertools.product(avatar.HANDS, names, avatar.GRIPS, kinds)
+        ]
+        self._grip_sites = np.array(sites, np.intp).reshape(len(names), -1)
+        self._welds = np.array(welds, np.intp).reshape(2, len(names), -1, 2)
+        self.sites = np.full((2, 2), -1, np.intp)
         self.reset()
 
     def nearest_grip(self, hand: int, item: int) -> int:
@@ -59,57 +50,57 @@ class Grips:
 
     def grip_along(self, item: int, forward: NDArray[np.float64]) -> int:
         """Grip of object `item` whose x axis is nearest to a direction (3,): 0 or 1."""
-        agreement = [float(self._data.site_xmat[site, 0::3] @ forward) for site in self._sites[item]]
+        agreement = [float(self._data.site_xmat[site, 0::3] @ forward) for site in self._grip_sites[item]]
         return int(np.argmax(agreement))
 
     def point(self, item: int, grip: int) -> NDArray[np.float64]:
         """Position of a grip site, m, shape (3,)."""
-        return np.array(self._data.site_xpos[self._sites[item, grip]])
+        return np.array(self._data.site_xpos[self._grip_sites[item, grip]])
 
     def gap(self, hand: int, item: int, grip: int) -> float:
         """Distance between a hand and a grip site, m."""
-        return site_gap(self._data.site_xpos, self._hand_sites[hand], self._sites[item, grip])
+        return site_gap(self._data.site_xpos, self._hand_sites[hand], self._grip_sites[item, grip])
 
     def close(self, hand: int, item: int, grip: int, *, gently: bool = False) -> None:
         """Weld object `item` to a hand, firmly or at first gently; a sleeping object wakes."""
         self._data.eq_active[self._welds[hand, item, grip]] = (gently, not gently)
-        self._closed[hand] = (item, grip)
-        self._note()
+        self._held[hand] = (item, grip)
+        self._update()
 
     def open(self, hand: int) -> None:
         """Let go of what a hand holds, if anything."""
-        closed = self._closed[hand]
-        if closed is not None:
-            self._data.eq_active[self._welds[hand, closed[0], closed[1]]] = 0
+        held = self._held[hand]
+        if held is not None:
+            self._data.eq_active[self._welds[hand, held[0], held[1]]] = 0
             # Falls begin slowly: what was held still would fall asleep in the air.
-            self._data.tree_asleep[self._trees[closed[0]]] = AWAKE
-            self._closed[hand] = None
-            self._note()
+            self._data.tree_asleep[self._trees[held[0]]] = AWAKE
+            self._held[hand] = None
+            self._update()
 
     def error(self, hand: int) -> float:
         """How far the weld of a hand is stretched, m; 0 when it holds nothing."""
-        closed = self._closed[hand]
-        return 0.0 if closed is None else self.gap(hand, *closed)
+        held = self._held[hand]
+        return 0.0 if held is None else self.gap(hand, *held)
 
     def get_state(self) -> GripState:
         """Object and grip that each hand holds; the welds themselves are part of the physics."""
-        left, right = self._closed
+        left, right = self._held
         return left, right
 
     def set_state(self, state: GripState) -> None:
         """Go on from what `get_state` gave."""
-        self._closed = list(state)
-        self._note()
+        self._held = list(state)
+        self._update()
 
     def reset(self) -> None:
         """Forget what was held; the state's welds are reset with the state."""
-        self._closed = [None, None]
-        self._note()
+        self._held = [None, None]
+        self._update()
 
-    def _note(self) -> None:
-        self.gripped = tuple(closed[0] for closed in self._closed if closed is not None)
-        for hand, closed in enumerate(self._closed):
-            self.pairs[hand] = (-1, -1) if closed is None else (self._hand_sites[hand], self._sites[closed])
+    def _update(self) -> None:
+        self.gripped = tuple(held[0] for held in self._held if held is not None)
+        for hand, held in enumerate(self._held):
+            self.sites[hand] = (-1, -1) if held is None else (self._hand_sites[hand], self._grip_sites[held])
 
 
 @kernel
@@ -128,10 +119,3 @@ def site_angle(site_xmat: NDArray[np.float64], first: int, second: int) -> float
     for k in range(9):
         trace += site_xmat[first, k] * site_xmat[second, k]
     return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
-
-
-def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    found = int(mujoco.mj_name2id(model, kind, name))
-    if found < 0:
-        raise AssetError(f"the model has no {kind.name} {name!r}; compose the scene with avatar=True")
-    return found

@@ -1,19 +1,20 @@
 """One control step of the hands' postures, as numba kernels: where a load has room, and how a target moves there.
 
-A person draws a box in when passing a door frame. A hand looks up the clearance around the place where it is about to
-be and moves away from what is too near. Should its load touch something static all the same, the hand gives way along
-the contact's normal, and where it cannot any further, the body does not walk or turn into the contact.
+A person draws a box in when passing a door frame. A hand looks up the clearance around the place where it will be
+shortly, and moves away from what is too near. If its load touches something static all the same, the hand gives way
+along the contact's normal, up to a limit. From there on the body does not walk or turn into the contact.
 
-All arrays are those of the `Rig` and of `Carrying`, and are changed in place.
+Arrays belong to the `Rig` and to `Carrying`, and are changed in place.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
-from mjsim.model.clearance import clearance_at
+from mjsim.model.clearance import ClearanceField, clearance_at
 from mjsim.person.grips import site_gap
 
 Floats = NDArray[np.float64]
@@ -23,20 +24,30 @@ Ints = NDArray[np.int32]
 X, Y, HEADING = 0, 1, 2
 FORWARD, LEFT, TURN = 0, 1, 2
 
-LOWEST = 0.97  # m, for the underside of what is carried: above counters
+MIN_HEIGHT = 0.97  # m, for the underside of what is carried: above counters
 MARGIN = 0.03  # m
 NEAR, FAR = 0.15, 0.3  # s, how far ahead a hand looks
 ROUNDS = 3
-MOST_SHIFT = 0.2  # m
-EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)  # of the way from the body's axis to the posture
-OVER_GAP = 0.04  # m, between two held things one above the other
+MAX_SHIFT = 0.2  # m
+EXTENSIONS = (
+    0.0,
+    0.15,
+    0.3,
+    0.45,
+    0.6,
+    0.7,
+    0.8,
+    0.9,
+    1.0,
+)  # of the line from the body's axis to the posture
+OVER_GAP = 0.04  # m, between two held objects one above the other
 PASSING = 0.10  # m of approach over which one is raised above the other
 PUSH_BACK = 0.25  # m/s beyond the speed of approach
 RELAX = 0.9  # 1/s
-MOST_YIELD = 0.15  # m
+MAX_COMPLIANCE = 0.15  # m
 UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
 
-MOST_HELD_BACK = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
+MAX_SERVO_LAG = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
 
 POSTURE_GAIN = 7.0  # 1/s
 POSTURE_SPEED = 1.5  # m/s
@@ -44,56 +55,102 @@ POSTURE_ACCELERATION = 8.0  # m/s^2
 _ARRIVED = 0.0005  # m
 
 
+class BodyMotion(NamedTuple):
+    """Where the body is, how it is told to move, and what is around it.
+
+    Attributes:
+        pose: x, y, heading and more, m and rad, shape (10,) or longer.
+        command: Commanded velocity in the body frame (forward, left), m/s, and yaw rate, rad/s, shape (3,) or longer.
+        clearance: Clearance at the heights of what is carried.
+    """
+
+    pose: Floats
+    command: Floats
+    clearance: ClearanceField
+
+
+class Hands(NamedTuple):
+    """Control of both hands; left before right, in the body frame.
+
+    Attributes:
+        targets: Where the servos are told to be, m, shape (2, 3).
+        velocities: How fast the targets move, m/s, shape (2, 3).
+        compliance: Offsets by which the hands give way to contacts, m, shape (2, 2).
+        goals: Room for where the hands belong, m, shape (2, 3).
+        rest: Where an empty left hand belongs, m, shape (3,).
+        loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
+    """
+
+    targets: Floats
+    velocities: Floats
+    compliance: Floats
+    goals: Floats
+    rest: Floats
+    loads: Floats
+
+
+class Contacts(NamedTuple):
+    """What touches what.
+
+    Attributes:
+        geoms: Geoms of each contact, shape (k, 2).
+        frames: Frame of each contact, the normal first, shape (k, 9).
+        owners: Object of each geom, -1 for the house, -2 for the person, shape (ngeom,).
+    """
+
+    geoms: Ints
+    frames: Floats
+    owners: Ints
+
+
+class Holding(NamedTuple):
+    """What the hands are doing.
+
+    Attributes:
+        left, right: Object in the hand, or -1.
+        moving: Hand that a motion moves, or -1.
+        posture: Where a left hand that holds something belongs, m, shape (3,).
+    """
+
+    left: int
+    right: int
+    moving: int
+    posture: Floats
+
+
 @kernel
-def update_hands(
-    pose: Floats, motion: Floats, targets: Floats, velocities: Floats, yields: Floats, goals: Floats,
-    item_0: int, item_1: int, moving: int, posture: Floats, rest: Floats, loads: Floats,
-    distance: Floats, gradient: Floats, frame: Floats, geoms: Ints, frames: Floats, bearer: Ints, dt: float,
-) -> None:  # fmt: skip
-    """Set the targets of the hands that no motion moves, and guard the walking command.
+def update_hands(body: BodyMotion, hands: Hands, holding: Holding, contacts: Contacts, dt: float) -> None:
+    """Set the targets of the hands that no motion moves, and keep the walking command off contacts.
 
     Args:
-        pose: x, y, heading and more, m and rad, (10,).
-        motion: Commanded velocity in the body frame, m/s, and yaw rate, rad/s, (4,); changed.
-        targets: The hands' targets, body frame, m, (2, 3); changed.
-        velocities: How fast these move, m/s, (2, 3); changed.
-        yields: How far each hand has given way, m, (2, 2); changed.
-        goals: Where the hands belong, m, (2, 3); overwritten.
-        item_0: Object in the left hand, or -1.
-        item_1: Object in the right hand, or -1.
-        moving: Hand that a motion moves, or -1.
-        posture: Where a left hand that holds something belongs, m, (3,).
-        rest: Where an empty left hand belongs, m, (3,).
-        loads: How far each object reaches sideways and down about its grip, m, (n, 2).
-        distance: `ClearanceField.distance`.
-        gradient: `ClearanceField.gradient`.
-        frame: `ClearanceField.frame`.
-        geoms: Geoms of each contact, (k, 2).
-        frames: Frame of each contact, (k, 9).
-        bearer: Object of each geom, -1 for the house, -2 for the person, (ngeom,).
+        body: The command is changed.
+        hands: Targets, velocities and compliance are changed.
+        holding: What each hand is doing.
+        contacts: Contacts of the physics; none where nothing is held or there is no physics.
         dt: Control step, s.
     """
     for hand in range(2):
         side = 1.0 - 2.0 * hand
-        yields[hand, 0] *= 1.0 - RELAX * dt
-        yields[hand, 1] *= 1.0 - RELAX * dt
-        goals[hand, 0], goals[hand, 1], goals[hand, 2] = rest[0], side * rest[1], rest[2]
-        item = item_0 if hand == 0 else item_1
-        if item < 0 or hand == moving:
+        hands.compliance[hand, 0] *= 1.0 - RELAX * dt
+        hands.compliance[hand, 1] *= 1.0 - RELAX * dt
+        goal = hands.goals[hand]
+        goal[0], goal[1], goal[2] = hands.rest[0], side * hands.rest[1], hands.rest[2]
+        item = holding.left if hand == 0 else holding.right
+        if item < 0 or hand == holding.moving:
             continue
-        _yield_to_contacts(hand, item, pose, motion, targets, yields, geoms, frames, bearer, dt)
-        radius, height = loads[item, 0], loads[item, 1]
-        forward, left = drawn_in(
-            posture[0], side * posture[1], radius, pose, motion, distance, gradient, frame
-        )
-        goals[hand, 0] = forward + yields[hand, 0]
-        goals[hand, 1] = left + yields[hand, 1]
-        goals[hand, 2] = max(posture[2], LOWEST + height)
-    if item_0 >= 0 and item_1 >= 0 and moving < 0:
-        _raise_right(goals, loads[item_0, 0] + loads[item_1, 0], loads[item_1, 1])
+        _comply(hand, item, body, hands, contacts, dt)
+        radius, height = hands.loads[item, 0], hands.loads[item, 1]
+        forward, left = drawn_in(holding.posture[0], side * holding.posture[1], radius, body)
+        goal[0] = forward + hands.compliance[hand, 0]
+        goal[1] = left + hands.compliance[hand, 1]
+        goal[2] = max(holding.posture[2], MIN_HEIGHT + height)
+    if holding.left >= 0 and holding.right >= 0 and holding.moving < 0:
+        loads, left, right = hands.loads, holding.left, holding.right
+        _raise_right(hands.goals, loads[left, 0] + loads[right, 0], loads[right, 1])
     for hand in range(2):
-        if hand != moving:
-            move_hand(targets, velocities, hand, goals[hand, 0], goals[hand, 1], goals[hand, 2], dt)
+        if hand != holding.moving:
+            goal = hands.goals[hand]
+            move_hand(hands.targets, hands.velocities, hand, goal[0], goal[1], goal[2], dt)
 
 
 @kernel
@@ -120,25 +177,22 @@ def move_hand(
 
 
 @kernel
-def drawn_in(
-    forward: float, left: float, radius: float, pose: Floats, motion: Floats,
-    distance: Floats, gradient: Floats, frame: Floats,
-) -> tuple[float, float]:  # fmt: skip
-    """Place nearest to a posture (forward, left) where a load is clear of the house, now and shortly.
+def drawn_in(forward: float, left: float, radius: float, body: BodyMotion) -> tuple[float, float]:
+    """Place nearest to a posture (forward, left), m, where a load is clear of the house, now and shortly.
 
-    Sideways first, as past a door frame; then as far out from the body's axis as nothing is in between: the far side
-    of a wall is clear, but out of the question.
+    First a shift sideways, as past a door frame. If that is not enough, a place between the body's axis and the
+    posture, as far out as the line from the axis is clear: the far side of a wall is clear, too, but out of reach.
     """
-    shift_f, shift_l = _sideways(forward, left, radius + MARGIN, pose, motion, distance, gradient, frame)
+    shift_f, shift_l = _sideways(forward, left, radius + MARGIN, body)
     forward, left = forward + shift_f, left + shift_l
-    if _clear_throughout(forward, left, radius + MARGIN, pose, motion, distance, gradient, frame):
+    if _clear_throughout(forward, left, radius + MARGIN, body):
         return forward, left
     best_f, best_l, best_room, before = 0.0, 0.0, -math.inf, -math.inf
     for share in EXTENSIONS:
         at_f, at_l = share * forward, share * left
         room = math.inf
         for horizon in (0.0, NEAR, FAR):
-            there, _, _ = _room(at_f, at_l, horizon, pose, motion, distance, gradient, frame)
+            there, _, _ = _room(at_f, at_l, horizon, body)
             room = min(room, there)
         room -= radius
         clear = room >= 0.5 * MARGIN
@@ -151,53 +205,43 @@ def drawn_in(
 
 
 @kernel
-def _clear_throughout(
-    forward: float, left: float, needed: float, pose: Floats, motion: Floats,
-    distance: Floats, gradient: Floats, frame: Floats,
-) -> bool:  # fmt: skip
+def _clear_throughout(forward: float, left: float, needed: float, body: BodyMotion) -> bool:
     """Whether the ends alone tell that a load is clear all the way: clearance changes by no more than the distance."""
     length = math.sqrt(forward * forward + left * left)
     for horizon in (0.0, NEAR, FAR):
-        axis, _, _ = _room(0.0, 0.0, horizon, pose, motion, distance, gradient, frame)
-        there, _, _ = _room(forward, left, horizon, pose, motion, distance, gradient, frame)
+        axis, _, _ = _room(0.0, 0.0, horizon, body)
+        there, _, _ = _room(forward, left, horizon, body)
         if min(axis, there, 0.5 * (axis + there - length)) < needed:
             return False
     return True
 
 
 @kernel
-def _sideways(
-    forward: float, left: float, needed: float, pose: Floats, motion: Floats,
-    distance: Floats, gradient: Floats, frame: Floats,
-) -> tuple[float, float]:  # fmt: skip
+def _sideways(forward: float, left: float, needed: float, body: BodyMotion) -> tuple[float, float]:
     """Shift in the body frame, away from what is too near."""
     shift_f, shift_l = 0.0, 0.0
     for horizon in (0.0, NEAR, FAR):
         for _ in range(ROUNDS):
-            room, away_f, away_l = _room(
-                forward + shift_f, left + shift_l, horizon, pose, motion, distance, gradient, frame
-            )
+            room, away_f, away_l = _room(forward + shift_f, left + shift_l, horizon, body)
             if room >= needed:
                 break
             shift_f += (needed - room) * away_f
             shift_l += (needed - room) * away_l
     size = math.hypot(shift_f, shift_l)
-    limit = min(1.0, MOST_SHIFT / size) if size > 0.0 else 1.0
+    limit = min(1.0, MAX_SHIFT / size) if size > 0.0 else 1.0
     return shift_f * limit, shift_l * limit
 
 
 @kernel
-def _room(
-    forward: float, left: float, horizon: float, pose: Floats, motion: Floats,
-    distance: Floats, gradient: Floats, frame: Floats,
-) -> tuple[float, float, float]:  # fmt: skip
+def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tuple[float, float, float]:
     """Clearance in `horizon` seconds at a place of the body frame, and the way out, in that frame."""
-    forward += motion[FORWARD] * horizon
-    left += motion[LEFT] * horizon
-    heading = pose[HEADING] + motion[TURN] * horizon
+    pose, command = body.pose, body.command
+    forward += command[FORWARD] * horizon
+    left += command[LEFT] * horizon
+    heading = pose[HEADING] + command[TURN] * horizon
     c, s = math.cos(heading), math.sin(heading)
     x, y = pose[X] + c * forward - s * left, pose[Y] + s * forward + c * left
-    room, away_x, away_y = clearance_at(x, y, distance, gradient, frame)
+    room, away_x, away_y = clearance_at(x, y, body.clearance)
     return room, c * away_x + s * away_y, c * away_y - s * away_x
 
 
@@ -211,52 +255,50 @@ def _raise_right(goals: Floats, radii: float, height: float) -> None:
 
 
 @kernel
-def _yield_to_contacts(
-    hand: int, item: int, pose: Floats, motion: Floats, targets: Floats, yields: Floats,
-    geoms: Ints, frames: Floats, bearer: Ints, dt: float,
-) -> None:  # fmt: skip
+def _comply(hand: int, item: int, body: BodyMotion, hands: Hands, contacts: Contacts, dt: float) -> None:
     """Give way to everything static that a held object touches from the side."""
-    for contact in range(len(geoms)):
-        first, second = bearer[geoms[contact, 0]], bearer[geoms[contact, 1]]
+    owners = contacts.owners
+    for contact in range(len(contacts.geoms)):
+        first, second = owners[contacts.geoms[contact, 0]], owners[contacts.geoms[contact, 1]]
         if first == item and second == -1:
             sign = -1.0
         elif second == item and first == -1:
             sign = 1.0
         else:
             continue
-        nx, ny = sign * frames[contact, 0], sign * frames[contact, 1]
+        nx, ny = sign * contacts.frames[contact, 0], sign * contacts.frames[contact, 1]
         size = math.sqrt(nx * nx + ny * ny)
         if size > UPRIGHT:
-            _give_way(hand, nx / size, ny / size, pose, motion, targets, yields, dt)
+            _give_way(hand, nx / size, ny / size, body, hands, dt)
 
 
 @kernel
-def _give_way(
-    hand: int, nx: float, ny: float, pose: Floats, motion: Floats, targets: Floats, yields: Floats, dt: float
-) -> None:
-    c, s = math.cos(pose[HEADING]), math.sin(pose[HEADING])
+def _give_way(hand: int, nx: float, ny: float, body: BodyMotion, hands: Hands, dt: float) -> None:
+    """Move a hand's offset along a contact's normal; at its limit, keep the body from moving into the contact."""
+    command, target, offset = body.command, hands.targets[hand], hands.compliance[hand]
+    c, s = math.cos(body.pose[HEADING]), math.sin(body.pose[HEADING])
     away_f, away_l = c * nx + s * ny, c * ny - s * nx
-    swing = (away_l * targets[hand, 0] - away_f * targets[hand, 1]) * motion[TURN]
-    approach = -(away_f * motion[FORWARD] + away_l * motion[LEFT] + swing)
+    swing = (away_l * target[0] - away_f * target[1]) * command[TURN]
+    approach = -(away_f * command[FORWARD] + away_l * command[LEFT] + swing)
     push = (max(approach, 0.0) + PUSH_BACK) * dt
-    yields[hand, 0] += away_f * push
-    yields[hand, 1] += away_l * push
-    size = math.sqrt(yields[hand, 0] ** 2 + yields[hand, 1] ** 2)
-    if size > MOST_YIELD:
-        yields[hand, 0] *= MOST_YIELD / size
-        yields[hand, 1] *= MOST_YIELD / size
+    offset[0] += away_f * push
+    offset[1] += away_l * push
+    size = math.sqrt(offset[0] ** 2 + offset[1] ** 2)
+    if size > MAX_COMPLIANCE:
+        offset[0] *= MAX_COMPLIANCE / size
+        offset[1] *= MAX_COMPLIANCE / size
         if swing < 0.0:
-            motion[TURN] = 0.0
-        into = away_f * motion[FORWARD] + away_l * motion[LEFT]
+            command[TURN] = 0.0
+        into = away_f * command[FORWARD] + away_l * command[LEFT]
         if into < 0.0:
-            motion[FORWARD] -= into * away_f
-            motion[LEFT] -= into * away_l
+            command[FORWARD] -= into * away_f
+            command[LEFT] -= into * away_l
 
 
 @kernel
 def count_strain(
-    pose: Floats, targets: Floats, site_xpos: Floats, pairs: NDArray[np.intp], left: bool, right: bool,
-    most_error: float, patience: float, strained: NDArray[np.int64],
+    pose: Floats, targets: Floats, site_xpos: Floats, sites: NDArray[np.intp], held: tuple[bool, bool],
+    max_error: float, patience: float, strained: NDArray[np.int64],
 ) -> int:  # fmt: skip
     """Count for how many control steps each hand has been strained.
 
@@ -264,10 +306,9 @@ def count_strain(
         pose: `Rig.pose`.
         targets: `Rig.hand_targets`.
         site_xpos: Positions of all sites, m, (nsite, 3).
-        pairs: `Grips.pairs`.
-        left: Whether the left hand carries something.
-        right: Whether the right one does.
-        most_error: A weld stretched farther than this is strained, m.
+        sites: `Grips.sites`.
+        held: Whether the left and the right hand carry something.
+        max_error: A weld stretched farther than this is strained, m.
         patience: Control steps after which a load slips.
         strained: Steps per hand, (2,); changed.
 
@@ -276,15 +317,15 @@ def count_strain(
     """
     slipping = 0
     for hand in range(2):
-        if not (left if hand == 0 else right):
+        if not held[hand]:
             strained[hand] = 0
             continue
-        back = 0.0
+        lag = 0.0
         for axis in range(3):
-            back += (pose[4 + 3 * hand + axis] - targets[hand, axis]) ** 2
-        first, second = pairs[hand, 0], pairs[hand, 1]
+            lag += (pose[4 + 3 * hand + axis] - targets[hand, axis]) ** 2
+        first, second = sites[hand, 0], sites[hand, 1]
         error = site_gap(site_xpos, first, second) if first >= 0 else 0.0
-        tense = error > most_error or math.sqrt(back) > MOST_HELD_BACK
+        tense = error > max_error or math.sqrt(lag) > MAX_SERVO_LAG
         strained[hand] = strained[hand] + 1 if tense else 0
         if strained[hand] > patience:
             slipping += 1 << hand

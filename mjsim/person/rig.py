@@ -56,8 +56,8 @@ class Rig:
         self._dt = control_timestep
         joints = [avatar.PREFIX + n for n in ("x", "y", "yaw", "pitch")]
         joints += [f"{avatar.PREFIX}{hand}/{axis}" for hand in avatar.HANDS for axis in "xyz"]
-        ids = [_find(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
-        actuators = np.array([_find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in joints])
+        ids = [find_id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
+        actuators = np.array([find_id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in joints])
         self.pose = _run(data.qpos, model.jnt_qposadr[ids])
         self.rates = _run(data.qvel, model.jnt_dofadr[ids])
         self._commands = _run(data.act, model.actuator_actadr[actuators])
@@ -67,11 +67,11 @@ class Rig:
         self._hand_targets_before = np.zeros((2, 3))
         self._command = np.zeros(_SERVOS)
         self.grip_sites = tuple(
-            _find(model, mujoco.mjtObj.mjOBJ_SITE, f"{avatar.PREFIX}{hand}_grip") for hand in avatar.HANDS
+            find_id(model, mujoco.mjtObj.mjOBJ_SITE, f"{avatar.PREFIX}{hand}_grip") for hand in avatar.HANDS
         )
-        self.trunk = _find(model, mujoco.mjtObj.mjOBJ_GEOM, avatar.TRUNK)
-        self.foot = _find(model, mujoco.mjtObj.mjOBJ_GEOM, avatar.FOOT)
-        self.body = _find(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BODY)
+        self.trunk = find_id(model, mujoco.mjtObj.mjOBJ_GEOM, avatar.TRUNK)
+        self.foot = find_id(model, mujoco.mjtObj.mjOBJ_GEOM, avatar.FOOT)
+        self.body = find_id(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BODY)
         self.reset()
 
     def reset(self) -> None:
@@ -236,7 +236,12 @@ def _run(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
     return values[first : first + count]
 
 
-def _find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+def find_id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    """Number of a named part of the person.
+
+    Raises:
+        AssetError: The model has no such part.
+    """
     found = int(mujoco.mj_name2id(model, kind, name))
     if found < 0:
         raise AssetError(f"the model has no {kind.name} {name!r}; compose the scene with avatar=True")
