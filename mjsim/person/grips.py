@@ -39,8 +39,8 @@ class Grips:
             find_id(model, mujoco.mjtObj.mjOBJ_EQUALITY, avatar.grip_name(*key))
             for key in itertools.product(avatar.HANDS, names, avatar.GRIPS, kinds)
         ]
-        self._grip_sites = np.array(sites, np.intp).reshape(len(names), -1)
-        self._welds = np.array(welds, np.intp).reshape(2, len(names), -1, 2)
+        self._grip_sites = np.array(sites, np.intp).reshape(len(names), len(avatar.GRIPS))
+        self._welds = np.array(welds, np.intp).reshape(2, len(names), len(avatar.GRIPS), 2)
         self.sites = np.full((2, 2), -1, np.intp)
         self.reset()
 
