@@ -3,10 +3,10 @@
     pip install -e '.[learn]'
     python -m experiments.examples.behaviour_cloning
 
-A built-in participant demonstrates; a policy of Stable-Baselines3 is fitted to its actions, on its own episodes and
-then, for a number of rounds, on episodes in which the learner acts and is corrected (DAgger). The learner wears the
-glasses: a sensor tells it where the breadcrumbs lead. The policy's share of delivered objects in episodes it never saw
-is printed before and after. It runs on a CPU in a few minutes.
+A policy of Stable-Baselines3 is fitted to the actions of a built-in participant: first in episodes in which the
+participant acts, then in rounds in which the policy acts and the participant says what it would have done (DAgger). The
+policy observes the breadcrumbs of the HUD. The share of objects that it delivers in unseen episodes is printed before
+and after training. This takes a few minutes on a CPU.
 """
 
 import argparse
@@ -31,8 +31,8 @@ from mjsim.environments.core import ObservationDict
 from mjsim.environments.gymnasium_environment import RearrangeEnv
 from mjsim.environments.sensors import Sensor
 
-UNSEEN = 1_000_000  # first seed of the evaluation; far from those of the demonstrations
-TRIGGER_WEIGHT = 10.0  # attempts are rare and decide everything
+UNSEEN = 1_000_000  # first seed of the evaluation; no demonstration has such a seed
+TRIGGER_WEIGHT = 10.0  # picks and places are rare, and everything depends on them
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Settings:
 
     Attributes:
         episodes: Houses to learn in.
-        rounds: Rounds in which the learner acts and is corrected.
-        glasses: Whether the learner sees where the breadcrumbs lead.
+        rounds: Rounds in which the policy acts and is corrected.
+        breadcrumbs: Whether the policy observes the breadcrumbs.
         epochs: Passes over the data in each round.
         evaluation: Unseen episodes to measure in.
         seed: Of everything.
@@ -50,24 +50,22 @@ class Settings:
 
     episodes: int = 80
     rounds: int = 1
-    glasses: bool = True
+    breadcrumbs: bool = True
     epochs: int = 15
     evaluation: int = 20
     seed: int = 0
 
 
-def make_environment(
-    episodes: int | None, time_limit: float, breadcrumbs: Sequence[Sensor] = ()
-) -> RearrangeEnv:
-    """One object, eight decisions a second."""
+def make_environment(episodes: int | None, time_limit: float, sensors: Sequence[Sensor] = ()) -> RearrangeEnv:
+    """An environment with one object and 8 actions per second; `sensors` are added to the state."""
     made = gymnasium.make(
         "mjsim/Rearrange-v0",
         objects=1,
-        observations=("state", *breadcrumbs),
+        observations=("state", *sensors),
         actions=Continuous(repeat=3),
         time_limit=time_limit,
         episodes=episodes,
-        physics_errors="truncate",  # a learner flails, and training should outlive it
+        physics_errors="truncate",  # an untrained policy may break the physics; training goes on
     )
     environment = made.unwrapped
     if not isinstance(environment, RearrangeEnv):
@@ -76,16 +74,16 @@ def make_environment(
 
 
 def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
-    """Train an agent.
+    """Train a policy.
 
     Returns:
-        The Stable-Baselines3 model, and its share of delivered objects in unseen episodes before and after.
+        The Stable-Baselines3 model, and the share of objects that it delivers in unseen episodes before and after.
     """
     torch.manual_seed(settings.seed)
-    torch.set_num_threads(1)  # the network is small: more threads wait for each other
+    torch.set_num_threads(1)  # the network is too small for more
     rng = np.random.default_rng(settings.seed)
     house = House.load()
-    sensors = (breadcrumb_sensor(house.known()),) if settings.glasses else ()
+    sensors = (breadcrumb_sensor(house.known()),) if settings.breadcrumbs else ()
     environment = make_environment(settings.episodes, 30.0, sensors)
     model = PPO(
         "MultiInputPolicy",
@@ -99,8 +97,12 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
         action, _ = model.predict(observation, deterministic=True)
         return np.asarray(action, np.float32)
 
-    before = evaluate(model, make_environment(None, 60.0, sensors), settings.evaluation)
-    console.print(f"before: {before:.0%} delivered in {settings.evaluation} unseen episodes")
+    def evaluated(when: str) -> float:
+        share = evaluate(model, make_environment(None, 60.0, sensors), settings.evaluation)
+        console.print(f"{when}: {share:.0%} delivered in {settings.evaluation} unseen episodes")
+        return share
+
+    before = evaluated("before")
     gathered: list[Demonstrations] = []
     for number in range(settings.rounds + 1):
         started = time.perf_counter()
@@ -119,14 +121,13 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
             f"round {number}: the {who} delivered {shown.delivered:.0%}; {sum(len(d.actions) for d in gathered)} rows, "
             f"loss {loss:.4f}, {time.perf_counter() - started:.0f} s"
         )
-    after = evaluate(model, make_environment(None, 60.0, sensors), settings.evaluation)
-    console.print(f"after: {after:.0%} delivered in {settings.evaluation} unseen episodes")
+    after = evaluated("after")
     environment.close()
     return model, before, after
 
 
 def fit(model: Any, shown: Sequence[Demonstrations], *, epochs: int, rng: np.random.Generator) -> float:
-    """Fit the policy's mean action to the demonstrated ones; returns the last epoch's mean loss."""
+    """Fit the policy's mean action to the demonstrated ones; returns the mean loss of the last epoch."""
     observations = {
         name: torch.as_tensor(np.concatenate([d.observations[name] for d in shown]))
         for name in shown[0].observations
@@ -152,15 +153,15 @@ def fit(model: Any, shown: Sequence[Demonstrations], *, epochs: int, rng: np.ran
 
 
 def evaluate(model: Any, environment: RearrangeEnv, episodes: int) -> float:
-    """Share of the objects that the policy delivers in episodes it never saw; closes the environment."""
+    """Share of the objects that the policy delivers in unseen episodes; closes the environment."""
     delivered = total = 0
     for seed in range(UNSEEN, UNSEEN + episodes):
         seen, info = environment.reset(seed=seed)
-        over = False
-        while not over:
+        is_over = False
+        while not is_over:
             action, _ = model.predict(seen, deterministic=True)
             seen, _, terminated, truncated, info = environment.step(action)
-            over = terminated or truncated
+            is_over = terminated or truncated
         delivered += info["delivered"]
         total += info["objects"]
     environment.close()
@@ -172,16 +173,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Train an agent to deliver an object, by imitation.")
     parser.add_argument("--episodes", type=int, default=Settings.episodes, help="houses to learn in")
     parser.add_argument("--rounds", type=int, default=Settings.rounds, help="rounds of correction")
-    parser.add_argument(
-        "--without-glasses", action="store_true", help="do not show where the breadcrumbs lead"
-    )
-    parser.add_argument("--seed", type=int, default=Settings.seed)
-    parser.add_argument("--out", type=Path, default=None, help="where to save the trained model (.zip)")
+    parser.add_argument("--no-breadcrumbs", action="store_true", help="do not observe the breadcrumbs")
+    parser.add_argument("--seed", type=int, default=Settings.seed, help="seed of the networks and the noise")
+    parser.add_argument("--out", type=Path, help="file to save the trained model to (.zip)")
     given = parser.parse_args()
     console = Console()
-    settings = Settings(
-        episodes=given.episodes, rounds=given.rounds, seed=given.seed, glasses=not given.without_glasses
-    )
+    settings = Settings(given.episodes, given.rounds, not given.no_breadcrumbs, seed=given.seed)
     model, _, _ = learn(settings, console)
     if given.out is not None:
         model.save(given.out)

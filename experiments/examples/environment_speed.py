@@ -1,6 +1,4 @@
-"""How fast the environment is: steps and resets per second of one core, with and without pixels.
-
-Times are those of the processor, so that what else runs on the machine matters little.
+"""How fast the environment is: steps and resets per second of one core, and what several processes gain.
 
 python -m experiments.examples.environment_speed
 """
@@ -14,6 +12,7 @@ from rich.table import Table
 
 import mjsim  # noqa: F401 - registers the environment
 
+ID = "mjsim/Rearrange-v0"
 SECONDS = 3.0
 SETTINGS: dict[str, dict[str, Any]] = {
     "one number": {"observations": ("remaining",)},
@@ -26,8 +25,8 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple[float, float]:
-    """Steps and simulated seconds per second of one core, with random actions and 6 objects."""
-    env = gymnasium.make("mjsim/Rearrange-v0", episodes=1, disable_env_checker=True, **options)
+    """Steps and simulated seconds per second of CPU time, with random actions and 6 objects."""
+    env = gymnasium.make(ID, episodes=1, disable_env_checker=True, **options)
     env.action_space.seed(0)
     env.reset(seed=0)
     for _ in range(20):  # numba, caches and the OpenGL context
@@ -35,10 +34,10 @@ def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple
     steps, simulated, spent = 0, 0.0, 0.0
     while spent < seconds:
         _, info = env.reset(seed=0)
-        started, over = time.process_time(), False
-        while not over and spent + time.process_time() - started < seconds:
+        started, is_over = time.process_time(), False
+        while not is_over and spent + time.process_time() - started < seconds:
             *_, terminated, truncated, info = env.step(env.action_space.sample())
-            steps, over = steps + 1, terminated or truncated
+            steps, is_over = steps + 1, terminated or truncated
         spent += time.process_time() - started
         simulated += float(info["time"])
     env.close()
@@ -46,8 +45,8 @@ def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple
 
 
 def seconds_per_reset(episodes: int | None, resets: int) -> float:
-    """Mean processor time of a reset, s; a number of episodes that come again, or new ones without end."""
-    env = gymnasium.make("mjsim/Rearrange-v0", episodes=episodes, disable_env_checker=True)
+    """Mean CPU time of a reset, s, to one of `episodes` houses that come again, or to new houses."""
+    env = gymnasium.make(ID, episodes=episodes, disable_env_checker=True)
     for seed in range(episodes or 1):
         env.reset(seed=seed)
     started = time.process_time()
@@ -56,6 +55,35 @@ def seconds_per_reset(episodes: int | None, resets: int) -> float:
     spent = time.process_time() - started
     env.close()
     return spent / resets
+
+
+def vector_speedup(processes: int, steps: int = 300, rounds: int = 4) -> float:
+    """Steps per second of `processes` environments in as many processes, relative to one environment in this process.
+
+    Both are measured alternately, in wall time, with images: cheap steps spend more time between the processes.
+    """
+    options: dict[str, Any] = {"episodes": 1, "observations": ("state", "rgb")}
+    one = gymnasium.make_vec(ID, num_envs=1, vectorization_mode="sync", **options)
+    many = gymnasium.make_vec(
+        ID,
+        num_envs=processes,
+        vectorization_mode="async",
+        vector_kwargs={"context": "spawn"},  # OpenGL does not survive a fork
+        **options,
+    )
+    rates = [0.0, 0.0]
+    for number in range(rounds + 1):  # the first round warms up
+        for i, envs in enumerate((one, many)):
+            envs.reset(seed=0)
+            actions = envs.action_space.sample()
+            started = time.perf_counter()
+            for _ in range(steps):
+                envs.step(actions)
+            if number:
+                rates[i] += envs.num_envs * steps / (time.perf_counter() - started)
+    one.close()
+    many.close()
+    return rates[1] / rates[0]
 
 
 def main() -> None:
@@ -68,6 +96,7 @@ def main() -> None:
     console.print(table)
     console.print(f"reset to a new house: {seconds_per_reset(None, 10) * 1e3:.0f} ms")
     console.print(f"reset to one of 4 houses that come again: {seconds_per_reset(4, 400) * 1e3:.2f} ms")
+    console.print(f"2 environments in 2 processes: {vector_speedup(2):.2f} times as many steps as one")
 
 
 if __name__ == "__main__":
