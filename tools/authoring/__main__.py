@@ -1,12 +1,11 @@
 """Regenerate the procedural textures and object meshes: ``python -m authoring [models folder]``."""
 
 import argparse
-import importlib
-import importlib.util
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from authoring.objects import build_meshes
 from authoring.textures import build_textures
 
 
@@ -20,9 +19,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"{models} is not a folder; name the checkout's models folder")
     textures = build_textures(models / "textures")
     sys.stdout.write(f"{len(textures)} textures in {models / 'textures'}\n")
-    if importlib.util.find_spec("authoring.objects") is not None:
-        importlib.import_module("authoring.objects").build_meshes(models)
-        sys.stdout.write(f"object meshes in {models}\n")
+    meshes = build_meshes(models)
+    sys.stdout.write(f"{len(meshes)} meshes and labels in {models}\n")
     return 0
 
 

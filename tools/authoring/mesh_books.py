@@ -5,7 +5,7 @@ import math
 import numpy as np
 from shapely.geometry import Polygon
 
-from authoring.mesh_tools import Floats, Surface, arc, extrude, from_above, join, sheet, slab
+from authoring.mesh_tools import Floats, Surface, arc, from_above, join, ridge, sheet, slab
 
 
 def meshes() -> dict[str, Surface]:
@@ -25,9 +25,7 @@ def _spine(height: float, length: float, bulge: float) -> Surface:
     """A rounded back: half an ellipse extruded along y, flat side towards +x."""
     curve = arc(height / 2, 0.5 * math.pi, 1.5 * math.pi, 9)
     outline = Polygon(np.column_stack([curve[:, 0] * bulge / (height / 2), curve[:, 1]]))
-    prism = extrude(outline, length).moved((0, 0, -length / 2))
-    # Lay the extrusion direction along y: (x, y, z) -> (x, -z, y) is a rotation about x.
-    return Surface(prism.vertices[:, [0, 2, 1]] * [1, -1, 1], prism.faces)
+    return ridge(outline, length)
 
 
 def _curled() -> Surface:

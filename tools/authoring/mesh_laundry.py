@@ -6,7 +6,7 @@ import numpy as np
 from shapely import affinity
 from shapely.geometry import LineString, Point, Polygon, box
 
-from authoring.mesh_tools import Floats, Surface, arc, cushion, extrude, from_above, join, lathe, sheet
+from authoring.mesh_tools import Floats, Surface, arc, cushion, extrude, from_above, join, lathe, mm, sheet
 
 
 def meshes() -> dict[str, Surface]:
@@ -16,10 +16,8 @@ def meshes() -> dict[str, Surface]:
 
 def _socks() -> dict[str, Surface]:
     """Two socks side by side, one half on the other; locomotion along y."""
-    leg = Polygon([(-0.028, -0.02), (-0.028, 0.11), (0.028, 0.11), (0.028, -0.05), (0.0, -0.085)])
-    foot = Polygon(
-        [(-0.028, -0.02), (0.0, -0.085), (0.028, -0.05), (-0.03, 0.0), (-0.1, -0.03), (-0.1, -0.085)]
-    )
+    leg = Polygon(mm("-28 -20, -28 110, 28 110, 28 -50, 0 -85"))
+    foot = Polygon(mm("-28 -20, 0 -85, 28 -50, -30 0, -100 -30, -100 -85"))
     sock = leg.union(foot.buffer(0.002)).union(Point(-0.085, -0.058).buffer(0.03, quad_segs=4))
     sock = sock.buffer(0.012, quad_segs=3).buffer(-0.012, quad_segs=3).simplify(0.002)
     bands = [
@@ -44,7 +42,7 @@ def _socks() -> dict[str, Surface]:
 
 def _t_shirt() -> dict[str, Surface]:
     """A small T-shirt spread out flat, collar at +y."""
-    half = [(0.04, 0.125), (0.085, 0.112), (0.152, 0.035), (0.112, 0.0), (0.068, 0.052), (0.074, -0.13)]
+    half = mm("40 125, 85 112, 152 35, 112 0, 68 52, 74 -130")
     outline = Polygon([*half, *((-x, y) for x, y in reversed(half))])
     shirt = outline.difference(affinity.scale(Point(0, 0.122).buffer(0.036, quad_segs=4), 1.0, 0.7))
     neck = np.column_stack([arc(0.04, math.pi, 2 * math.pi, 9, 0.7) + np.array([0, 0.122]), np.full(9, 0.02)])
@@ -98,7 +96,7 @@ def _towel() -> Surface:
 
 def _jeans() -> Surface:
     """Jeans spread out flat, waist at +y."""
-    half = [(0.08, 0.125), (0.095, 0.05), (0.14, -0.105), (0.05, -0.125)]
+    half = mm("80 125, 95 50, 140 -105, 50 -125")
     outline = Polygon([*half, (0.0, 0.02), *((-x, y) for x, y in reversed(half))])
     return _rumpled(cushion(outline, 0.026, 0.006), 0.003)
 

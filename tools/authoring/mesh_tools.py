@@ -52,6 +52,11 @@ class Surface:
         return Surface(rule(self.vertices), self.faces, self.uv)
 
 
+def mm(points: str) -> Floats:
+    """Points given in mm as `x y, x y, ...`; in m, shape (n, 2)."""
+    return np.array([[float(value) / 1000 for value in point.split()] for point in points.split(",")])
+
+
 def join(surfaces: Sequence[Surface]) -> Surface:
     """One surface out of several, without UV unless all have it."""
     offsets = np.cumsum([0, *(len(s.vertices) for s in surfaces[:-1])])
@@ -116,6 +121,20 @@ def extrude(polygon: Polygon | MultiPolygon, height: float) -> Surface:
         return join([extrude(part, height) for part in polygon.geoms])
     mesh = trimesh.creation.extrude_polygon(orient(polygon), height, engine="manifold")
     return Surface(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
+
+
+def side(drawing: Polygon | MultiPolygon, width: float, rounding: float = 0.0) -> Surface:
+    """A body drawn from the side in the y-z plane, `width` across x, its corners rounded by `rounding` (m)."""
+    if rounding:
+        drawing = drawing.buffer(-rounding, quad_segs=3).buffer(rounding, quad_segs=3)
+    return extrude(drawing, width).moved((0, 0, -width / 2)).lengthwise()
+
+
+def ridge(drawing: Polygon, length: float) -> Surface:
+    """A prism along y over a drawing in the x-z plane."""
+    prism = extrude(drawing, length).moved((0, 0, -length / 2))
+    # Lay the extrusion direction along y: (x, y, z) -> (x, -z, y) is a rotation about x.
+    return Surface(prism.vertices[:, [0, 2, 1]] * [1, -1, 1], prism.faces)
 
 
 def cushion(polygon: Polygon, height: float, edge: float) -> Surface:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from shapely.geometry import Polygon, box
 
-from authoring.mesh_tools import Surface, extrude, lathe
+from authoring.mesh_tools import Surface, lathe, mm, side
 
 
 def meshes() -> dict[str, Surface]:
@@ -15,29 +15,15 @@ def meshes() -> dict[str, Surface]:
 
 def _car() -> dict[str, Surface]:
     """Drawn from the side: nose at +, tail at -."""
-    hull = Polygon(
-        [
-            (-0.11, 0.022),
-            (0.11, 0.022),
-            (0.112, 0.045),
-            (0.1, 0.056),
-            (0.055, 0.062),
-            (-0.105, 0.064),
-            (-0.112, 0.05),
-        ]
-    )
-    cabin = Polygon(
-        [(-0.085, 0.06), (0.06, 0.06), (0.025, 0.097), (0.015, 0.1), (-0.055, 0.1), (-0.065, 0.097)]
-    )
-    panes = Polygon([(-0.072, 0.064), (0.046, 0.064), (0.018, 0.091), (-0.058, 0.091)]).difference(
-        box(-0.016, 0.06, -0.006, 0.1)
-    )
-    screens = Polygon([(0.0575, 0.066), (0.06, 0.067), (0.03, 0.0965), (0.0265, 0.0945)])
+    hull = Polygon(mm("-110 22, 110 22, 112 45, 100 56, 55 62, -105 64, -112 50"))
+    cabin = Polygon(mm("-85 60, 60 60, 25 97, 15 100, -55 100, -65 97"))
+    panes = Polygon(mm("-72 64, 46 64, 18 91, -58 91")).difference(box(-0.016, 0.06, -0.006, 0.1))
+    screens = Polygon(mm("57.5 66, 60 67, 30 96.5, 26.5 94.5"))
     return {
-        "car_body": extrude(hull.buffer(0.003, quad_segs=3), 0.11).moved((0, 0, -0.055)).lengthwise(),
-        "car_cabin": extrude(cabin, 0.088).moved((0, 0, -0.044)).lengthwise(),
-        "car_panes": extrude(panes, 0.09).moved((0, 0, -0.045)).lengthwise(),
-        "car_screen": extrude(screens, 0.074).moved((0, 0, -0.037)).lengthwise(),
+        "car_body": side(hull.buffer(0.003, quad_segs=3), 0.11),
+        "car_cabin": side(cabin, 0.088),
+        "car_panes": side(panes, 0.09),
+        "car_screen": side(screens, 0.074),
     }
 
 
@@ -66,10 +52,7 @@ def _rings() -> dict[str, Surface]:
 
 
 def _duck() -> dict[str, Surface]:
-    body = lathe(
-        [(0, -0.052), (0.04, -0.05), (0.058, -0.02), (0.06, 0.005), (0.045, 0.035), (0.02, 0.047), (0, 0.05)],
-        22,
-    )
+    body = lathe(mm("0 -52, 40 -50, 58 -20, 60 5, 45 35, 20 47, 0 50"), 22)
 
     def stretch(v: np.ndarray) -> np.ndarray:
         """Long body whose tail (-y) lifts."""

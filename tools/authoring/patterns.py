@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Colour = tuple[float, float, float]
 
 
-def rgb(code: str) -> Colour:
+def rgb(code: str) -> Floats:
     """Return the colour of a hexadecimal code such as ``"c8a06e"`` as three floats in [0, 1]."""
-    red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
-    return red, green, blue
+    return np.array([int(code[i : i + 2], 16) / 255.0 for i in (0, 2, 4)])
 
 
 def noise(
@@ -42,7 +40,7 @@ def noise(
     return np.asarray(field / field.std(), dtype=np.float64)
 
 
-def grid(shape: tuple[int, int]) -> tuple[Floats, Floats]:
+def grid(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     """Return x (rightwards) and y (downwards) of the pixel centres, each (height, width), in [0, 1]."""
     y, x = np.mgrid[0 : shape[0], 0 : shape[1]]
     return (x + 0.5) / shape[1], (y + 0.5) / shape[0]
@@ -54,38 +52,43 @@ def smooth_step(value: Floats, low: float, high: float) -> Floats:
     return np.asarray(t * t * (3.0 - 2.0 * t), dtype=np.float64)
 
 
-def ramp(value: Floats, stops: Sequence[tuple[float, Colour]]) -> Floats:
+def ramp(value: Floats, stops: Sequence[tuple[float, str]]) -> Floats:
     """Map (height, width) values to (height, width, 3) colours through linearly interpolated `stops`."""
     positions = [stop for stop, _ in stops]
-    channels = [np.interp(value, positions, [colour[i] for _, colour in stops]) for i in range(3)]
+    channels = [np.interp(value, positions, [rgb(code)[i] for _, code in stops]) for i in range(3)]
     return np.stack(channels, axis=-1)
 
 
-def flat(shape: tuple[int, int], colour: Colour) -> Floats:
+def flat(shape: tuple[int, int], code: str) -> Floats:
     """Return an image of a single colour."""
-    return np.broadcast_to(np.asarray(colour), (*shape, 3)).copy()
+    return np.broadcast_to(rgb(code), (*shape, 3)).copy()
 
 
-def blend(image: Floats, colour: Colour, mask: Floats) -> Floats:
-    """Paint `colour` over an RGB `image` where the (height, width) `mask` is 1."""
+def blend(image: Floats, code: str, mask: Floats) -> Floats:
+    """Paint a colour over an RGB `image` where the (height, width) `mask` is 1."""
     weight = np.clip(mask, 0.0, 1.0)[..., None]
-    return np.asarray(image * (1.0 - weight) + np.asarray(colour) * weight, dtype=np.float64)
+    return np.asarray(image * (1.0 - weight) + rgb(code) * weight, dtype=np.float64)
 
 
-def shape_mask(shape: tuple[int, int], outline: Sequence[tuple[float, float]]) -> Floats:
-    """Return the antialiased mask of a polygon given in fractions of the image's width and height."""
+def polygon(image: Floats, code: str, outline: Sequence[tuple[float, float]], opacity: float = 1.0) -> Floats:
+    """Paint an antialiased polygon, given in fractions of the image's width and height, over an RGB `image`."""
+    shape = image.shape[:2]
     scale = np.array([shape[1], shape[0]]) * 16.0
     points = np.round(np.asarray(outline) * scale).astype(np.int32)
     mask = np.zeros(shape, np.uint8)
     cv2.fillPoly(mask, [points], 255, cv2.LINE_AA, 4)
-    return mask / 255.0
+    return blend(image, code, opacity * (mask / 255.0))
 
 
-def disc_mask(shape: tuple[int, int], centre: tuple[float, float], radius: float) -> Floats:
-    """Return the antialiased mask of a disc; all lengths in fractions of the image's height."""
+def disc(
+    image: Floats, code: str, centre: tuple[float, float], radius: float, opacity: float = 1.0
+) -> Floats:
+    """Paint an antialiased disc over an RGB `image`; centre in fractions of its size, radius of its height."""
+    shape = image.shape[:2]
     x, y = grid(shape)
     distance = np.hypot((x - centre[0]) * shape[1] / shape[0], y - centre[1])
-    return 1.0 - smooth_step(distance, radius - 0.75 / shape[0], radius + 0.75 / shape[0])
+    mask = 1.0 - smooth_step(distance, radius - 0.75 / shape[0], radius + 0.75 / shape[0])
+    return blend(image, code, opacity * mask)
 
 
 def joints(shape: tuple[int, int], rows: int, columns: int, width: float, offset: float = 0.0) -> Floats:

@@ -2,17 +2,7 @@
 
 import numpy as np
 
-from authoring.patterns import (
-    Colour,
-    Floats,
-    blend,
-    flat,
-    grid,
-    joints,
-    noise,
-    rgb,
-    smooth_step,
-)
+from authoring.patterns import Floats, blend, flat, grid, joints, noise, rgb, smooth_step
 
 
 def carpet(rng: np.random.Generator) -> Floats:
@@ -48,8 +38,8 @@ def stripes(rng: np.random.Generator) -> Floats:
     """Bed linen: white with blue pinstripes."""
     x, _ = grid((256, 256))
     lines = smooth_step(np.abs((x * 8) % 1.0 - 0.5), 0.34, 0.40)
-    cloth = flat((256, 256), rgb("eef0f2")) + 0.012 * noise(rng, (256, 256), roll_off=0.7)[..., None]
-    return blend(cloth, rgb("6f8fb8"), lines)
+    cloth = flat((256, 256), "eef0f2") + 0.012 * noise(rng, (256, 256), roll_off=0.7)[..., None]
+    return blend(cloth, "6f8fb8", lines)
 
 
 def quilt(rng: np.random.Generator) -> Floats:
@@ -61,10 +51,10 @@ def quilt(rng: np.random.Generator) -> Floats:
     image = np.asarray(palette)[picks[(y * 4).astype(int), (x * 4).astype(int)]]
     image = image + 0.02 * noise(rng, shape, roll_off=0.8)[..., None]
     dots = ((x * 32) % 1.0 < 0.5) & ((y * 32) % 1.0 < 0.5)
-    return blend(image, rgb("ffffff"), 0.75 * joints(shape, 4, 4, 5.0) * dots)
+    return blend(image, "ffffff", 0.75 * joints(shape, 4, 4, 5.0) * dots)
 
 
-def _framed_rug(shape: tuple[int, int], field: Floats, bands: list[tuple[float, Colour]]) -> Floats:
+def _framed_rug(shape: tuple[int, int], field: Floats, bands: list[tuple[float, str]]) -> Floats:
     """Put borders around `field`; each band begins at its distance from the edge, in image heights."""
     x, y = grid(shape)
     edge = np.minimum(np.minimum(x, 1 - x) * shape[1] / shape[0], np.minimum(y, 1 - y))
@@ -80,10 +70,10 @@ def rug_living(rng: np.random.Generator) -> Floats:
     x, y = grid(shape)
     u, v = (x * 6) % 1.0 - 0.5, (y * 4) % 1.0 - 0.5
     lozenge = np.abs(u) + np.abs(v)
-    field = flat(shape, rgb("d9d2c3"))
-    field = blend(field, rgb("5f7d95"), smooth_step(-np.abs(lozenge - 0.42), -0.06, -0.03))
-    field = blend(field, rgb("c58f5c"), smooth_step(-lozenge, -0.14, -0.10))
-    image = _framed_rug(shape, field, [(0.10, rgb("e4dccb")), (0.08, rgb("48637b")), (0.02, rgb("d9d2c3"))])
+    field = flat(shape, "d9d2c3")
+    field = blend(field, "5f7d95", smooth_step(-np.abs(lozenge - 0.42), -0.06, -0.03))
+    field = blend(field, "c58f5c", smooth_step(-lozenge, -0.14, -0.10))
+    image = _framed_rug(shape, field, [(0.10, "e4dccb"), (0.08, "48637b"), (0.02, "d9d2c3")])
     return image + 0.025 * noise(rng, shape, roll_off=0.4)[..., None]
 
 
@@ -103,14 +93,14 @@ def rug_runner(rng: np.random.Generator) -> Floats:
     shape = (128, 512)
     x, y = grid(shape)
     u, v = (x * 16) % 1.0 - 0.5, (y * 4) % 1.0 - 0.5
-    field = blend(flat(shape, rgb("8e3b34")), rgb("c9a26a"), smooth_step(-np.abs(u) - np.abs(v), -0.2, -0.14))
-    image = _framed_rug(shape, field, [(0.15, rgb("d8bf92")), (0.11, rgb("5c2a2c")), (0.03, rgb("8e3b34"))])
+    field = blend(flat(shape, "8e3b34"), "c9a26a", smooth_step(-np.abs(u) - np.abs(v), -0.2, -0.14))
+    image = _framed_rug(shape, field, [(0.15, "d8bf92"), (0.11, "5c2a2c"), (0.03, "8e3b34")])
     return image + 0.02 * noise(rng, shape, roll_off=0.4)[..., None]
 
 
 def rug_bedroom(rng: np.random.Generator) -> Floats:
     """Shaggy ivory rug."""
-    return flat((256, 256), rgb("ded7cc")) + 0.045 * noise(rng, (256, 256), roll_off=0.8)[..., None]
+    return flat((256, 256), "ded7cc") + 0.045 * noise(rng, (256, 256), roll_off=0.8)[..., None]
 
 
 TEXTILES = (

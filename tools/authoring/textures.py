@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from authoring import artwork, textiles
 from authoring.patterns import (
-    Colour,
     Floats,
     blend,
-    disc_mask,
+    disc,
     flat,
     grid,
     joints,
@@ -36,7 +35,7 @@ from mjsim.files import replacing
 Painter = Callable[[np.random.Generator], Floats]
 
 
-def _planks(rng: np.random.Generator, light: Colour, dark: Colour) -> Floats:
+def _planks(rng: np.random.Generator, light: str, dark: str) -> Floats:
     """Floor boards along x: 16 rows of two boards; 512 px stand for 2 m."""
     size, rows = 512, 16
     height = size // rows
@@ -55,17 +54,17 @@ def _planks(rng: np.random.Generator, light: Colour, dark: Colour) -> Floats:
         seams[row * height] = 1.0
     mix = np.clip(0.5 + 0.16 * grain + 0.24 * tone, 0.0, 1.0)
     wood = ramp(mix, [(0.0, dark), (1.0, light)])
-    return np.asarray(wood * (1.0 - 0.32 * seams[..., None]) / np.asarray(light), dtype=np.float64)
+    return np.asarray(wood * (1.0 - 0.32 * seams[..., None]) / rgb(light), dtype=np.float64)
 
 
 def oak_planks(rng: np.random.Generator) -> Floats:
     """Tinted d3ab7c: warm oak boards."""
-    return _planks(rng, rgb("d3ab7c"), rgb("ad8152"))
+    return _planks(rng, "d3ab7c", "ad8152")
 
 
 def pine_planks(rng: np.random.Generator) -> Floats:
     """Tinted e3cfab: pale pine boards."""
-    return _planks(rng, rgb("e3cfab"), rgb("c9ad80"))
+    return _planks(rng, "e3cfab", "c9ad80")
 
 
 def wood_grain(rng: np.random.Generator) -> Floats:
@@ -79,9 +78,9 @@ def kitchen_tiles(rng: np.random.Generator) -> Floats:
     """Tinted cbc4b8: square stone tiles, 4 x 4."""
     shape = (256, 256)
     tone = 0.5 + 0.22 * tile_tones(rng, shape, 4, 4) + 0.1 * noise(rng, shape, roll_off=1.2)
-    stone = ramp(np.clip(tone, 0.0, 1.0), [(0.0, rgb("a9a196")), (1.0, rgb("cbc4b8"))])
-    tiles = blend(stone, rgb("8d867c"), joints(shape, 4, 4, 2.4))
-    return np.asarray(tiles / np.asarray(rgb("cbc4b8")), dtype=np.float64)
+    stone = ramp(np.clip(tone, 0.0, 1.0), [(0.0, "a9a196"), (1.0, "cbc4b8")])
+    tiles = blend(stone, "8d867c", joints(shape, 4, 4, 2.4))
+    return np.asarray(tiles / rgb("cbc4b8"), dtype=np.float64)
 
 
 def bath_tiles(rng: np.random.Generator) -> Floats:
@@ -90,8 +89,8 @@ def bath_tiles(rng: np.random.Generator) -> Floats:
     x, y = grid(shape)
     checker = (np.floor(x * 4) + np.floor(y * 4)) % 2
     tone = 0.02 * noise(rng, shape, roll_off=1.0)
-    base = ramp(checker, [(0.0, rgb("e9efee")), (1.0, rgb("b4cccb"))]) + tone[..., None]
-    return blend(base, rgb("c7cecd"), joints(shape, 4, 4, 2.2))
+    base = ramp(checker, [(0.0, "e9efee"), (1.0, "b4cccb")]) + tone[..., None]
+    return blend(base, "c7cecd", joints(shape, 4, 4, 2.2))
 
 
 def metro_tiles(rng: np.random.Generator) -> Floats:
@@ -105,8 +104,8 @@ def bricks(rng: np.random.Generator) -> Floats:
     """Whitewashed brickwork, 12 courses of 4."""
     shape = (256, 256)
     tone = 0.5 + 0.3 * tile_tones(rng, shape, 12, 4, 0.5) + 0.16 * noise(rng, shape, roll_off=0.9)
-    clay = ramp(np.clip(tone, 0.0, 1.0), [(0.0, rgb("a8644c")), (1.0, rgb("c98b70"))])
-    return blend(clay, rgb("cfc4b6"), joints(shape, 12, 4, 3.4, 0.5))
+    clay = ramp(np.clip(tone, 0.0, 1.0), [(0.0, "a8644c"), (1.0, "c98b70")])
+    return blend(clay, "cfc4b6", joints(shape, 12, 4, 3.4, 0.5))
 
 
 def marble(rng: np.random.Generator) -> Floats:
@@ -115,7 +114,7 @@ def marble(rng: np.random.Generator) -> Floats:
     warp = noise(rng, shape, roll_off=1.6)
     veins = np.exp(-np.abs(noise(rng, shape, roll_off=1.7) + 0.25 * warp) * 9.0)
     tone = np.clip(0.75 - 0.55 * veins + 0.08 * warp, 0.0, 1.0)
-    return ramp(tone, [(0.0, rgb("8c8d90")), (0.7, rgb("dedcd8")), (1.0, rgb("f2f0ec"))])
+    return ramp(tone, [(0.0, "8c8d90"), (0.7, "dedcd8"), (1.0, "f2f0ec")])
 
 
 def brushed_steel(rng: np.random.Generator) -> Floats:
@@ -126,8 +125,8 @@ def brushed_steel(rng: np.random.Generator) -> Floats:
 def leaves(rng: np.random.Generator) -> Floats:
     """Tinted 79ac55: foliage of many small leaves."""
     shape = (256, 256)
-    dark, light = np.asarray(rgb("24502a")), np.asarray(rgb("79ac55"))
-    image = (flat(shape, rgb("21452a")) * 255).astype(np.uint8)
+    dark, light = rgb("24502a"), rgb("79ac55")
+    image = (flat(shape, "21452a") * 255).astype(np.uint8)
     for _ in range(420):
         x, y = (int(v) for v in rng.integers(0, 256, 2))
         axes = (int(rng.integers(9, 17)), int(rng.integers(4, 7)))
@@ -142,12 +141,12 @@ def leaves(rng: np.random.Generator) -> Floats:
 def polka_dots(rng: np.random.Generator) -> Floats:
     """Wallpaper: pale yellow with staggered white, orange and teal dots."""
     shape = (256, 256)
-    image = flat(shape, rgb("fae7b8")) + 0.006 * noise(rng, shape, roll_off=0.8)[..., None]
+    image = flat(shape, "fae7b8") + 0.006 * noise(rng, shape, roll_off=0.8)[..., None]
     for index in range(16):
         row, column = divmod(index, 4)
         centre = ((column + 0.25 + 0.5 * (row % 2)) / 4, (row + 0.5) / 4)
-        colour = rgb(("ffffff", "f0b06a", "ffffff", "8cc5bf")[(index + row // 2) % 4])
-        image = blend(image, colour, disc_mask(shape, centre, 0.026))
+        code = ("ffffff", "f0b06a", "ffffff", "8cc5bf")[(index + row // 2) % 4]
+        image = disc(image, code, centre, 0.026)
     return image
 
 
