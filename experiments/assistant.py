@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from experiments.conditions import STEP, TaskBoard, alternatives
 from experiments.house import House
-from experiments.participants.base import Choice, Guidance
-from experiments.participants.walking import first_astray, project, rest_of
+from experiments.participants.base import Choice, Guidance, Visit
 from experiments.records import EventLog
 from experiments.regrets import Regrets, RegretsAtOnce
 from hud.conditions import condition
@@ -20,10 +19,12 @@ from mjsim.actions import EventKind, WorldEvent
 from mjsim.episode import CAPACITY, Episode
 from mjsim.observation import ObjectStatus, Observation
 from planner.plan import Status, VisitKind
+from planner.polyline import first_off_path, project, rest_of
 from planner.replanner import Replanner, Stop
 from planner.route import XY, Route, RouteVisit, TaskState
 
 OFF_THE_PATH = 0.6  # m from the shown path before a new one is shown
+GOAL = "goal"  # role of the markers of conditions that show the plan
 MOVED = 0.25  # m an object may be pushed before the way to it is shown anew
 FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock starts
 
@@ -45,6 +46,9 @@ class Assistant:
         log: Where plans and visits are logged.
         regrets: Works out what alternatives cost; None for one whose answers repeat.
         judging: Whether the regret of every visit is logged.
+
+    Attributes:
+        shown_roles: Roles of the markers that the condition shows at the start of the task.
     """
 
     def __init__(
@@ -74,6 +78,7 @@ class Assistant:
         }
         self._route: Route | None = None
         self._path: NDArray[np.float64] | None = None
+        self.shown_roles: frozenset[str] = frozenset()
         self._path_goal = np.zeros(2)
         self._stood = np.zeros(2)
 
@@ -88,6 +93,7 @@ class Assistant:
         self._stood = observation.position.copy()
         self._plan(observation)
         self.say("started", observation.time)
+        self.shown_roles = frozenset(marker.role for marker in self.hud_state(observation).markers)
 
     def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
         """Take note of what happened in the last control step; replan where the person left the plan."""
@@ -107,7 +113,7 @@ class Assistant:
         """Whether a better plan may turn up at any moment, so that every control step has to be observed."""
         return self._replanner.pending
 
-    def walked(self, positions: NDArray[np.float64], observation: Observation) -> None:
+    def observe_walk(self, positions: NDArray[np.float64], observation: Observation) -> None:
         """Take note of a walk on which nothing happened and nothing moved, as `observe` of each step would.
 
         Args:
@@ -116,7 +122,7 @@ class Assistant:
         """
         first = 0
         while self._path is not None and first < len(positions):
-            astray = first_astray(self._path, positions, first, OFF_THE_PATH)
+            astray = first_off_path(self._path, positions, first, OFF_THE_PATH)
             if astray < 0:
                 return
             self._show_way(observation, positions[astray])
@@ -140,22 +146,18 @@ class Assistant:
         return self._show(view)
 
     def guidance(self, observation: Observation) -> Guidance | None:
-        """The next step and the way to it; None when all is done."""
+        """The next step and the path to it; None when all is done."""
         visit = self._route.next if self._route else None
         if self._path is None or visit is None:
             return None
-        ahead, goal = (
-            rest_of(self._path, *observation.position),
-            self._goal(observation, visit.kind, visit.object),
-        )
-        return Guidance(visit.kind.value, visit.object, ahead, goal, way=self._path)
+        goal = self._goal(observation, visit.kind, visit.object)
+        return Guidance(Visit(visit.kind, visit.object), self._path, goal, OFF_THE_PATH)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
         """What can be done next and what it costs compared with the best, the best first; empty until it is known."""
         return tuple(
             Choice(
-                kind.value,
-                name,
+                Visit(kind, name),
                 self._goal(observation, kind, name),
                 found.regret,
                 found.capped,
@@ -220,8 +222,8 @@ class Assistant:
         self._show_way(observation, observation.position)
         if not first and self._replanner.replans == before:
             return
-        if not first:
-            self.say("replanned", observation.time)
+        if not first and GOAL in self.shown_roles:
+            self._board.announce_replan(observation.time)
         self._log_plan(observation, self._route)
 
     def _improve(self, observation: Observation) -> None:

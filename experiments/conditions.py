@@ -1,6 +1,8 @@
 """From the state of the world to what an assistance condition sees: labels, pictures, rooms, messages."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,9 @@ from planner.plan import VisitKind
 from planner.regret import Regret
 from planner.replanner import Stop
 
+READING_TIME = 2.0  # s that a message is shown before the announcement of a new plan takes its place
+REPLANNED = "replanned"
+
 STEP: Mapping[VisitKind, StepKind] = {VisitKind.PICK: "pick", VisitKind.PLACE: "place"}
 
 
@@ -24,6 +29,14 @@ def alternatives(regrets: Mapping[Stop, Regret]) -> tuple[Alternative, ...]:
     return tuple(
         Alternative(STEP[kind], name, found.regret, found.capped) for (kind, name), found in regrets.items()
     )
+
+
+class _Said(NamedTuple):
+    """A message: its key, since when it is shown, s, and the object that it is about."""
+
+    key: str
+    since: float
+    object: str | None = None
 
 
 class TaskBoard:
@@ -40,7 +53,8 @@ class TaskBoard:
         self._episode = episode
         self._order = tuple(order)
         self._done: list[tuple[StepKind, str]] = []
-        self._said: tuple[str, float, str | None] | None = None
+        self._latest = _Said("started", -math.inf)
+        self._replanned_at: float | None = None
         self._receptacles = tuple(self._task_receptacle(key) for key in episode.receptacles)
 
     def did(self, kind: StepKind, object_name: str) -> None:
@@ -48,8 +62,15 @@ class TaskBoard:
         self._done.append((kind, object_name))
 
     def say(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Note a message about an event or refusal at `time` s; it replaces the one before."""
-        self._said = (key, time, object_name)
+        """Show a message about an event or refusal from `time` s on; it replaces the one before."""
+        shown = self._shown(time)
+        if shown.key == REPLANNED and time >= shown.since + READING_TIME:
+            self._replanned_at = None
+        self._latest = _Said(key, time, object_name)
+
+    def announce_replan(self, time: float) -> None:
+        """Show that the plan was changed at `time` s, as soon as there was time to read the latest message."""
+        self._replanned_at = time
 
     def view(
         self,
@@ -89,9 +110,7 @@ class TaskBoard:
         )
 
     def _message(self, time: float) -> Message | None:
-        if self._said is None:
-            return None
-        key, since, name = self._said
+        key, since, name = self._shown(time)
         opacity = fade(time - since)
         if opacity <= 0:
             return None
@@ -99,6 +118,13 @@ class TaskBoard:
             return message(key, opacity=opacity)
         receptacle = self._house.catalogue.receptacles[self._episode.targets[name]]
         return message(key, object=self._label(name), receptacle=receptacle.label, opacity=opacity)
+
+    def _shown(self, time: float) -> "_Said":
+        """The message that the bar shows at a time, fresh or faded."""
+        if self._replanned_at is None:
+            return self._latest
+        since = max(self._replanned_at, self._latest.since + READING_TIME)
+        return _Said(REPLANNED, since) if time >= since else self._latest
 
     def _label(self, name: str) -> str:
         model = next(o.model for o in self._episode.objects if o.name == name)

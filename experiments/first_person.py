@@ -6,7 +6,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.assistant import Assistant
 from experiments.house import House
 from experiments.video import VideoWriter
 from hud.compose import Compositor
@@ -89,7 +88,10 @@ class Filming:
         self._glasses = glasses
         self._video = video
 
-    def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
+    def camera(self, world: World) -> CameraView:
+        """The eye camera."""
+        return self._glasses.camera_view(world.data)
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - all is in the world
         """Film one frame."""
-        state = assistant.hud_state(observation, self._glasses.camera_view(world.data))
-        self._video.write(self._glasses.frame(world.data, state))
+        self._video.write(self._glasses.frame(world.data, hud_state))

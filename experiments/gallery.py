@@ -11,12 +11,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.assistant import Assistant
 from experiments.errors import RecordError
 from experiments.first_person import FilmConfig, FirstPersonRenderer
 from experiments.house import House
 from experiments.records import EventLog
 from experiments.trial import TrialConfig, prepare_session
+from hud.projection import CameraView
+from hud.state import HudState
 from mjsim.files import replacing
 from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus, Observation
@@ -98,13 +99,16 @@ class _Photographer:
         self._targets = targets
         self.taken: dict[str, Image] = {}
 
-    def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
+    def camera(self, world: World) -> CameraView:
+        """The eye camera."""
+        return self._glasses.camera_view(world.data)
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
         """Take the pictures whose moment this is."""
         now = Now(world, observation, self._targets)
         come = [shot for shot in self._due if shot.moment(now)]
         if come:
-            state = assistant.hud_state(observation, self._glasses.camera_view(world.data))
-            frame = self._glasses.frame(world.data, state)
+            frame = self._glasses.frame(world.data, hud_state)
             self.taken |= {shot.name: frame for shot in come}
             self._due = [shot for shot in self._due if shot not in come]
         if not self._due:

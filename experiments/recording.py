@@ -35,7 +35,7 @@ class Recording:
     def __init__(
         self, world: World, log: EventLog, *, checkpoints: Collection[int] | None = None, first: int = 0
     ) -> None:
-        self._world, self._log = world, log
+        self._world, self.log = world, log
         self._steps_given = None if checkpoints is None else frozenset(checkpoints)
         self._period = max(1, round(CHECKPOINT_PERIOD / world.control_timestep))
         self._first, self._last = first, first
@@ -60,15 +60,15 @@ class Recording:
 
     def append(self) -> None:
         """Record the state before the next action."""
-        self._log_size.append(self._log.size)
-        self._log_hash.append(self._log.hash)
+        self._log_size.append(self.log.size)
+        self._log_hash.append(self.log.hash)
         self._state_hash.append(self._world.state_hash())
 
     def extend(self, state_hashes: NDArray[np.uint64]) -> None:
         """Record the states before actions during which nothing was logged, shape (n,)."""
         self._state_hash += state_hashes.tolist()
-        self._log_size += [self._log.size] * len(state_hashes)
-        self._log_hash += [self._log.hash] * len(state_hashes)
+        self._log_size += [self.log.size] * len(state_hashes)
+        self._log_hash += [self.log.hash] * len(state_hashes)
 
     @property
     def steps_to_checkpoint(self) -> int:
@@ -90,8 +90,8 @@ class Recording:
         arrays = {
             "state_hash": np.array(self._state_hash[:count], np.uint64),
             "action_hash": action_hashes(actions),
-            "log_size": np.array([*self._log_size[:count], self._log.size], np.int64),
-            "log_hash": np.array([*self._log_hash[:count], self._log.hash], np.uint64),
+            "log_size": np.array([*self._log_size[:count], self.log.size], np.int64),
+            "log_hash": np.array([*self._log_hash[:count], self.log.hash], np.uint64),
             "checkpoint_step": np.array(list(kept), np.int64),
             "checkpoint_physics": np.array(states) if states else np.zeros((0, 0)),
             "checkpoint_details": np.array([state.details_json() for state in kept.values()], np.str_),

@@ -1,23 +1,25 @@
 """The one loop: observe, show, let the user act, step the world. A script, a person and a replay all run in it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.assistant import OFF_THE_PATH, Assistant
+from experiments.assistant import Assistant
 from experiments.errors import SessionError
-from experiments.participants.base import Foreseeing, Guidance, Outlook, Participant, Percept, Things
-from experiments.participants.visit_tasks import NO_MOVES
+from experiments.locomotion import LocomotionController
+from experiments.participants.base import WAIT, Decision, Moves, Participant, Wait, WalkAlong
+from experiments.perception import Perception
 from experiments.recording import Recording
-from experiments.records import EventLog, Trajectory
-from mjsim.actions import IDLE, Action, ActionResult, WorldEvent
+from experiments.records import Trajectory
+from hud.projection import CameraView
+from hud.state import HudState
+from mjsim.actions import IDLE, Action, ActionResult, Move, WorldEvent
 from mjsim.errors import PhysicsError
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.visibility import visible_objects
+from mjsim.rollout import Rollout
 from mjsim.world import World
 
 ALL_DELIVERED, TIME_LIMIT, INTERRUPTED, PHYSICS_ERROR = (
@@ -33,8 +35,12 @@ MAX_MOTION = 30.0  # s; no pick or place takes as long
 class Viewer(Protocol):
     """Takes what is shown at every control step, e.g. to film it."""
 
-    def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
-        """Show the present state."""
+    def camera(self, world: World) -> CameraView | None:
+        """The eye camera through which the HUD is seen; None for a view from outside."""
+        ...
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
+        """Show the present state, and what the HUD shows in it."""
         ...
 
 
@@ -55,15 +61,14 @@ class Session:
 
     Args:
         world: The physics, freshly made.
-        assistant: Plans and fills the glasses.
+        assistant: Plans and says what the HUD shows.
         participant: The user.
-        log: Takes the events.
-        targets: Object instance name -> receptacle key.
+        recording: Takes hashes and checkpoints; its log takes the events.
+        walls: Outline of the navigable floor, ends x, y, x, y of its edges, m, shape (e, 4).
         time_limit: Simulated time after which the session ends, s.
         viewer: Sees every control step, or None.
-        recording: Hashes every control step; None for one that decides on checkpoints by itself.
-        foresight: Take many control steps at once where nobody has to see each of them: the fidelity is not `full`,
-            the participant foresees its moves, and there is no viewer. The run is the same without.
+        rollouts: Take many control steps at once where nobody watches them and the fidelity is not `full`. The run is
+            the same without.
 
     Attributes:
         trajectory: Poses and actions so far.
@@ -75,30 +80,27 @@ class Session:
         world: World,
         assistant: Assistant,
         participant: Participant,
+        recording: Recording,
         *,
-        log: EventLog,
-        targets: Mapping[str, str],
+        walls: NDArray[np.float64],
         time_limit: float,
         viewer: Viewer | None = None,
-        recording: Recording | None = None,
-        foresight: bool = True,
+        rollouts: bool = True,
     ) -> None:
         self._world = world
         self._assistant = assistant
         self._participant = participant
-        self._log = log
-        self._targets = targets
+        self._log = recording.log
         self._time_limit = time_limit
         self._viewer = viewer
-        self._shown: frozenset[str] = frozenset()
+        self._rollouts = rollouts and viewer is None and world.options.fidelity != "full"
+        self._perception = Perception(world, assistant)
+        self._controller = LocomotionController(walls)
         self._answer: ActionResult | None = None
+        self._hud: tuple[Observation, HudState] | None = None
         self._recorded_until = 0.0
-        self._foreseeing: Foreseeing | None = None
-        if foresight and viewer is None and world.options.fidelity != "full":
-            self._foreseeing = participant if isinstance(participant, Foreseeing) else None
-        self._minded: tuple[tuple[ObjectStatus, ...], NDArray[np.bool_]] = ((), np.zeros(0, np.bool_))
         self.trajectory = Trajectory(world.scene.index.names)
-        self.recording = recording or Recording(world, log)
+        self.recording = recording
 
     def run(self, on_progress: OnProgress = lambda _: None) -> str:
         """Run from the start to the end; returns why it ended: `all delivered`, `time limit` or `interrupted`.
@@ -119,21 +121,21 @@ class Session:
             SessionError: The participant needs guidance that the assistance condition does not show.
         """
         self._now = observation
-        self._shown = frozenset(m.role for m in self._assistant.hud_state(observation).markers)
-        if not self._participant.needs <= self._shown:
+        self._delivered = len(observation.names_with(ObjectStatus.DELIVERED))
+        shown = self._assistant.shown_roles
+        if not self._participant.needs <= shown:
             raise SessionError(
                 f"this participant needs {sorted(self._participant.needs)} markers but the assistance condition shows "
-                f"{sorted(self._shown) or 'none'}; choose another --user or --assistance"
+                f"{sorted(shown) or 'none'}; choose another --user or --assistance"
             )
 
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
         """Go on to the end, once started; returns and raises as `run` does."""
         try:
-            reason = self._end_reason
-            while reason is None:
+            while self.end_reason is None:
                 self.advance()
                 on_progress(self.progress)
-                reason = self._end_reason
+            reason = self.end_reason
             self._end(reason)
         except KeyboardInterrupt:
             # What has been done so far is kept and measured, as it would be for a person who stops early.
@@ -148,40 +150,38 @@ class Session:
     @property
     def progress(self) -> Progress:
         """How far the session has got."""
-        delivered = sum(status is ObjectStatus.DELIVERED for status in self._now.object_status)
-        return Progress(self._now.time, delivered, len(self._now.object_names))
+        return Progress(self._now.time, self._delivered, len(self._now.object_names))
+
+    @property
+    def end_reason(self) -> str | None:
+        """Why the session is over; None while it goes on."""
+        if self._delivered == len(self._now.object_names):
+            return ALL_DELIVERED
+        return TIME_LIMIT if self._now.time >= self._time_limit - 1e-9 else None
 
     def advance(self) -> None:
-        """Let the participant decide once, and do that: one control step, or many that nobody has to see.
+        """Let the participant decide once, and carry that out: one control step, or a rollout of many.
 
         Raises:
             PhysicsError: The physics failed.
         """
         self._now = self.recording.pass_checkpoint(self._now)
-        self._film()
-        percept = self._percept(self._answer)
-        moves = None if self._foreseeing is None else self._foresee(self._foreseeing, percept)
-        if moves is None:
-            self._step(self._participant.act(percept))
-        else:
-            self._answer = None
-            self._stride(moves)
+        self._show()
+        decision = self._participant.act(
+            self._perception.percept(
+                self._now, self._answer, self._hud_state, blocked=self._controller.blocked
+            )
+        )
+        if not (self._rollouts and self._roll_out(decision)):
+            self._step(self._action(decision))
 
-    @property
-    def _end_reason(self) -> str | None:
-        """Why the session is over, or None if it is not."""
-        progress = self.progress
-        if progress.delivered == progress.total:
-            return ALL_DELIVERED
-        return TIME_LIMIT if progress.time >= self._time_limit - 1e-9 else None
-
-    def _end(self, reason: str) -> None:
-        """Record the last state, and let the viewer see that all is done."""
-        if reason == ALL_DELIVERED:
-            self._assistant.say("finished", self._now.time)
-        self._record(IDLE)
-        if reason == ALL_DELIVERED:
-            self._hold_final_view()
+    def _action(self, decision: Decision) -> Action:
+        """What a decision means for the next control step."""
+        if isinstance(decision, WalkAlong):
+            return self._controller.step(decision, self._now)
+        if isinstance(decision, Moves):
+            return Move(*decision.rows[0].tolist())
+        return IDLE if isinstance(decision, Wait) else decision
 
     def _step(self, action: Action) -> None:
         """One control step, observed by everybody."""
@@ -189,123 +189,103 @@ class Session:
         step = self._world.step(action)
         self._now, self._answer = step.observation, step.result
         if step.result is not None:
-            self._note_attempt(self._now.time, step.result)
-        self._take_note(step.events)
+            self._note_attempt(step.result)
+        self._note_events(step.events)
 
-    def _foresee(self, participant: Foreseeing, percept: Percept) -> NDArray[np.float64] | None:
-        """Moves of many control steps at once, none to wait for a pick or place; None where each has to be observed."""
-        left = int((self._time_limit - percept.time) / self._world.control_timestep) - 1
-        if self._assistant.expecting or (percept.answer is not None and not percept.answer.applied):
-            return None
-        if percept.busy:
-            in_time = left * self._world.control_timestep > MAX_MOTION
-            return NO_MOVES if in_time and participant.waits() else None
-        limit = min(left, self.recording.steps_to_checkpoint)
+    def _roll_out(self, decision: Decision) -> bool:
+        """Carry out many control steps at once, if all of them follow from the decision; whether that was so."""
+        if self._assistant.expecting:
+            return False
+        left = int((self._time_limit - self._now.time) / self._world.control_timestep) - 1
+        if decision is WAIT:
+            if not self._now.busy or left * self._world.control_timestep <= MAX_MOTION:
+                return False
+            self._note_events(self._recorded(None).events)
+            return True
+        moves = self._moves(decision, min(left, self.recording.steps_to_checkpoint))
+        if not len(moves):
+            return False
+        rollout = self._recorded(moves)
+        if isinstance(decision, WalkAlong):
+            self._controller.commit(len(rollout))
+        uneventful = len(rollout) - (1 if rollout.events else 0)
+        self._assistant.observe_walk(rollout.positions[:uneventful], self._now)
+        if rollout.events:
+            self._note_events(rollout.events)
+        return True
+
+    def _moves(self, decision: Decision, limit: int) -> NDArray[np.float64]:
+        """Moves that follow from a decision, at most `limit`, shape (n, 4)."""
         locomotion = self._world.locomotion
-        if limit < 1 or locomotion is None:
-            return None
-        moves = participant.foresee(percept, Outlook(locomotion, limit, stray=OFF_THE_PATH))
-        return moves if len(moves) else None
+        if limit >= 1 and locomotion is not None:
+            if isinstance(decision, WalkAlong):
+                return self._controller.roll_out(decision, self._now, locomotion, limit)
+            if isinstance(decision, Moves):
+                return decision.rows[:limit]
+        return np.zeros((0, 4))
 
-    def _stride(self, moves: NDArray[np.float64]) -> None:
-        """Many control steps, recorded as if they had been observed one by one."""
+    def _recorded(self, moves: NDArray[np.float64] | None) -> Rollout:
+        """Many control steps, recorded as if they had been observed one by one.
+
+        Args:
+            moves: Forward, left (m/s), turn and look (rad/s) of every step, shape (n, 4); None to wait for the pick or
+                place under way.
+        """
         self._recorded_until = self._now.time
         self.recording.append()
         health = self._world.health_sample
-        walks = len(moves) > 0
-        stretch = self._world.walk(moves) if walks else self._world.finish()
-        count = len(stretch)
-        self.recording.extend(stretch.state_hashes[:-1])
-        self.trajectory.extend(self._now, health, stretch, moves[:count] if walks else np.zeros((count, 4)))
-        self._now = stretch.observation
-        if walks:
-            if self._foreseeing is not None:
-                self._foreseeing.went(count)
-            quiet = count - 1 if stretch.events else count
-            self._assistant.walked(stretch.positions[:quiet], self._now)
-        if stretch.events or not walks:
-            self._take_note(stretch.events)
+        rollout = self._world.finish() if moves is None else self._world.walk(moves)
+        count = len(rollout)
+        self.recording.extend(rollout.state_hashes[:-1])
+        self.trajectory.extend(
+            self._now, health, rollout, np.zeros((count, 4)) if moves is None else moves[:count]
+        )
+        self._now, self._answer = rollout.observation, None
+        return rollout
 
     def _record(self, action: Action) -> None:
         self._recorded_until = self._now.time
         self.recording.append()
         self.trajectory.append(self._now, action, self._world.health_sample)
 
-    def _hold_final_view(self) -> None:
-        """Let the viewer see the end for a moment; nothing of it is measured."""
+    def _end(self, reason: str) -> None:
+        """Record the last state; let the viewer see for a moment that all is done. That is not measured."""
+        if reason == ALL_DELIVERED:
+            self._assistant.say("finished", self._now.time)
+        self._record(IDLE)
         end = self._now
-        while self._viewer is not None and self._now.time < end.time + FINAL_HOLD:
-            self._film()
+        while reason == ALL_DELIVERED and self._viewer is not None and self._now.time < end.time + FINAL_HOLD:
+            self._show()
             self._now = self._world.step(IDLE).observation
         self._now = end
 
-    def _take_note(self, events: tuple[WorldEvent, ...]) -> None:
+    def _note_events(self, events: tuple[WorldEvent, ...]) -> None:
+        """Log what happened in the world and tell the assistant."""
         for event in events:
             self._log.append(event.time, event.kind.value, object=event.object, receptacle=event.receptacle)
         self._assistant.observe(self._now, events)
         for event in events:
             self._assistant.say(event.kind.value, self._now.time, event.object)
+        if events:
+            self._delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
 
-    def _note_attempt(self, time: float, result: ActionResult) -> None:
+    def _note_attempt(self, result: ActionResult) -> None:
+        """Log an attempt to pick or place; a refusal is shown."""
+        time, refusal = self._now.time, result.refusal.value if result.refusal else None
         kind = type(result.action).__name__.lower()
-        refusal = result.refusal.value if result.refusal else None
         self._log.append(
             time, "attempt", action=kind, object=result.object, applied=result.applied, refusal=refusal
         )
         if refusal is not None:
             self._assistant.say(refusal, time, result.object)
 
-    def _film(self) -> None:
+    def _hud_state(self) -> HudState:
+        """What the HUD shows now; composed once per state, and only when somebody asks."""
+        if self._hud is None or self._hud[0] is not self._now:
+            camera = self._viewer.camera(self._world) if self._viewer is not None else None
+            self._hud = self._now, self._assistant.hud_state(self._now, camera)
+        return self._hud[1]
+
+    def _show(self) -> None:
         if self._viewer is not None:
-            self._viewer.show(self._world, self._now, self._assistant)
-
-    def _percept(self, answer: ActionResult | None) -> Percept:
-        seen = self._now
-        return Percept(
-            time=seen.time,
-            position=seen.position,
-            heading=seen.heading,
-            hands=seen.hands,
-            busy=seen.busy,
-            targets=self._targets,
-            answer=answer,
-            things=self._things(seen),
-            hud=partial(self._assistant.hud_state, seen),
-            look=partial(self._look, seen),
-            find_guidance=partial(self._guidance, seen),
-            find_flagpoles=partial(self._flagpoles, seen),
-            find_choices=partial(self._assistant.choices, seen),
-        )
-
-    def _look(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
-        # What has been put away stays in view, in its bin, but nobody takes it for misplaced.
-        seen = visible_objects(
-            self._world.scene,
-            self._world.data,
-            observation.eye,
-            observation.heading,
-            observation.pitch,
-            among=observation.names_with(ObjectStatus.LOOSE),
-        )
-        return {name: _position_of(observation, name) for name in seen}
-
-    def _guidance(self, observation: Observation) -> Guidance | None:
-        return self._assistant.guidance(observation) if "goal" in self._shown else None
-
-    def _flagpoles(self, observation: Observation) -> dict[str, NDArray[np.float64]]:
-        if "flagpole" not in self._shown:
-            return {}
-        return {n: _position_of(observation, n) for n in observation.names_with(ObjectStatus.LOOSE)}
-
-    def _things(self, observation: Observation) -> Things:
-        status, minded = self._minded
-        if observation.object_status != status:
-            status = observation.object_status
-            minded = np.array([s is ObjectStatus.LOOSE for s in status])
-            self._minded = status, minded
-        # Kernels are compiled for arrays without gaps.
-        return Things(observation.object_names, np.ascontiguousarray(observation.object_positions), minded)
-
-
-def _position_of(observation: Observation, name: str) -> NDArray[np.float64]:
-    return observation.object_positions[observation.object_names.index(name), :2]
+            self._viewer.show(self._world, self._now, self._hud_state())

@@ -20,7 +20,7 @@ from experiments.health import summarise_health
 from experiments.house import House
 from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
-from experiments.recording import provenance
+from experiments.recording import Recording, provenance
 from experiments.records import EventLog
 from experiments.regrets import RegretsAtOnce, RegretsBeside
 from experiments.run_directory import keep_failed, run_directory
@@ -166,12 +166,12 @@ def _simulate(
     on_progress: OnProgress,
 ) -> _Ran:
     """Run the session of a trial; log and video are complete in `folder` afterwards."""
-    ran = _simulate_once(config, house, scene, folder, film, on_progress, foresight=True)
+    ran = _simulate_once(config, house, scene, folder, film, on_progress, rollouts=True)
     if isinstance(ran.ended, PhysicsError) and config.fidelity != "full":
         # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
         for path in folder.iterdir():
             path.unlink()
-        ran = _simulate_once(config, house, scene, folder, film, on_progress, foresight=False)
+        ran = _simulate_once(config, house, scene, folder, film, on_progress, rollouts=False)
     return ran
 
 
@@ -183,7 +183,7 @@ def _simulate_once(
     film: FilmConfig | None,
     on_progress: OnProgress,
     *,
-    foresight: bool,
+    rollouts: bool,
 ) -> _Ran:
     with ExitStack() as stack:
         log = stack.enter_context(EventLog(folder / records.EVENTS))
@@ -196,7 +196,7 @@ def _simulate_once(
         replanner = None
         if config.live:
             replanner = stack.enter_context(LiveReplanner(house.geodesics, solver(config.planner)))
-        session, _ = prepare_session(config, house, scene, log, viewer, replanner, foresight=foresight)
+        session, _ = prepare_session(config, house, scene, log, viewer, replanner, rollouts=rollouts)
         try:
             ended: str | PhysicsError = session.run(on_progress)
         except PhysicsError as error:
@@ -212,7 +212,7 @@ def prepare_session(
     viewer: Viewer | None = None,
     replanner: Replanner | None = None,
     *,
-    foresight: bool = True,
+    rollouts: bool = True,
     world: World | None = None,
 ) -> tuple[Session, World]:
     """Make the world, the assistant and the participant of a trial, ready to run.
@@ -224,7 +224,7 @@ def prepare_session(
         log: Takes the events.
         viewer: Sees every control step, or None.
         replanner: Plans for the assistant; None for one whose plans repeat.
-        foresight: See `Session`.
+        rollouts: See `Session`.
         world: A new world of the scene in the trial's fidelity; None to make one.
     """
     episode = scene.episode
@@ -259,11 +259,11 @@ def prepare_session(
         world,
         assistant,
         participant(config.user_name)(house.known(), user_rng),
-        log=log,
-        targets=episode.targets,
+        Recording(world, log),
+        walls=house.known().outline,
         time_limit=config.limit,
         viewer=viewer,
-        foresight=foresight,
+        rollouts=rollouts,
     )
     return session, world
 

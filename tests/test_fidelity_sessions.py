@@ -1,4 +1,4 @@
-"""Trials outside of full physics: foreseen or stepped, run or replayed, they are the same."""
+"""Trials outside of full physics: rolled out or stepped, run or replayed, they are the same."""
 
 import numpy as np
 import pytest
@@ -8,11 +8,12 @@ from experiments.agreement import run_in
 from experiments.errors import ReplayError
 from experiments.files import read_arrays, read_json
 from experiments.house import House
-from experiments.participants.base import Foreseeing
-from experiments.participants.follower import Follower
+from experiments.participants.base import WAIT, Moves
+from experiments.participants.visit_executor import VisitExecutor
 from experiments.records import EventLog, read_events
 from experiments.replaying.replay import replay
 from experiments.trial import TrialConfig, prepare_session, run_trial
+from mjsim.actions import Move
 from mjsim.errors import PhysicsError
 from mjsim.health.monitor import HealthMonitor
 from mjsim.model.scene import compose
@@ -43,11 +44,11 @@ def event_run(house, tmp_path_factory):
     return out
 
 
-def played(house, config, *, foresight):
+def played(house, config, *, rollouts, ends="all delivered"):
     """Arrays, log and state hashes of a trial, and how many single control steps its session asked for."""
     scene = compose(house.sample_episode(objects=config.objects, seed=config.seed), house.catalogue)
     log = EventLog()
-    session, world = prepare_session(config, house, scene, log, foresight=foresight)
+    session, world = prepare_session(config, house, scene, log, rollouts=rollouts)
     singles, step = 0, world.step
 
     def counted(action):
@@ -56,7 +57,7 @@ def played(house, config, *, foresight):
         return step(action)
 
     world.step = counted
-    assert session.run() == "all delivered"
+    assert session.run() == ends
     arrays = {name: array.tobytes() for name, array in session.trajectory.arrays().items()}
     hashes = session.recording.state_hashes()
     return (
@@ -67,14 +68,18 @@ def played(house, config, *, foresight):
 
 
 @pytest.mark.parametrize("fidelity", ["windows", "event"])
-@pytest.mark.parametrize("assistance", ["optimal", "highlight", "none"])
-def test_what_is_foreseen_is_what_stepping_gives(house, fidelity, assistance):
-    config = TrialConfig(objects=3, assistance=assistance, seed=1, fidelity=fidelity)
-    foreseen, singles, steps = played(house, config, foresight=True)
-    stepped, all_single, _ = played(house, config, foresight=False)
-    assert {name for name in stepped if stepped[name] != foreseen[name]} == set()
+@pytest.mark.parametrize(
+    ("assistance", "user"),
+    [("optimal", None), ("highlight", None), ("none", None), ("none", "boltzmann:3")],
+)
+def test_rollouts_are_what_stepping_gives(house, fidelity, assistance, user):
+    config = TrialConfig(objects=3, assistance=assistance, seed=1, fidelity=fidelity, user=user)
+    rolled_out, singles, steps = played(house, config, rollouts=True)
+    stepped, all_single, _ = played(house, config, rollouts=False)
+    assert {name for name in stepped if stepped[name] != rolled_out[name]} == set()
     assert all_single == steps - 1
-    assert singles < (0.6 if assistance == "none" else 0.2) * steps
+    searches = assistance == "none" and user is None
+    assert singles < (0.6 if searches else 0.2) * steps
 
 
 @pytest.mark.parametrize("start", [0.0, 15.0])
@@ -138,16 +143,60 @@ def test_an_interrupted_run_without_physics_replays(house, tmp_path):
     assert replay(tmp_path / "run", house=house).ended == "interrupted"
 
 
-def test_only_walkers_that_can_foresee_are_asked_to(house):
-    assert isinstance(Follower(house.known()), Foreseeing)
+class SimpleFollower:
+    """All that an author of a participant has to write."""
 
-    class Stepper:
-        needs = frozenset()
+    needs = frozenset({"goal"})
 
-        def act(self, percept):
-            raise NotImplementedError
+    def __init__(self, house):
+        self._executor = VisitExecutor(house)
 
-    assert not isinstance(Stepper(), Foreseeing)
+    def act(self, percept):
+        return self._executor.follow(percept, percept.guidance) if percept.guidance else WAIT
+
+
+def build(house, rng):  # noqa: ARG001 - the interface of participants
+    return SimpleFollower(house)
+
+
+def test_a_participant_of_one_method_is_as_quick_as_a_built_in_one(house):
+    theirs, ours = (
+        TrialConfig(objects=3, assistance="optimal", seed=1, fidelity="event", user=user)
+        for user in (f"{__name__}:build", "follower")
+    )
+    mine, singles, steps = played(house, theirs, rollouts=True)
+    other, *counts = played(house, ours, rollouts=True)
+    assert (mine["hashes"], singles, steps) == (other["hashes"], *counts)
+
+
+class Dancer:
+    """Moves in figures, and answers every kind of decision in turn."""
+
+    needs = frozenset()
+
+    def __init__(self):
+        self._figure = np.tile([0.3, 0.1, 1.0, 0.0], (7, 1))
+        self._asked = 0
+
+    def act(self, percept):
+        self._asked = round(percept.time / 0.04)
+        if self._asked % 20 < 7:
+            return Moves(self._figure[self._asked % 20 :])
+        return WAIT if self._asked % 20 < 10 else Move(turn=-1.0)
+
+
+def dance(house, rng):  # noqa: ARG001 - the interface of participants
+    return Dancer()
+
+
+def test_prepared_moves_are_made_one_by_one_or_at_once(house):
+    config = TrialConfig(
+        objects=2, assistance="none", seed=1, fidelity="event", user=f"{__name__}:dance", time_limit=10.0
+    )
+    at_once, singles, steps = played(house, config, rollouts=True, ends="time limit")
+    one_by_one, *_ = played(house, config, rollouts=False, ends="time limit")
+    assert at_once == one_by_one
+    assert singles < 0.75 * steps
 
 
 def test_the_tiers_deliver_the_same_in_about_the_same_time(house):

@@ -7,35 +7,32 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from experiments.participants.walking import (
+from experiments.path_following import (
     BRAKING,
-    CLEAR_OF_FEET,
+    CLEARANCE,
     CRUISE_SPEED,
-    LEAST_AHEAD,
     LOOK_AHEAD,
     LOOK_BEYOND,
     MAX_TURN,
-    STEP_AROUND_FROM,
+    MIN_AHEAD,
+    SIDESTEP_RANGE,
     TURN_GAIN,
-    first_astray,
+    Obstacles,
     follow,
     is_free,
-    path_length,
-    point_along,
-    project,
-    rest_of,
     sidestep,
     turn_towards,
     wrap_angle,
 )
 from planner.navmesh import NavMesh
+from planner.polyline import first_off_path, path_length, point_along, project, rest_of
 
 CONTROL_TIMESTEP = 0.04
 PATIENT = settings(deadline=None)  # the first case compiles
 coordinate = st.floats(-5, 5).map(lambda v: round(v, 3))
 spots = st.tuples(coordinate, coordinate)
 points = st.lists(spots, min_size=2, max_size=6).map(np.array)
-NOTHING = np.zeros((0, 3)), np.zeros(0, bool), -1, np.zeros((0, 4))
+NOTHING = Obstacles(np.zeros((0, 3)), np.zeros(0, bool), np.zeros((0, 4)))
 
 
 def floor_of(*obstacles):
@@ -45,8 +42,9 @@ def floor_of(*obstacles):
 ANYWHERE = floor_of()
 
 
-def mind(*things):
-    return np.array([(x, y, 0.0) for x, y in things]).reshape(-1, 3), np.ones(len(things), bool), -1
+def among(walls, *objects):
+    positions = np.array([(x, y, 0.0) for x, y in objects]).reshape(-1, 3)
+    return Obstacles(positions, np.ones(len(objects), bool), walls)
 
 
 def moved(position, heading, move):
@@ -94,7 +92,7 @@ def test_a_point_mass_arrives_and_stays_near_the_path(path):
     path = np.array(path, dtype=float)
     position, heading, strayed = path[0].copy(), 0.0, 0.0
     for _ in range(1000):
-        position, heading = moved(position, heading, follow(path, *position, heading, *NOTHING))
+        position, heading = moved(position, heading, follow(path, *position, heading, NOTHING))
         strayed = max(strayed, project(path, *position)[1])
         if np.linalg.norm(position - path[-1]) < 0.05:
             break
@@ -108,7 +106,7 @@ def test_things_on_the_way_are_walked_around(across):
     path, thing = np.array([[0.0, 0.0], [4.0, 0.0]]), np.array([2.0, across])
     position, heading, nearest = np.zeros(2), 0.0, np.inf
     for _ in range(400):
-        position, heading = moved(position, heading, follow(path, *position, heading, *mind(thing), ANYWHERE))
+        position, heading = moved(position, heading, follow(path, *position, heading, among(ANYWHERE, thing)))
         nearest = min(nearest, float(np.linalg.norm(position - thing)))
     assert nearest > 0.3
     assert np.linalg.norm(position - path[-1]) < 0.1
@@ -117,23 +115,22 @@ def test_things_on_the_way_are_walked_around(across):
 def test_a_thing_is_passed_on_its_free_side():
     target, beyond = (0.25, 0.0), (1.0, 0.0)
     south, north = floor_of(_box(-9, -9, 9, -0.2)), floor_of(_box(-9, -9, 9, -0.2), _box(-9, 0.2, 9, 9))
-    assert sidestep(0.0, 0.0, target, beyond, *mind((0.5, 0.1)), ANYWHERE)[1] < 0
-    assert sidestep(0.0, 0.0, target, beyond, *mind((0.5, 0.1)), south)[1] > 0
-    assert sidestep(0.0, 0.0, target, beyond, *mind((0.5, 0.1)), north) == target
+    assert sidestep(0.0, 0.0, target, beyond, among(ANYWHERE, (0.5, 0.1)))[1] < 0
+    assert sidestep(0.0, 0.0, target, beyond, among(south, (0.5, 0.1)))[1] > 0
+    assert sidestep(0.0, 0.0, target, beyond, among(north, (0.5, 0.1))) == target
 
 
 @pytest.mark.parametrize("thing", [(-0.3, 0.0), (1.5, 0.0), (0.4, 0.6)])
 def test_what_is_not_in_the_way_bends_nothing(thing):
     target = (0.25, 0.0)
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), *mind(thing), ANYWHERE) == target
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), among(ANYWHERE, thing)) == target
 
 
 def test_what_is_sought_or_put_away_bends_nothing():
-    things, target = np.array([(0.4, 0.0, 0.0)]), (0.25, 0.0)
-    seen = sidestep(0.0, 0.0, target, (1.0, 0.0), things, np.array([True]), -1, ANYWHERE)
-    assert seen != target
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), things, np.array([True]), 0, ANYWHERE) == target
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), things, np.array([False]), -1, ANYWHERE) == target
+    target, obstacles = (0.25, 0.0), among(ANYWHERE, (0.4, 0.0))
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), obstacles) != target
+    ignored = obstacles._replace(is_obstacle=np.array([False]))
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), ignored) == target
 
 
 def _box(x0, y0, x1, y1):
@@ -173,16 +170,16 @@ def sidestep_in_numpy(position, target, beyond, things, is_free):
     in_the_way = [
         (r @ ahead, r @ left)
         for r in offsets
-        if 0.0 < r @ ahead < STEP_AROUND_FROM and abs(r @ left) < CLEAR_OF_FEET
+        if 0.0 < r @ ahead < SIDESTEP_RANGE and abs(r @ left) < CLEARANCE
     ]
     if not in_the_way:
         return target
     along, across = min(in_the_way)
     side = -1.0 if across >= 0 else 1.0
     for sign in (side, -side):
-        if sign == -side and along < LEAST_AHEAD * abs(across + sign * CLEAR_OF_FEET):
+        if sign == -side and along < MIN_AHEAD * abs(across + sign * CLEARANCE):
             return target
-        step = along * ahead + (across + sign * CLEAR_OF_FEET) * left
+        step = along * ahead + (across + sign * CLEARANCE) * left
         aside = position + step * (np.linalg.norm(target - position) / np.linalg.norm(step))
         if is_free(position + step) and is_free(aside):
             return aside
@@ -223,7 +220,7 @@ def test_kernels_agree_with_numpy(path, position, heading, things):
         (project(path, *position), nearest_in_numpy(path, there)),
         (point_along(path, 1.234), along_in_numpy(path, 1.234)),
         (
-            follow(path, *position, heading, *mind(*things), walls.outline()),
+            follow(path, *position, heading, among(walls.outline(), *things)),
             follow_in_numpy(path, there, heading, np.array(things), walls.is_navigable),
         ),
     ):
@@ -244,10 +241,10 @@ def test_the_rest_of_a_path_is_what_lies_ahead(path, position):
 
 @PATIENT
 @given(points, st.lists(spots, min_size=1, max_size=8).map(np.array), st.floats(0.1, 3.0))
-def test_the_first_astray_is_the_first_far_from_the_path(path, positions, gap):
+def test_the_first_off_path_is_the_first_far_from_the_path(path, positions, gap):
     far = [k for k, (x, y) in enumerate(positions) if project(path, x, y)[1] > gap]
-    assert first_astray(path, positions, 0, gap) == (far[0] if far else -1)
-    assert first_astray(path, positions, len(positions), gap) == -1
+    assert first_off_path(path, positions, 0, gap) == (far[0] if far else -1)
+    assert first_off_path(path, positions, len(positions), gap) == -1
 
 
 def test_the_outline_says_where_one_can_stand(navmesh):

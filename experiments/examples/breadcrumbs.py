@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse, Point
-from experiments.participants.walking import path_length, point_along
 from mjsim.environments.sensors import Sensor, SensorInput, unit_spec
 from mjsim.observation import ObjectStatus
+from planner.polyline import path_length, point_along
 
 AHEAD = 1.0  # m along the way; about as far as a walker looks
 

@@ -1,6 +1,7 @@
 """Demonstrations for imitation: what a built-in participant does, as pairs of observation and action."""
 
-from collections.abc import Callable, Mapping
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +10,11 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.known_house import KnownHouse
-from experiments.participants.base import NO_THINGS, Percept
+from experiments.locomotion import LocomotionController
+from experiments.participants.base import Choice, Guidance, Percept, Point, WalkAlong
 from experiments.participants.nearest import Nearest
 from hud.state import HudState
-from mjsim.actions import Action, ActionResult, Move, Pick
+from mjsim.actions import IDLE, Action, ActionResult, Move, Pick
 from mjsim.environments.core import ObservationDict, Rearrangement
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
@@ -45,15 +47,13 @@ class Demonstrator:
 
     def __init__(self, known: KnownHouse, targets: Mapping[str, str]) -> None:
         self._participant = Nearest(known)
+        self._controller = LocomotionController(known.outline)
         self._targets = targets
         self.answer: ActionResult | None = None
 
     def act(self, observation: Observation) -> Action:
         """What it would do now."""
-        positions = zip(observation.object_names, observation.object_positions[:, :2], strict=True)
-        loose = set(observation.names_with(ObjectStatus.LOOSE))
-        flagpoles = {name: xy for name, xy in positions if name in loose}
-        return self._participant.act(
+        decision = self._participant.act(
             Percept(
                 time=observation.time,
                 position=observation.position,
@@ -62,17 +62,53 @@ class Demonstrator:
                 busy=observation.busy,
                 targets=self._targets,
                 answer=self.answer,
-                things=NO_THINGS,
-                hud=_no_glasses,
-                look=lambda: flagpoles,
-                find_guidance=lambda: None,
-                find_flagpoles=lambda: flagpoles,
+                blocked=self._controller.blocked,
+                senses=_Flagpoles(observation),
             )
         )
+        if not isinstance(decision, WalkAlong):
+            return IDLE
+        return self._controller.step(decision, _without_objects(observation))
 
 
-def _no_glasses() -> HudState:
-    raise NotImplementedError("this participant looks at the flagpoles alone")
+class _Flagpoles:
+    """Senses of somebody who sees a flagpole over every misplaced object, and nothing else."""
+
+    def __init__(self, observation: Observation) -> None:
+        self._observation = observation
+
+    def flagpoles(self) -> Mapping[str, Point]:
+        """Object instance name -> floor position, m, shape (2,)."""
+        seen = self._observation
+        positions = zip(seen.object_names, seen.object_positions[:, :2], strict=True)
+        loose = set(seen.names_with(ObjectStatus.LOOSE))
+        return {name: xy for name, xy in positions if name in loose}
+
+    def look(self) -> Mapping[str, Point]:
+        """Nothing."""
+        return {}
+
+    def nearby(self) -> Mapping[str, Point]:
+        """Nothing."""
+        return {}
+
+    def guidance(self) -> Guidance | None:
+        """None."""
+        return None
+
+    def choices(self) -> Sequence[Choice]:
+        """None."""
+        return ()
+
+    def hud(self) -> HudState:
+        """Raises `NotImplementedError`."""
+        raise NotImplementedError("this participant sees the flagpoles alone")
+
+
+def _without_objects(observation: Observation) -> Observation:
+    """The learner cannot see what lies at its feet, so its teacher walks straight on, too."""
+    nothing = np.zeros((0, 3))
+    return dataclasses.replace(observation, object_names=(), object_status=(), object_positions=nothing)
 
 
 def encode(action: Action, options: WorldOptions) -> NDArray[np.float32]:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from experiments.assistant import Assistant
 from experiments.house import House
 from experiments.records import EventLog
 from experiments.trial import TrialConfig, prepare_session
@@ -37,11 +36,14 @@ class _Recorder:
     def __init__(self) -> None:
         self.states: list[HudState] = []
 
-    def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
-        """Keep the state of this control step."""
+    def camera(self, world: World) -> CameraView:
+        """The eye camera."""
         pose = camera_pose(world.model, world.data, "avatar/eye")
-        camera = CameraView(pose.position, pose.rotation, pose.fovy, *SIZE)
-        self.states.append(assistant.hud_state(observation, camera))
+        return CameraView(pose.position, pose.rotation, pose.fovy, *SIZE)
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002
+        """Keep the state of this control step."""
+        self.states.append(hud_state)
 
 
 def session_states(house: House, trial: TrialConfig) -> tuple[HudState, ...]:

@@ -3,38 +3,41 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, runtime_checkable
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse
 from hud.state import HudState
-from mjsim.actions import Action, ActionResult
-from mjsim.fidelity.kinematics import LocomotionState
+from mjsim.actions import Action, ActionResult, Pick, Place
+from planner.plan import VisitKind
 
 Point = NDArray[np.float64]
 
-NEARBY = 1.3  # m
+
+class Visit(NamedTuple):
+    """Pick this object up, or place it into its receptacle."""
+
+    kind: VisitKind
+    object: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Guidance:
     """The step that the HUD shows now: what to do, with which object, along which breadcrumbs.
 
     Attributes:
-        kind: `pick` or `place`.
-        object: Instance name.
-        path: Floor points of the segment still ahead, m, shape (k, 2).
+        visit: What to do.
+        path: Floor points of the segment as it was first shown, m, shape (k, 2); what lies behind the person vanishes.
         goal: Where the object or the receptacle is, m, shape (2,).
-        way: The segment as it was shown first, m, shape (k, 2): `path` is what is left of it.
+        tolerance: How far the person may leave the path before a new one is shown, m.
     """
 
-    kind: str
-    object: str
+    visit: Visit
     path: NDArray[np.float64]
     goal: Point
-    way: NDArray[np.float64]
+    tolerance: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,62 +45,62 @@ class Choice:
     """A visit that is possible next, and what it costs compared with the best one.
 
     Attributes:
-        kind: `pick` or `place`.
-        object: Instance name.
+        visit: What could be done.
         goal: Where the object or the receptacle is, m, shape (2,).
         regret: By how much it makes the rest of the task longer, m, as of the last visit.
         capped: Whether `regret` is only a lower bound.
         find_exact: Gives the exact regret, m, or None where nothing is proven; takes some 0.1 s.
     """
 
-    kind: str
-    object: str
+    visit: Visit
     goal: Point
     regret: float
     capped: bool
     find_exact: Callable[[], float | None]
 
 
+class Senses(Protocol):
+    """Finds out what a percept offers, when it is asked for."""
+
+    def nearby(self) -> Mapping[str, Point]:
+        """See `Percept.nearby`."""
+        ...
+
+    def look(self) -> Mapping[str, Point]:
+        """See `Percept.look`."""
+        ...
+
+    def hud(self) -> HudState:
+        """See `Percept.hud`."""
+        ...
+
+    def guidance(self) -> Guidance | None:
+        """See `Percept.guidance`."""
+        ...
+
+    def flagpoles(self) -> Mapping[str, Point]:
+        """See `Percept.flagpoles`."""
+        ...
+
+    def choices(self) -> Sequence[Choice]:
+        """See `Percept.choices`."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
-class Things:
-    """What lies about in the house, near or far.
-
-    Attributes:
-        names: Instance names.
-        positions: m, shape (n, 3).
-        minded: Whether a walker minds it: it lies on the floor and is neither carried nor in its bin; shape (n,).
-    """
-
-    names: tuple[str, ...]
-    positions: NDArray[np.float64]
-    minded: NDArray[np.bool_]
-
-    def index(self, name: str) -> int:
-        """Number of an object; -1 if there is none of that name."""
-        return self.names.index(name) if name in self.names else -1
-
-
-NO_THINGS = Things((), np.zeros((0, 3)), np.zeros(0, np.bool_))
-
-
-@dataclass(frozen=True)
 class Percept:
-    """Everything a person can know at one control step. What takes work to find out is found out when it is asked.
+    """What a person can know at one control step. What takes work to find out is found out when it is asked for.
 
     Attributes:
         time: Simulated time, s.
         position: Own floor position, m, shape (2,).
         heading: Own heading, rad.
         hands: Object in the left and in the right hand.
-        busy: Whether a reach is under way.
+        busy: Whether a pick or place is under way.
         targets: Object instance name -> receptacle key, from the lists in the HUD.
         answer: The world's answer to the previous action, if that was a pick or place.
-        things: What the feet feel their way around; nobody knows more of it than `nearby`.
-        hud: What the glasses show; composed only when asked.
-        look: Misplaced objects in view at this moment -> their floor position, m; computed only when asked.
-        find_guidance: Gives `guidance`.
-        find_flagpoles: Gives `flagpoles`.
-        find_choices: Gives `choices`.
+        blocked: Whether the walk makes no progress; until the person has backed off.
+        senses: Finds out the rest.
     """
 
     time: float
@@ -107,37 +110,43 @@ class Percept:
     busy: bool
     targets: Mapping[str, str]
     answer: ActionResult | None
-    things: Things
-    hud: Callable[[], HudState]
-    look: Callable[[], Mapping[str, Point]]
-    find_guidance: Callable[[], Guidance | None]
-    find_flagpoles: Callable[[], Mapping[str, Point]]
-    find_choices: Callable[[], Sequence[Choice]] = tuple
+    blocked: bool
+    senses: Senses
+
+    def hud(self) -> HudState:
+        """What the HUD shows."""
+        return self.senses.hud()
+
+    def look(self) -> Mapping[str, Point]:
+        """Misplaced objects in view at this moment -> their floor position, m, shape (2,)."""
+        return self._in_view
+
+    @cached_property
+    def _in_view(self) -> Mapping[str, Point]:
+        return self.senses.look()
 
     @cached_property
     def guidance(self) -> Guidance | None:
-        """The step shown by the HUD, in conditions that show the way; None when all is done."""
-        return self.find_guidance()
+        """The step shown by the HUD, in conditions that show a path; None when all is done."""
+        return self.senses.guidance()
 
     @cached_property
     def flagpoles(self) -> Mapping[str, Point]:
-        """Object instance name -> floor position of the flagpole over it, m; empty in conditions without."""
-        return self.find_flagpoles()
+        """Object instance name -> floor position of the flagpole over it, m, shape (2,); empty where none is shown."""
+        return self.senses.flagpoles()
 
     @cached_property
     def choices(self) -> Sequence[Choice]:
-        """All visits that are possible next with their regrets, the best first: for models of people, who know less.
+        """All visits that are possible next with their regrets, the best first: for models of compliance.
 
-        Empty when all is done, and beside a person until the regrets are known.
+        No condition shows as much. Empty when all is done, and in live planning until the regrets are known.
         """
-        return self.find_choices()
+        return self.senses.choices()
 
     @cached_property
     def nearby(self) -> Mapping[str, Point]:
-        """Misplaced objects within `NEARBY` -> floor position, m: nobody has to look to know what is at the feet."""
-        floor = self.things.positions[:, :2]
-        near = (np.linalg.norm(floor - self.position, axis=1) < NEARBY) & self.things.minded
-        return {self.things.names[i]: floor[i] for i in np.flatnonzero(near)}
+        """Misplaced objects at the feet (within 1.3 m) -> floor position, m, shape (2,)."""
+        return self.senses.nearby()
 
     @property
     def carried(self) -> tuple[str, ...]:
@@ -145,8 +154,53 @@ class Percept:
         return tuple(name for name in self.hands if name is not None)
 
 
+@dataclass(frozen=True, eq=False)
+class WalkAlong:
+    """Walk along a path, sidestep objects on the way, face the goal at its end, and pick or place there.
+
+    The session walks; where every control step is simulated or watched it asks the participant again after each one.
+    So as long as nothing happens, the answer must stay the same.
+
+    Attributes:
+        path: Floor points, m, shape (k, 2), k >= 1.
+        goal: What is walked to, m, shape (2,): an object or a receptacle may lie beside the path's end.
+        stop_distance: How near to the goal the walk ends, m; it also ends with the path.
+        then: What to do there, once the person faces the goal; None to do nothing and face nothing.
+        until: Simulated time at which the participant wants to be asked again, s; None for the end of the walk.
+        shown: Whether the path is shown by the HUD, which cuts off what lies behind the person.
+        tolerance: How far the person may leave the path before the participant is asked again, m.
+    """
+
+    path: NDArray[np.float64]
+    goal: Point
+    stop_distance: float
+    then: Pick | Place | None = None
+    until: float | None = None
+    shown: bool = False
+    tolerance: float = 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """Make these moves, one per control step, unless something happens.
+
+    Attributes:
+        rows: Forward, left (m/s), turn and look (rad/s), shape (n, 4), n >= 1.
+    """
+
+    rows: NDArray[np.float64]
+
+
+class Wait:
+    """Do nothing until the pick or place under way is over; for one control step if none is."""
+
+
+WAIT: Final = Wait()
+Decision = Action | WalkAlong | Moves | Wait
+
+
 class Participant(Protocol):
-    """A user of the assistance: sees a percept, answers with an action, once per control step.
+    """A user of the assistance: sees a percept, answers with a decision.
 
     Attributes:
         needs: Roles of the world-locked markers it cannot do without (`goal`, `flagpole`); a session in a condition
@@ -155,46 +209,8 @@ class Participant(Protocol):
 
     needs: frozenset[str]
 
-    def act(self, percept: Percept) -> Action:
-        """Choose what to do during the next control step."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Outlook:
-    """What a walk depends on as long as nothing happens; not for deciding, only for foreseeing one's own steps.
-
-    Attributes:
-        locomotion: What moves the person.
-        limit: How many control steps to foresee at most.
-        stray: How far from the way that is shown another one is shown, m.
-    """
-
-    locomotion: LocomotionState
-    limit: int
-    stray: float
-
-
-@runtime_checkable
-class Foreseeing(Participant, Protocol):
-    """A participant that can say what it will do, where the walk follows from the walker alone.
-
-    Foreseeing is a matter of speed: a run in which nothing is foreseen is the same.
-    """
-
-    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
-        """Moves of the next control steps if nothing happens: forward, left (m/s), turn, look (rad/s), shape (n, 4).
-
-        With n = 0 it is asked to `act`.
-        """
-        ...
-
-    def went(self, steps: int) -> None:
-        """So many of the moves foreseen last were made."""
-        ...
-
-    def waits(self) -> bool:
-        """Whether it will do nothing until the pick or place under way is over."""
+    def act(self, percept: Percept) -> Decision:
+        """Choose what to do next: an action for the next control step, a walk, or to wait."""
         ...
 
 

@@ -13,9 +13,16 @@ import numpy as np
 
 from experiments.errors import ConfigError
 from experiments.known_house import KnownHouse
-from experiments.participants.base import Choice, Participant, ParticipantFactory, Percept
-from experiments.participants.visit_participant import Decider
-from experiments.participants.visit_tasks import Visit, VisitTask
+from experiments.participants.base import (
+    WAIT,
+    Choice,
+    Decision,
+    Participant,
+    ParticipantFactory,
+    Percept,
+    Visit,
+)
+from experiments.participants.visit_executor import VisitExecutor
 
 TEMPERATURE = 0.5  # m
 
@@ -47,7 +54,7 @@ def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator
         regrets[k], exact[k] = regrets[k] + excess, True
 
 
-class Boltzmann(Decider):
+class Boltzmann:
     """Draws what to do next, and keeps to it once drawn.
 
     Args:
@@ -56,22 +63,25 @@ class Boltzmann(Decider):
         temperature: How little the cost matters, m.
     """
 
+    needs: frozenset[str] = frozenset()
+
     def __init__(self, house: KnownHouse, rng: np.random.Generator, temperature: float) -> None:
-        super().__init__(house)
+        self._executor = VisitExecutor(house)
         self._rng = rng
         self._temperature = temperature
         self._choice: Visit | None = None
 
-    def errand(self, percept: Percept) -> VisitTask | None:
-        """What was drawn, until it is done with."""
-        choices = {(choice.kind, choice.object): choice for choice in percept.choices}
+    def act(self, percept: Percept) -> Decision:
+        """Do what was drawn; draw anew once that is done or impossible."""
+        if percept.busy:
+            return WAIT
+        choices = {choice.visit: choice for choice in percept.choices}
         if not choices:
-            return None
+            return WAIT
         if self._choice not in choices:
-            drawn = draw(list(choices.values()), self._temperature, self._rng)
-            self._choice = drawn.kind, drawn.object
+            self._choice = draw(list(choices.values()), self._temperature, self._rng).visit
         chosen = choices[self._choice]
-        return self._runner.errand(percept, self._choice, {chosen.object: chosen.goal})
+        return self._executor.act(percept, chosen.visit, {chosen.visit.object: chosen.goal})
 
 
 def with_parameter(text: str) -> ParticipantFactory:

@@ -1,12 +1,10 @@
 """Follows the breadcrumbs and does what the current step says (condition `optimal`)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse
-from experiments.participants.base import Guidance, Outlook, Participant, Percept
-from experiments.participants.visit_tasks import NO_MOVES, VisitExecutor, VisitTask
-from mjsim.actions import IDLE, Action
+from experiments.participants.base import WAIT, Decision, Participant, Percept
+from experiments.participants.visit_executor import VisitExecutor
 
 
 class Follower:
@@ -15,31 +13,13 @@ class Follower:
     needs = frozenset({"goal"})
 
     def __init__(self, house: KnownHouse) -> None:
-        self._runner = VisitExecutor(house)
+        self._executor = VisitExecutor(house)
 
-    def act(self, percept: Percept) -> Action:
+    def act(self, percept: Percept) -> Decision:
         """Walk along the breadcrumbs; pick or place at their end."""
         if percept.busy or percept.guidance is None:
-            return IDLE
-        return self._runner.act(percept, _errand(percept.guidance), percept.guidance.path)
-
-    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
-        """Moves up to the end of the breadcrumbs."""
-        if percept.guidance is None:
-            return NO_MOVES
-        return self._runner.foresee(percept, outlook, _errand(percept.guidance), percept.guidance.way)
-
-    def went(self, steps: int) -> None:
-        """So many of the moves foreseen were made."""
-        self._runner.went(steps)
-
-    def waits(self) -> bool:
-        """It reaches and looks on."""
-        return True
-
-
-def _errand(step: Guidance) -> VisitTask:
-    return VisitTask(step.kind, step.object, step.goal, step.path[-1])
+            return WAIT
+        return self._executor.follow(percept, percept.guidance)
 
 
 def build(house: KnownHouse, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance

@@ -3,34 +3,33 @@
 import numpy as np
 
 from experiments.known_house import KnownHouse
-from experiments.participants.base import Participant, Percept
-from experiments.participants.visit_participant import Decider
-from experiments.participants.visit_tasks import Visit, VisitTask, nearest_visit
+from experiments.participants.base import WAIT, Decision, Participant, Percept, Visit
+from experiments.participants.visit_executor import VisitExecutor, nearest_visit
+from planner.plan import VisitKind
 
 
-class Nearest(Decider):
+class Nearest:
     """Greedy: goes to the nearest place where something can be done, and keeps to a decision once made."""
 
     needs = frozenset({"flagpole"})
 
     def __init__(self, house: KnownHouse) -> None:
-        super().__init__(house)
+        self._house = house
+        self._executor = VisitExecutor(house)
         self._choice: Visit | None = None
 
-    def waits(self) -> bool:
-        """It reaches and looks on."""
-        return True
-
-    def errand(self, percept: Percept) -> VisitTask | None:
-        """The nearest flagpole or bin, until it is done with."""
-        feasible = [("place", name) for name in percept.carried]
+    def act(self, percept: Percept) -> Decision:
+        """Go to the nearest flagpole or bin; pick or place there."""
+        if percept.busy:
+            return WAIT
+        feasible = [Visit(VisitKind.PLACE, name) for name in percept.carried]
         if None in percept.hands:
-            feasible += [("pick", name) for name in percept.flagpoles]
+            feasible += [Visit(VisitKind.PICK, name) for name in percept.flagpoles]
         if not feasible:
-            return None
+            return WAIT
         if self._choice not in feasible:
             self._choice = nearest_visit(self._house, percept, feasible, percept.flagpoles)
-        return self._runner.errand(percept, self._choice, percept.flagpoles)
+        return self._executor.act(percept, self._choice, percept.flagpoles)
 
 
 def build(house: KnownHouse, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance

@@ -1,23 +1,13 @@
 """Searches room by room with what it can see, and tidies what it finds (condition `none`)."""
 
-import dataclasses
-import math
-
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.known_house import KnownHouse, Point
-from experiments.participants.base import Outlook, Participant, Percept
-from experiments.participants.visit_tasks import (
-    NO_MOVES,
-    Visit,
-    VisitExecutor,
-    VisitTask,
-    estimated_distances,
-    nearest_visit,
-)
-from experiments.participants.walking_rollout import TICK
-from mjsim.actions import IDLE, Action, Move
+from experiments.locomotion import TIME_TOLERANCE
+from experiments.participants.base import WAIT, Decision, Participant, Percept, Visit
+from experiments.participants.visit_executor import VisitExecutor, estimated_distances, nearest_visit
+from mjsim.actions import IDLE, Move
+from planner.plan import VisitKind
 
 LOOK_INTERVAL = 0.2  # s between two looks while walking
 SEARCHED = 0.5  # m from a viewpoint before the look around begins
@@ -35,7 +25,7 @@ class Searcher:
     def __init__(self, house: KnownHouse, rng: np.random.Generator) -> None:
         self._house = house
         self._rng = rng
-        self._runner = VisitExecutor(house)
+        self._executor = VisitExecutor(house)
         self._remembered: dict[str, Point] = {}
         self._unsearched: list[tuple[str, Point]] = []
         self._target: tuple[str, Point] | None = None
@@ -45,82 +35,61 @@ class Searcher:
         self._next_look = 0.0
         self._choice: Visit | None = None
 
-    def act(self, percept: Percept) -> Action:
-        """Look, remember, decide, and do one control step of what was decided."""
+    def act(self, percept: Percept) -> Decision:
+        """Look and remember; fetch or bring what is known, else search."""
         if percept.busy:
-            return IDLE
+            return WAIT
         self._look(percept)
-        errand = self._errand(percept)
-        if errand is not None:
-            self._turned = None
-            return self._runner.act(percept, errand)
-        return self._search(percept)
-
-    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:
-        """Moves up to the next look, while it walks somewhere."""
-        self._look(percept)
-        steps = math.ceil((self._next_look - TICK - percept.time) / outlook.locomotion.gait.dt)
-        outlook = dataclasses.replace(outlook, limit=min(outlook.limit, steps))
-        errand = self._errand(percept)
-        if errand is not None:
-            self._turned = None
-            return self._runner.foresee(percept, outlook, errand)
-        if self._turned is not None:
-            return NO_MOVES
-        return self._runner.foresee_walk(percept, outlook, self._goal(percept)[1], SEARCHED)
-
-    def went(self, steps: int) -> None:
-        """So many of the moves foreseen were made."""
-        self._runner.went(steps)
-
-    def waits(self) -> bool:
-        """It reaches and looks on."""
-        return True
+        visit = self._next_visit(percept)
+        if visit is None:
+            return self._search(percept)
+        self._turned = None
+        return self._executor.act(percept, visit, self._remembered, until=self._next_look)
 
     def _look(self, percept: Percept) -> None:
         for name in percept.carried:
             self._remembered.pop(name, None)
-        if percept.time < self._next_look - TICK:
+        if percept.time < self._next_look - TIME_TOLERANCE:
             return
         self._next_look = percept.time + LOOK_INTERVAL
         self._remembered.update(percept.look())
 
-    def _errand(self, percept: Percept) -> VisitTask | None:
+    def _next_visit(self, percept: Percept) -> Visit | None:
         """What can be done with what is known: fetch the nearest known object, or bring what is carried."""
-        bins = [("place", name) for name in percept.carried]
-        known = [("pick", name) for name in sorted(self._remembered)]
+        bins = [Visit(VisitKind.PLACE, name) for name in percept.carried]
+        known = [Visit(VisitKind.PICK, name) for name in sorted(self._remembered)]
         feasible = bins if None not in percept.hands else known or bins
         if not feasible:
             return None
         if self._choice not in feasible:
             self._choice = nearest_visit(self._house, percept, feasible, self._remembered)
-        chosen = self._runner.errand(percept, self._choice, self._remembered)
-        if chosen.kind == "pick" and self._has_gone(percept, chosen):
-            del self._remembered[chosen.object]
-            return self._errand(percept)
-        return chosen
+        kind, name = self._choice
+        if kind is VisitKind.PICK and self._has_gone(percept, name):
+            del self._remembered[name]
+            return self._next_visit(percept)
+        return self._choice
 
-    def _has_gone(self, percept: Percept, errand: VisitTask) -> bool:
+    def _has_gone(self, percept: Percept, name: str) -> bool:
         refused = percept.answer is not None and not percept.answer.applied
-        near = float(np.linalg.norm(errand.goal - percept.position)) < GONE
-        return refused and near and errand.object not in percept.look()
+        near = float(np.linalg.norm(self._remembered[name] - percept.position)) < GONE
+        return refused and near and name not in percept.look()
 
-    def _search(self, percept: Percept) -> Action:
+    def _search(self, percept: Percept) -> Decision:
         if self._turned is not None:
             return self._look_around(percept)
-        room, viewpoint = self._goal(percept)
+        room, viewpoint = self._viewpoint(percept)
         if float(np.linalg.norm(viewpoint - percept.position)) > SEARCHED:
-            return self._runner.walk(percept, self._runner.way_to(percept.position, viewpoint))
+            return self._executor.walk_to(percept, viewpoint, SEARCHED, until=self._next_look)
         self._room, self._turned, self._last_heading = room, 0.0, percept.heading
         return Move(turn=LOOK_AROUND_RATE)
 
-    def _goal(self, percept: Percept) -> tuple[str, Point]:
+    def _viewpoint(self, percept: Percept) -> tuple[str, Point]:
         """Viewpoint to search from next, and its room."""
         if self._target is None:
             self._target = self._next_viewpoint(percept.position)
         return self._target
 
-    def _look_around(self, percept: Percept) -> Action:
+    def _look_around(self, percept: Percept) -> Decision:
         step = (percept.heading - self._last_heading + np.pi) % FULL_TURN - np.pi
         self._turned, self._last_heading = (self._turned or 0.0) + step, percept.heading
         if self._turned < FULL_TURN:

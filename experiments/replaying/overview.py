@@ -6,10 +6,10 @@ from types import TracebackType
 
 import numpy as np
 
-from experiments.assistant import Assistant
 from experiments.first_person import FilmConfig
 from experiments.video import VideoWriter
-from hud.state import Marker, Rgba, Vec3
+from hud.projection import CameraView
+from hud.state import HudState, Marker, Rgba, Vec3
 from mjsim.model.avatar import EYE_HEIGHT, TRUNK_RADIUS
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
@@ -89,9 +89,13 @@ class Overview:
         self._camera = camera
         self._video = video
 
-    def show(self, world: World, observation: Observation, assistant: Assistant) -> None:
+    def camera(self, world: World) -> CameraView | None:  # noqa: ARG002 - nobody sees the HUD itself from outside
+        """None: the HUD is not seen from outside."""
+        return None
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
         """Film one frame: house, person, and what the glasses lock to the world."""
-        markers = [*assistant.hud_state(observation).markers, *figure(observation)]
+        markers = [*hud_state.markers, *figure(observation)]
         self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
 
     def close(self) -> None:

@@ -4,26 +4,26 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 from numpy.typing import NDArray
 
 from experiments.assistant import Assistant
 from experiments.errors import RecordError, ReplayError
 from experiments.house import House
-from experiments.participants.base import Outlook, Percept
-from experiments.participants.visit_tasks import NO_MOVES
+from experiments.participants.base import WAIT, Decision, Moves, Percept
 from experiments.recording import Recording, provenance
 from experiments.records import Event, EventLog
 from experiments.replaying.logged_plans import LoggedPlans
 from experiments.replaying.run_record import WORLD_EVENTS, Fault, RunRecord
 from experiments.session import INTERRUPTED, PHYSICS_ERROR, Session, Viewer
-from mjsim.actions import Action, WorldEvent
+from mjsim.actions import WorldEvent
 from mjsim.errors import PhysicsError, StateError
 from mjsim.model.scene import compose
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.replanner import Replanner
+
+MAX_ROLLOUT = 250  # control steps
 
 
 class _EndOfReplay(Exception):  # noqa: N818 - no error: the record has no more to tell
@@ -39,8 +39,8 @@ class _RecordedUser:
         self._record, self._world, self._recording = record, world, recording
         self.fault: Fault | None = record.fault
 
-    def act(self, percept: Percept) -> Action:  # noqa: ARG002 - the record decides
-        """The recorded action; raises `_EndOfReplay` where the record ends or goes wrong."""
+    def act(self, percept: Percept) -> Decision:
+        """What was recorded; raises `_EndOfReplay` where the record ends or goes wrong."""
         step, record = self._recording.step, self._record
         if step >= record.steps:
             self._stop(Fault(step, f"the run ended here ({record.reason}), the replay goes on"))
@@ -53,30 +53,22 @@ class _RecordedUser:
                 raise _EndOfReplay
             if record.reason != PHYSICS_ERROR:
                 self._stop(Fault(step, f"the run ended here ({record.reason}), the replay goes on"))
+        if percept.busy and self._waits(step):
+            return WAIT
+        moves = record.moves(step, min(step + MAX_ROLLOUT, self._last_sound))
         try:
-            return record.action(step)
+            return Moves(moves) if len(moves) else record.action(step)
         except RecordError as error:
             self._stop(Fault(step, str(error)))
             raise
 
-    def foresee(self, percept: Percept, outlook: Outlook) -> NDArray[np.float64]:  # noqa: ARG002 - the record decides
-        """The moves recorded next; what came of them is compared when the replay is over."""
-        record, step = self._record, self._recording.step
-        if step >= record.steps or self._world.state_hash() != int(record.recorded.state_hash[step]):
-            return NO_MOVES
-        return record.moves(step, min(step + outlook.limit, self._last_sound))
-
-    def waits(self) -> bool:
+    def _waits(self, step: int) -> bool:
         """Whether nothing was asked until the pick or place under way was over."""
-        record, step = self._record, self._recording.step
-        until = record.next_event(step)
+        until = self._record.next_event(step)
         if until is None or until >= self._last_sound:
             return False
-        idle = record.moves(step, until + 1)
+        idle = self._record.moves(step, until + 1)
         return len(idle) == until + 1 - step and not idle.any()
-
-    def went(self, steps: int) -> None:
-        """The record knows."""
 
     @property
     def _last_sound(self) -> int:
@@ -146,11 +138,10 @@ class Replayer:
             self._world,
             self._assistant,
             self._user,
-            log=self._log,
-            targets=record.episode.targets,
+            recording,
+            walls=self.house.known().outline,
             time_limit=float(record.start["time_limit"]),
             viewer=viewer,
-            recording=recording,
         )
         self._plans.clock = lambda: float(self._world.data.time)
         try:

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.participants.walking import path_length, point_along, project, wrap_angle
+from experiments.path_following import wrap_angle
 from mjsim.actions import IDLE, Action, EventKind, Move, Pick
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.scene import compose
 from mjsim.world import World
+from planner.polyline import path_length, point_along, project
 
 SEED = 2027
 SPEED = 1.4  # m/s

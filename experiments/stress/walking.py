@@ -13,7 +13,6 @@ import shapely
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.participants.walking import point_along
 from mjsim.actions import Move
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import PhysicsError
@@ -23,6 +22,7 @@ from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.errors import UnreachableError
+from planner.polyline import point_along
 
 SEED = 2028
 SPEEDS = (1.0, 8.0)  # m/s

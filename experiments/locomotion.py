@@ -1,0 +1,212 @@
+"""Turns "walk along this path" into moves: one per control step, or many at once where nobody watches every step.
+
+Both give the same moves to the last bit, because they run the same kernels.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.participants.base import WalkAlong
+from experiments.path_following import Obstacles, follow, turn_towards
+from mjsim.actions import IDLE, Action, Move, Pick, Place
+from mjsim.fidelity.body_state import HEADING, X, Y
+from mjsim.fidelity.kinematics import LocomotionState
+from mjsim.fidelity.kinematics import walk as walk_body
+from mjsim.kernels import kernel
+from mjsim.observation import ObjectStatus, Observation
+from planner.polyline import distance, path_length, project, rest_of
+
+ARRIVED_WITHIN = 0.06  # m from the end of the path
+FACING_WITHIN = 0.25  # rad
+MIN_PROGRESS = 0.05  # m
+PROGRESS_TIMEOUT = 2.0  # s without progress until the person is blocked
+BACK_OFF = Move(forward=-0.4, left=0.3)
+BACK_OFF_TIME = 0.6  # s
+TIME_TOLERANCE = 1e-6  # s; times are sums of many steps, and no decision may depend on their rounding
+
+WALKING, TURNING, ARRIVED, BLOCKED = range(4)  # phases of a walk
+SHORTEST_LEFT, SINCE = range(2)  # progress of a walk: shortest distance left so far, m, and when that was, s
+
+Floats = NDArray[np.float64]
+
+
+class Walk(NamedTuple):
+    """`WalkAlong` for kernels."""
+
+    path: Floats
+    goal: tuple[float, float]
+    stop_distance: float
+    face_goal: bool
+    shown: bool
+    tolerance: float
+
+
+class Step(NamedTuple):
+    """One control step: phase of the walk, velocities forward and left (m/s), yaw rate (rad/s)."""
+
+    phase: int
+    forward: float
+    left: float
+    turn: float
+
+
+@kernel
+def makes_progress(path: Floats, x: float, y: float, time: float, progress: Floats) -> bool:
+    """Whether a walk along `path` gets on; updates `progress`, shape (2,)."""
+    arc, gap = project(path, x, y)
+    left = path_length(path) - arc + gap
+    if left < progress[SHORTEST_LEFT] - MIN_PROGRESS or left > progress[SHORTEST_LEFT] + 1.0:
+        progress[SHORTEST_LEFT], progress[SINCE] = left, time
+        return True
+    return bool(time - progress[SINCE] <= PROGRESS_TIMEOUT + TIME_TOLERANCE)
+
+
+@kernel
+def next_step(
+    walk: Walk, x: float, y: float, heading: float, time: float, obstacles: Obstacles, progress: Floats
+) -> Step:
+    """The next control step of a walk; updates `progress`.
+
+    Args:
+        walk: The walk.
+        x: Where the person is, m.
+        y: Where the person is, m.
+        heading: Where the person faces, rad.
+        time: Simulated time, s.
+        obstacles: What to keep clear of.
+        progress: Shortest distance left so far, m, and when that was, s; shape (2,).
+    """
+    path = rest_of(walk.path, x, y) if walk.shown else walk.path
+    at_the_end = distance(x, y, path[-1, 0], path[-1, 1]) < ARRIVED_WITHIN
+    if distance(x, y, walk.goal[0], walk.goal[1]) > walk.stop_distance and not at_the_end:
+        phase = WALKING if makes_progress(path, x, y, time, progress) else BLOCKED
+        forward, left, turn = follow(path, x, y, heading, obstacles)
+        return Step(phase, forward, left, turn)
+    turn, error = turn_towards(heading, x, y, walk.goal[0], walk.goal[1])
+    if walk.face_goal and abs(error) > FACING_WITHIN:
+        return Step(TURNING, 0.0, 0.0, turn)
+    return Step(ARRIVED, 0.0, 0.0, 0.0)
+
+
+@kernel
+def roll_out(
+    walk: Walk, state: LocomotionState, time: float, obstacles: Obstacles, moves: Floats, progress: Floats
+) -> int:
+    """Moves of a walk until it ends, is blocked, or leaves its path; returns how many.
+
+    Args:
+        walk: The walk.
+        state: The body, how it walks and what it walks into; the body is moved.
+        time: Simulated time, s.
+        obstacles: What to keep clear of.
+        moves: Takes forward, left (m/s), turn and look (rad/s) of every step, shape (limit, 4).
+        progress: Takes the progress after every step, shape (limit + 1, 2); row 0 holds the present one.
+    """
+    body, gait, floor = state
+    for k in range(len(moves)):
+        x, y, heading = body[X], body[Y], body[HEADING]
+        if project(walk.path, x, y)[1] > walk.tolerance:
+            return k
+        progress[k + 1] = progress[k]
+        step = next_step(walk, x, y, heading, time + k * gait.dt, obstacles, progress[k + 1])
+        if step.phase == ARRIVED or step.phase == BLOCKED:
+            return k
+        moves[k, 0], moves[k, 1], moves[k, 2], moves[k, 3] = step.forward, step.left, step.turn, 0.0
+        walk_body(body, step.forward, step.left, step.turn, 0.0, gait, floor)
+    return len(moves)
+
+
+class LocomotionController:
+    """Walks for a participant: follows paths, sidesteps objects at the feet, and backs off when blocked.
+
+    Args:
+        walls: Outline of the navigable floor, ends x, y, x, y of its edges, m, shape (e, 4).
+
+    Attributes:
+        blocked: Whether the walk makes no progress; until the first step after backing off.
+    """
+
+    def __init__(self, walls: Floats) -> None:
+        self._walls = walls
+        self._visit: Pick | Place | None = None
+        self._progress = np.array([np.inf, 0.0])
+        self._predicted = self._progress[None]
+        self._back_off_until = -math.inf
+        self._status: tuple[ObjectStatus, ...] | None = None
+        self._is_obstacle = np.zeros(0, np.bool_)
+        self.blocked = False
+
+    def step(self, walk: WalkAlong, seen: Observation) -> Action:
+        """The next control step of a walk, or what it ends with."""
+        self._take_up(walk, seen)
+        if self._is_backing_off(walk, seen.time):
+            return BACK_OFF
+        x, y = seen.position
+        step = next_step(
+            _for_kernels(walk), x, y, seen.heading, seen.time, self._obstacles(seen), self._progress
+        )
+        self.blocked = step.phase == BLOCKED
+        if self.blocked:
+            self._back_off_until = seen.time + BACK_OFF_TIME
+            self._progress[:] = np.inf, self._back_off_until
+        if step.phase == ARRIVED:
+            return walk.then or IDLE
+        return Move(step.forward, step.left, step.turn)
+
+    def roll_out(self, walk: WalkAlong, seen: Observation, state: LocomotionState, limit: int) -> Floats:
+        """Moves that `step` would choose one after the other, as long as nothing else happens.
+
+        Args:
+            walk: The walk.
+            seen: State now.
+            state: What the walk depends on.
+            limit: How many at most, 1 or more.
+
+        Returns:
+            Forward, left (m/s), turn and look (rad/s) of every step, shape (n, 4); n is 0 where the next one needs
+            `step`. `commit` says how many were made.
+        """
+        self._take_up(walk, seen)
+        if self._is_backing_off(walk, seen.time):
+            return np.zeros((0, 4))
+        if walk.until is not None:
+            steps = math.ceil((walk.until - TIME_TOLERANCE - seen.time) / state.gait.dt)
+            limit = max(1, min(limit, steps))
+        moves, self._predicted = np.empty((limit, 4)), np.empty((limit + 1, 2))
+        self._predicted[0] = self._progress
+        start = state._replace(body=state.body.copy())
+        count = roll_out(_for_kernels(walk), start, seen.time, self._obstacles(seen), moves, self._predicted)
+        return moves[:count]
+
+    def commit(self, steps: int) -> None:
+        """So many of the moves rolled out last were made."""
+        self._progress = self._predicted[steps].copy()
+        self.blocked = False
+
+    def _take_up(self, walk: WalkAlong, seen: Observation) -> None:
+        """A walk to another visit begins anew; walks that lead to no visit count as part of the one before."""
+        if walk.then is None or walk.then == self._visit:
+            return
+        self._visit, self._status = walk.then, None
+        self._progress[:] = np.inf, seen.time
+
+    def _is_backing_off(self, walk: WalkAlong, time: float) -> bool:
+        """Only on the way to a visit; who is blocked on another walk takes another path at once."""
+        return walk.then is not None and time < self._back_off_until
+
+    def _obstacles(self, seen: Observation) -> Obstacles:
+        """What lies on the floor, but for the object that the present or last visit is about."""
+        if seen.object_status is not self._status and seen.object_status != self._status:
+            self._status = seen.object_status
+            target = None if self._visit is None else self._visit.object
+            pairs = zip(seen.object_names, seen.object_status, strict=True)
+            self._is_obstacle = np.array([s is ObjectStatus.LOOSE and n != target for n, s in pairs])
+        return Obstacles(np.ascontiguousarray(seen.object_positions), self._is_obstacle, self._walls)
+
+
+def _for_kernels(walk: WalkAlong) -> Walk:
+    goal = (float(walk.goal[0]), float(walk.goal[1]))
+    return Walk(walk.path, goal, walk.stop_distance, walk.then is not None, walk.shown, walk.tolerance)

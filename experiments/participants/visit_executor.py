@@ -1,0 +1,146 @@
+"""Carrying out visits: where to walk, how near to go, and what to do there. All simulated participants share it."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.known_house import KnownHouse
+from experiments.participants.base import WAIT, Decision, Guidance, Percept, Point, Visit, WalkAlong
+from mjsim.actions import Pick, Place
+from planner.errors import PlannerError
+from planner.plan import VisitKind
+from planner.polyline import project
+
+STOP_DISTANCE = 0.72  # m from the goal: near enough to reach, far enough not to kick it
+CLOSER = 0.12  # m nearer after every refusal
+MIN_STOP_DISTANCE = 0.30  # m
+FAR = 1e6  # m
+
+
+class VisitExecutor:
+    """Carries out one visit after the other; goes nearer after a refusal, and takes another path when blocked.
+
+    Args:
+        house: What the participant knows of the house.
+    """
+
+    def __init__(self, house: KnownHouse) -> None:
+        self._house = house
+        self._visit: Visit | None = None
+        self._stop_distance = STOP_DISTANCE
+        self._path: NDArray[np.float64] | None = None
+        self._places: tuple[Visit, Point, Point] | None = None
+
+    def act(
+        self, percept: Percept, visit: Visit, objects: Mapping[str, Point], *, until: float | None = None
+    ) -> Decision:
+        """Walk the shortest path that the participant knows to a visit, and do it.
+
+        Args:
+            percept: What is perceived now.
+            visit: What to do; a new one starts afresh.
+            objects: Where objects are believed to be, m, shape (2,).
+            until: Simulated time at which to ask again, s.
+        """
+        if percept.busy:
+            return WAIT
+        goal, stand = self._find_places(percept, visit, objects)
+        self._take_up(percept, visit)
+        path = self._path_to(percept, stand)
+        return WalkAlong(path, goal, self._stop_distance, _action(visit), until)
+
+    def follow(self, percept: Percept, guidance: Guidance) -> Decision:
+        """Walk along the path that is shown, and do what is shown at its end."""
+        if percept.busy:
+            return WAIT
+        self._take_up(percept, guidance.visit)
+        return WalkAlong(
+            guidance.path,
+            guidance.goal,
+            self._stop_distance,
+            _action(guidance.visit),
+            shown=True,
+            tolerance=guidance.tolerance,
+        )
+
+    def walk_to(
+        self, percept: Percept, goal: Point, stop_distance: float, *, until: float | None = None
+    ) -> Decision:
+        """Walk the shortest known path to a place, up to `stop_distance` m from it."""
+        return WalkAlong(self._path_to(percept, goal), goal, stop_distance, until=until)
+
+    def _take_up(self, percept: Percept, visit: Visit) -> None:
+        if visit != self._visit:
+            self._visit, self._path, self._stop_distance = visit, None, STOP_DISTANCE
+        if percept.answer is not None and not percept.answer.applied:
+            self._stop_distance = max(self._stop_distance - CLOSER, MIN_STOP_DISTANCE)
+
+    def _path_to(self, percept: Percept, goal: Point) -> NDArray[np.float64]:
+        """The path as it was, or a new one if that leads elsewhere, is blocked, or the person has left it; (k, 2)."""
+        path = self._path
+        if path is None or percept.blocked or not _same(path[-1], goal) or _is_off(path, percept):
+            self._path = path = np.vstack([self._house.path(percept.position, goal), goal])
+        return path
+
+    def _find_places(
+        self, percept: Percept, visit: Visit, objects: Mapping[str, Point]
+    ) -> tuple[Point, Point]:
+        """As `places`; worked out anew only for another visit, or when the object has moved."""
+        known = self._places
+        if known is not None and known[0] == visit:
+            _, goal, stand = known
+            if visit.kind is VisitKind.PLACE or _same(goal, objects[visit.object]):
+                return goal, stand
+        goal, stand = places(self._house, percept, visit, objects)
+        self._places = visit, goal, stand
+        return goal, stand
+
+
+def places(
+    house: KnownHouse, percept: Percept, visit: Visit, objects: Mapping[str, Point]
+) -> tuple[Point, Point]:
+    """Where a visit's object or receptacle is, and where the path to it ends, m, both of shape (2,)."""
+    if visit.kind is VisitKind.PICK:
+        goal = objects[visit.object]
+        return goal, house.stand_for_object(goal)
+    receptacle = percept.targets[visit.object]
+    return house.bins[receptacle], house.approaches[receptacle]
+
+
+def nearest_visit(
+    house: KnownHouse, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]
+) -> Visit:
+    """The visit of one or more with the shortest path to it; `objects` says where objects are, m, shape (2,)."""
+    stands = [places(house, percept, visit, objects)[1] for visit in visits]
+    distances = estimated_distances(house, percept.position, stands)
+    ranked = zip(distances, visits, strict=True)
+    return min(ranked, key=lambda pair: (pair[0], pair[1].kind.value, pair[1].object))[1]
+
+
+def estimated_distance(house: KnownHouse, start: Point, goal: Point) -> float:
+    """Walking distance in m as a person estimates it; very far when there is no path."""
+    try:
+        return house.distance(start, goal)
+    except PlannerError:
+        return FAR
+
+
+def estimated_distances(house: KnownHouse, start: Point, goals: Sequence[Point]) -> list[float]:
+    """Walking distances in m from one point to several, as `estimated_distance`."""
+    try:
+        return [float(gap) for gap in house.geodesics.distances_from(start, np.array(goals))]
+    except PlannerError:  # one of them cannot be reached
+        return [estimated_distance(house, start, goal) for goal in goals]
+
+
+def _action(visit: Visit) -> Pick | Place:
+    return Pick(visit.object) if visit.kind is VisitKind.PICK else Place(visit.object)
+
+
+def _same(one: Point, other: Point) -> bool:
+    return bool(one[0] == other[0] and one[1] == other[1])
+
+
+def _is_off(path: NDArray[np.float64], percept: Percept) -> bool:
+    return project(path, percept.position[0], percept.position[1])[1] > WalkAlong.tolerance

@@ -1,0 +1,141 @@
+"""Walking along a polyline the way a person does: look ahead, slow down for sharp turns, pass objects beside the feet.
+
+Compiled, because this runs at every control step of every participant. The same kernels run step by step and in
+rollouts (`experiments.locomotion`), so both give the same numbers to the last bit.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.kernels import kernel
+from planner.polyline import AT_THE_END, Path, distance, path_length, point_along, project
+
+CRUISE_SPEED = 1.3  # m/s, an unhurried indoor pace
+LOOK_AHEAD = 0.25  # m; longer cuts corners into the walls, shorter wobbles
+LOOK_BEYOND = 1.2  # m; farther than `SIDESTEP_RANGE`
+SIDESTEP_RANGE = 0.8  # m ahead
+CLEARANCE = 0.40  # m from the body's axis: its radius and half an object
+MIN_AHEAD = 0.6  # m ahead per metre aside on the way around an object's far side; with less one would dither
+BRAKING = 1.5  # m/s^2 planned for, half of what the body can do
+TURN_GAIN = 5.0  # 1/s
+MAX_TURN = 2.5  # rad/s
+
+
+class Obstacles(NamedTuple):
+    """What a walker keeps clear of.
+
+    Attributes:
+        positions: Object positions, m, shape (n, 2 or more).
+        is_obstacle: Whether to walk around the object, shape (n,).
+        walls: Outline of the navigable floor, ends x, y, x, y of its edges, m, shape (e, 4).
+    """
+
+    positions: NDArray[np.float64]
+    is_obstacle: NDArray[np.bool_]
+    walls: NDArray[np.float64]
+
+
+@kernel
+def wrap_angle(angle: float) -> float:
+    """Wrap to [-pi, pi)."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@kernel
+def turn_towards(heading: float, x: float, y: float, to_x: float, to_y: float) -> tuple[float, float]:
+    """Yaw rate (rad/s) that turns `heading` towards a point, and the angle still to turn (rad)."""
+    error = wrap_angle(math.atan2(to_y - y, to_x - x) - heading)
+    return min(max(TURN_GAIN * error, -MAX_TURN), MAX_TURN), error
+
+
+@kernel
+def is_free(x: float, y: float, walls: NDArray[np.float64]) -> bool:
+    """Whether a person can stand at (x, y), given the outline of the navigable floor, m, shape (e, 4)."""
+    inside = False
+    for k in range(len(walls)):
+        if (walls[k, 1] > y) != (walls[k, 3] > y):
+            at = (y - walls[k, 1]) * (walls[k, 2] - walls[k, 0]) / (walls[k, 3] - walls[k, 1])
+            if x < walls[k, 0] + at:
+                inside = not inside
+    return inside
+
+
+@kernel
+def sidestep(
+    x: float,
+    y: float,
+    target: tuple[float, float],
+    beyond: tuple[float, float],
+    obstacles: Obstacles,
+) -> tuple[float, float]:
+    """Where to walk instead of straight to `target` so that objects on the floor stay beside the feet, m.
+
+    Passes the nearest object ahead on the side it is not on; on the other side if that is blocked and takes no
+    turn aside; and else straight on, over it.
+
+    Args:
+        x: Where the person is, m.
+        y: Where the person is, m.
+        target: Where the person is heading for, m.
+        beyond: Farther along the path, m: it decides what is in the way and on which side, and keeps the person on
+            that side, because it lies behind the object.
+        obstacles: What to keep clear of.
+    """
+    reach = distance(x, y, beyond[0], beyond[1])
+    if reach < AT_THE_END:
+        return target
+    ahead_x, ahead_y = (beyond[0] - x) / reach, (beyond[1] - y) / reach
+    nearest_along, nearest_across = np.inf, np.inf
+    for k in range(len(obstacles.positions)):
+        if not obstacles.is_obstacle[k]:
+            continue
+        dx, dy = obstacles.positions[k, 0] - x, obstacles.positions[k, 1] - y
+        along, across = dx * ahead_x + dy * ahead_y, dy * ahead_x - dx * ahead_y
+        in_the_way = 0.0 < along < SIDESTEP_RANGE and abs(across) < CLEARANCE
+        nearer = along < nearest_along or (along == nearest_along and across < nearest_across)
+        if in_the_way and nearer:
+            nearest_along, nearest_across = along, across
+    if nearest_along == np.inf:
+        return target
+    gap = distance(x, y, target[0], target[1])
+    side = -1.0 if nearest_across >= 0.0 else 1.0
+    for sign in (side, -side):
+        out = nearest_across + sign * CLEARANCE
+        if sign != side and nearest_along < MIN_AHEAD * abs(out):
+            break
+        step_x = nearest_along * ahead_x - out * ahead_y
+        step_y = nearest_along * ahead_y + out * ahead_x
+        share = gap / math.sqrt(step_x * step_x + step_y * step_y)
+        aside_x, aside_y = x + share * step_x, y + share * step_y
+        if is_free(x + step_x, y + step_y, obstacles.walls) and is_free(aside_x, aside_y, obstacles.walls):
+            return aside_x, aside_y
+    return target
+
+
+@kernel
+def follow(
+    path: Path, x: float, y: float, heading: float, obstacles: Obstacles
+) -> tuple[float, float, float]:
+    """One control step along `path`, stopping at its end: velocities forward and left (m/s), and yaw rate (rad/s).
+
+    The body turns towards the look-ahead point and walks straight at it, so that it leaves the path neither at
+    corners nor while it turns; the pace drops with the angle still to turn and with the distance left.
+
+    Args:
+        path: Floor polyline, m, shape (k, 2), k >= 1.
+        x: Where the person is, m.
+        y: Where the person is, m.
+        heading: Where the person faces, rad.
+        obstacles: What to keep clear of.
+    """
+    arc, gap = project(path, x, y)
+    left = max(path_length(path) - arc, 0.0) + gap
+    beyond = point_along(path, arc + LOOK_BEYOND)
+    target = sidestep(x, y, point_along(path, arc + LOOK_AHEAD), beyond, obstacles)
+    turn, error = turn_towards(heading, x, y, target[0], target[1])
+    ahead = max(math.cos(error), 0.0)
+    pace = min(CRUISE_SPEED, math.sqrt(2.0 * BRAKING * left)) * ahead * ahead
+    return pace * math.cos(error), pace * math.sin(error), turn

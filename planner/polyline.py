@@ -1,0 +1,89 @@
+"""Polylines on the floor: lengths, projections, and what is left of them.
+
+Points are passed as two numbers, polylines as arrays (k, 2), k >= 1, in m. All functions are compiled.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.kernels import kernel
+
+Path = NDArray[np.float64]
+
+AT_THE_END = 1e-9  # m
+
+
+@kernel
+def distance(x: float, y: float, to_x: float, to_y: float) -> float:
+    """Distance of two points, m."""
+    return math.sqrt((to_x - x) * (to_x - x) + (to_y - y) * (to_y - y))
+
+
+@kernel
+def project(path: Path, x: float, y: float) -> tuple[float, float]:
+    """Arc length of the point of `path` nearest to (x, y), and the distance to it, both m."""
+    nearest_arc, nearest_gap = 0.0, distance(x, y, path[0, 0], path[0, 1])
+    arc = 0.0
+    for k in range(len(path) - 1):
+        dx, dy = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
+        length = math.sqrt(dx * dx + dy * dy)
+        if length > 0.0:
+            t = ((x - path[k, 0]) * dx + (y - path[k, 1]) * dy) / (length * length)
+            t = min(max(t, 0.0), 1.0)
+            gap = distance(x, y, path[k, 0] + t * dx, path[k, 1] + t * dy)
+            if gap < nearest_gap:
+                nearest_arc, nearest_gap = arc + t * length, gap
+            arc += length
+    return nearest_arc, nearest_gap
+
+
+@kernel
+def path_length(path: Path) -> float:
+    """Length of a polyline, m."""
+    arc = 0.0
+    for k in range(len(path) - 1):
+        arc += distance(path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1])
+    return arc
+
+
+@kernel
+def point_along(path: Path, arc: float) -> tuple[float, float]:
+    """Point of `path` at arc length `arc` m, clamped to its ends."""
+    passed = 0.0
+    if arc <= 0.0:
+        return path[0, 0], path[0, 1]
+    for k in range(len(path) - 1):
+        dx, dy = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
+        length = math.sqrt(dx * dx + dy * dy)
+        if arc < passed + length:
+            t = (arc - passed) / length
+            return path[k, 0] + t * dx, path[k, 1] + t * dy
+        passed += length
+    return path[-1, 0], path[-1, 1]
+
+
+@kernel
+def rest_of(path: Path, x: float, y: float) -> Path:
+    """What is left of `path` from its point nearest to (x, y) on, m, shape (k, 2)."""
+    arc, _ = project(path, x, y)
+    if path_length(path) - arc < AT_THE_END:
+        return path[-1:].copy()
+    passed, first = 0.0, 0
+    while passed <= arc + AT_THE_END and first < len(path) - 1:
+        passed += distance(path[first, 0], path[first, 1], path[first + 1, 0], path[first + 1, 1])
+        first += 1
+    rest = np.empty((len(path) - first + 1, 2))
+    rest[0, 0], rest[0, 1] = point_along(path, arc)
+    rest[1:] = path[first:]
+    return rest
+
+
+@kernel
+def first_off_path(path: Path, positions: NDArray[np.float64], first: int, gap: float) -> int:
+    """Index of the first position (n, 2), from `first` on, farther than `gap` m from `path`; -1 if none is."""
+    for k in range(first, len(positions)):
+        if project(path, positions[k, 0], positions[k, 1])[1] > gap:
+            return k
+    return -1

@@ -1,0 +1,154 @@
+"""What a participant may perceive, and what the message bar tells it of the plan."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from experiments.house import House
+from experiments.participants.base import WAIT, Percept
+from experiments.records import EventLog
+from experiments.session import INTERRUPTED
+from experiments.trial import TrialConfig, prepare_session
+from hud.messages import TEXTS
+from mjsim.model.scene import compose
+from mjsim.observation import ObjectStatus
+from mjsim.visibility import visible_objects
+
+UPDATED = TEXTS["replanned"][1]
+
+
+@pytest.fixture(scope="module")
+def house():
+    return House.load()
+
+
+class Recorder:
+    """A viewer that keeps what is shown at every control step."""
+
+    def __init__(self):
+        self.shown = []
+
+    def camera(self, world):  # noqa: ARG002 - the interface of viewers
+        return None
+
+    def show(self, world, observation, hud_state):
+        self.shown.append((world, observation, hud_state))
+
+
+def session_with(house, assistance, *, user=None, objects=12, seed=3, viewer=None):
+    config = TrialConfig(
+        objects=objects, assistance=assistance, seed=seed, user=user, fidelity="event", regret=False
+    )
+    scene = compose(house.sample_episode(objects=objects, seed=seed), house.catalogue)
+    log = EventLog()
+    session, world = prepare_session(config, house, scene, log, viewer)
+    return session, world, log
+
+
+class Spy:
+    """Stands where it is and turns, and hands every percept to a check."""
+
+    needs = frozenset()
+    check = None
+
+    def act(self, percept):
+        Spy.check(percept)
+        return WAIT
+
+
+def spy(house, rng):  # noqa: ARG001 - the interface of participants
+    return Spy()
+
+
+def percepts(house, assistance, monkeypatch):
+    """The first percept of a session, what there is in the world then, and what the HUD shows."""
+    found, recorder = [], Recorder()
+    session, world, _ = session_with(house, assistance, user=f"{__name__}:spy", viewer=recorder)
+
+    def check(percept):
+        found.append(percept)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Spy, "check", check)
+    assert session.run() == INTERRUPTED
+    _, observation, hud_state = recorder.shown[0]
+    return found[0], world, observation, hud_state
+
+
+def numbers_in(value):
+    """All arrays of numbers within a value."""
+    if isinstance(value, np.ndarray):
+        yield value.ravel()
+    elif isinstance(value, dict):
+        for part in value.values():
+            yield from numbers_in(part)
+    elif isinstance(value, (list, tuple)):
+        for part in value:
+            yield from numbers_in(part)
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield from numbers_in(getattr(value, field.name))
+
+
+def told(percept):
+    """Everything that a participant can read off a percept, but for the regrets of models of compliance."""
+    names = [n for n in dir(Percept) if not n.startswith("_") and n not in ("hud", "look", "choices")]
+    fields = [f.name for f in dataclasses.fields(percept) if f.name != "senses"]
+    return [getattr(percept, n) for n in {*names, *fields} - {"senses"}] + [percept.look(), percept.hud()]
+
+
+@pytest.mark.parametrize("assistance", ["none", "optimal"])
+def test_nothing_in_a_percept_holds_the_position_of_an_unseen_object(house, monkeypatch, assistance):
+    percept, world, observation, hud_state = percepts(house, assistance, monkeypatch)
+    eye = observation.eye, observation.heading, observation.pitch
+    seen = set(visible_objects(world.scene, world.data, *eye))
+    assert set(percept.look()) == seen
+    assert percept.hud() is hud_state
+    known = {*seen, *percept.nearby}
+    if percept.guidance is not None:
+        known.add(percept.guidance.visit.object)
+    unseen = [n for n in observation.names_with(ObjectStatus.LOOSE) if n not in known]
+    assert len(unseen) >= 6
+    places = dict(zip(observation.object_names, observation.object_positions[:, :2], strict=True))
+    numbers = np.concatenate([np.zeros(0), *numbers_in(told(percept))])
+    for name in unseen:
+        assert not np.isin(places[name], numbers).any(), name
+        assert np.linalg.norm(places[name] - observation.position) >= 1.3
+
+
+def test_flagpoles_are_those_of_the_picture(house, monkeypatch):
+    percept, _, observation, hud_state = percepts(house, "highlight", monkeypatch)
+    poles = {m.position[:2] for m in hud_state.markers if m.role == "flagpole" and m.shape == "sphere"}
+    assert {tuple(place) for place in percept.flagpoles.values()} == poles
+    assert set(percept.flagpoles) == set(observation.names_with(ObjectStatus.LOOSE))
+    assert all(marker.x_ray for marker in hud_state.markers)  # so the picture shows those behind walls, too
+
+
+def test_no_flagpoles_and_no_path_where_none_are_shown(house, monkeypatch):
+    percept, *_ = percepts(house, "none", monkeypatch)
+    assert (dict(percept.flagpoles), percept.guidance, percept.hud().markers) == ({}, None, ())
+
+
+def messages(house, assistance):
+    """What the message bar shows at every control step of a trial with many deviations, and its replans, s."""
+    recorder = Recorder()
+    session, _, log = session_with(house, assistance, user="boltzmann:30", objects=6, viewer=recorder)
+    session.run()
+    replans = [event["t"] for event in log.events if event["event"] == "plan"][1:]
+    return [(o.time, state.message) for _, o, state in recorder.shown], replans
+
+
+def test_who_sees_the_plan_is_told_that_it_has_changed(house):
+    shown, replans = messages(house, "optimal")
+    assert len(replans) >= 3
+    for t in replans:
+        texts = [m.text for time, m in shown if t <= time < t + 6.0 and m is not None and m.opacity == 1.0]
+        assert texts[0].startswith("You p")  # picked up, put: what was done is told first
+        assert texts.count(UPDATED) >= 2.0 / 0.04 - 1 or t > shown[-1][0] - 4.0
+
+
+def test_who_sees_no_plan_is_not_told_of_any(house):
+    shown, replans = messages(house, "highlight")
+    assert len(replans) >= 3
+    assert all(message is None or message.text != UPDATED for _, message in shown)
