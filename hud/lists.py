@@ -34,7 +34,7 @@ def inventory(view: TaskView) -> tuple[InventorySlot, InventorySlot]:
 def random_order(view: TaskView) -> tuple[TaskObject, ...]:
     """Objects in the participant's order; picked ones at the bottom, in the order of picking.
 
-    An object that was dropped on the way counts as not picked again.
+    An object that was dropped counts as not picked.
     """
     picks = [name for kind, name in view.steps_done if kind == "pick"]
     last_pick = {name: i for i, name in enumerate(picks)}

@@ -21,7 +21,7 @@ class Marker:
         size: Sizes in m; meaning by shape.
         rgba: Colour, components in 0..1.
         role: What it is for: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal`.
-        x_ray: Whether it also shows faintly through walls.
+        x_ray: Whether it also shows, dimmed, through walls.
         object: Instance name of the object that it stands over, or None.
     """
 
@@ -35,7 +35,7 @@ class Marker:
 
 
 class MessageKind(enum.Enum):
-    """Tone of a message: decides its colour and symbol."""
+    """Kind of message, which decides its colour and symbol."""
 
     INFO = "info"
     SUCCESS = "success"
@@ -44,7 +44,7 @@ class MessageKind(enum.Enum):
 
 @dataclass(frozen=True)
 class Message:
-    """Text of the message bar, with the fade already worked out: 1 opaque, 0 gone."""
+    """Text of the message bar, and its opacity at this moment: 1 opaque, 0 gone."""
 
     text: str
     kind: MessageKind
@@ -57,8 +57,8 @@ class ChecklistItem:
 
     Attributes:
         text: The object ("Blue mug").
-        detail: Below it: where it is, where it goes, what to do; a line break says where to break it when it
-            does not fit in one line ("Kitchen\\n→ Dish bin", "Pick up ·\\nKitchen").
+        detail: Below the text: where the object is, where it goes, what to do. Broken at its line break if it does
+            not fit in one line ("Kitchen\\n→ Dish bin", "Pick up ·\\nKitchen").
         picture: Key of the object's picture, or None.
         target_picture: Key of the receptacle's picture, or None.
         number: Step number, or None where order means nothing.
@@ -79,7 +79,7 @@ class ChecklistItem:
 class BinEntry:
     """A receptacle in the list that every condition shows: picture, name and semantic location.
 
-    A line break in `place` says where to break it when it does not fit in one line.
+    `place` is broken at its line break if it does not fit in one line.
     """
 
     label: str

@@ -1,4 +1,4 @@
-"""TaskView: what an assistance condition sees of the task, as one value."""
+"""TaskView: what an assistance condition knows of the task, as one value."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,16 +16,20 @@ StepKind = Literal["pick", "place"]
 
 
 class PlannedStep(NamedTuple):
-    """One visit: pick an object up, or place it into its receptacle."""
+    """A step of the plan: pick an object up, or place it into its receptacle."""
 
     kind: StepKind
     object: str
 
 
 class Alternative(NamedTuple):
-    """A visit that is possible next, and by how much it makes the rest of the task longer than the best one, m.
+    """A step that is possible next, and its regret.
 
-    `at_least`: that is only a lower bound.
+    Attributes:
+        kind: `pick` or `place`.
+        object: Instance name.
+        extra: How much longer the rest of the task gets than with the best next step, m.
+        at_least: Whether `extra` is only a lower bound.
     """
 
     kind: StepKind
@@ -80,19 +84,19 @@ class TaskView:
         receptacles: All receptacles, in the order in which they are listed.
         order: Object names in this participant's random order (PAPER section 5).
         hands: Object name in the left and in the right hand, or None.
-        steps_done: Feasible visits already made, in order.
-        plan: Remaining visits in planned order, the next one first; empty without a planner.
-        path: Floor polyline from the person to the goal of the next visit, m, shape (k, 2), or None.
-        goal: Where the next visit happens (the object, or its receptacle), m, or None.
+        steps_done: Successful picks and places so far, in order.
+        plan: Remaining steps in planned order, the next one first; empty without a planner.
+        path: Floor polyline from the person to the goal of the next step, m, shape (k, 2), or None.
+        goal: Where the next step happens (the object, or its receptacle), m, or None.
         position: Floor position of the person, m.
         eye: Position of the eye, m.
         message: What the message bar shows, or None.
         clock: Elapsed task time to show, s, or None.
-        camera: The eye camera; given, the optimal condition points to a goal that is out of view.
+        camera: The eye camera, which a pointer to a goal out of view needs; None for no pointer.
         heading: Where the person looks, rad, 0 along +x, counter-clockwise.
         bounds: xmin, ymin, xmax, ymax of the house, m, or None where there is no map of it.
-        alternatives: Gives all visits that are possible next, worked out only when asked; none as long as nothing is
-            known of them.
+        alternatives: Gives all steps that are possible next; called only by conditions that show them. Empty until
+            their regrets are known.
 
     Raises:
         TaskViewError: A name is unknown or repeated, `order` is not a permutation of the objects, or `path`
@@ -124,28 +128,19 @@ class TaskView:
                 raise TaskViewError(f"names of {what} must be unique, got {values}")
         if sorted(self.order) != sorted(names):
             raise TaskViewError(f"order {list(self.order)} must hold each object once: {names}")
-        for thing in self.objects:
-            if thing.receptacle not in keys:
-                raise TaskViewError(
-                    f"{thing.name} belongs to {thing.receptacle!r}, none of the receptacles {keys}"
-                )
-            if thing.status not in get_args(Status):
-                raise TaskViewError(
-                    f"status of {thing.name} is {thing.status!r}, must be one of {get_args(Status)}"
-                )
+        for o in self.objects:
+            if o.receptacle not in keys:
+                raise TaskViewError(f"{o.name} belongs to {o.receptacle!r}, none of the receptacles {keys}")
+            if o.status not in get_args(Status):
+                raise TaskViewError(f"status of {o.name} is {o.status!r}, must be one of {get_args(Status)}")
         for kind, name in (*self.steps_done, *self.plan):
             if kind not in get_args(StepKind) or name not in names:
                 raise TaskViewError(f"step {(kind, name)} must be a pick or place of one of {names}")
         for hand in self.hands:
             if hand is not None and hand not in names:
                 raise TaskViewError(f"hands hold {hand!r}, which is none of {names}")
-        if self.path is not None and (
-            self.path.ndim != 2
-            or self.path.shape[1] != 2
-            or len(self.path) < 1
-            or not np.isfinite(self.path).all()
-        ):
-            raise TaskViewError(f"path must be finite with shape (k, 2), k >= 1, got shape {self.path.shape}")
+        if self.path is not None:
+            _check_path(self.path)
 
     def object(self, name: str) -> TaskObject:
         """The object called `name`.
@@ -153,10 +148,10 @@ class TaskView:
         Raises:
             TaskViewError: There is none.
         """
-        for candidate in self.objects:
-            if candidate.name == name:
-                return candidate
-        raise TaskViewError(f"no object {name!r}; there are {[o.name for o in self.objects]}")
+        found = next((o for o in self.objects if o.name == name), None)
+        if found is None:
+            raise TaskViewError(f"no object {name!r}; there are {[o.name for o in self.objects]}")
+        return found
 
     def receptacle(self, key: str) -> TaskReceptacle:
         """The receptacle called `key`.
@@ -164,7 +159,13 @@ class TaskView:
         Raises:
             TaskViewError: There is none.
         """
-        for candidate in self.receptacles:
-            if candidate.key == key:
-                return candidate
-        raise TaskViewError(f"no receptacle {key!r}; there are {[r.key for r in self.receptacles]}")
+        found = next((r for r in self.receptacles if r.key == key), None)
+        if found is None:
+            raise TaskViewError(f"no receptacle {key!r}; there are {[r.key for r in self.receptacles]}")
+        return found
+
+
+def _check_path(path: NDArray[np.float64]) -> None:
+    shaped = path.ndim == 2 and path.shape[1] == 2 and len(path) >= 1
+    if not shaped or not np.isfinite(path).all():
+        raise TaskViewError(f"path must be finite with shape (k, 2), k >= 1, got shape {path.shape}")

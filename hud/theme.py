@@ -1,7 +1,7 @@
 """Colours and sizes of the HUD. Colours are sRGB 0..255; sizes are px of a 640 x 480 frame.
 
-Hues are from the Okabe-Ito palette, which people with colour-vision deficiencies can tell apart; nothing is
-told by hue alone: tones of messages have a symbol, done rows are crossed out, the current row is bold.
+Hues are from the Okabe-Ito palette, which people with colour-vision deficiencies can tell apart. Nothing is
+told by hue alone: kinds of messages have symbols, done rows are crossed out, the current row is bold.
 """
 
 from dataclasses import dataclass

@@ -4,11 +4,12 @@ import dataclasses
 from typing import Any
 
 import cv2
+import hud_sample as sample
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hud import markers, minimap, sample, theme
+from hud import markers, minimap, theme
 from hud.canvas import Canvas, Rect
 from hud.compose import Compositor, compose
 from hud.conditions import condition

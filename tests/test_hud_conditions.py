@@ -2,10 +2,10 @@
 
 import dataclasses
 
+import hud_sample as sample
 import numpy as np
 import pytest
 
-from hud import sample
 from hud.conditions import condition, condition_names
 from hud.errors import ConditionError, HudError, MessageError, TaskViewError
 from hud.lists import in_sentence

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import hud_sample as sample
 import pytest
 
-from hud import sample
 from hud.conditions import Condition, condition, condition_names
 from hud.options import option_names
 

@@ -4,11 +4,11 @@ import dataclasses
 from pathlib import Path
 
 import cv2
+import hud_sample as sample
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hud import sample
 from hud.compose import compose
 from hud.conditions import condition
 from hud.messages import message

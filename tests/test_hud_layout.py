@@ -4,12 +4,13 @@ import dataclasses
 import itertools
 import math
 
+import hud_sample as sample
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from hud import sample, theme
+from hud import theme
 from hud.canvas import Rect
 from hud.compose import Compositor
 from hud.conditions import condition

@@ -5,11 +5,11 @@ import dataclasses
 import json
 from typing import Any
 
+import hud_sample as sample
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hud import sample
 from hud.conditions import condition, condition_names
 from hud.errors import SchemaError
 from hud.messages import message

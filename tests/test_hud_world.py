@@ -3,6 +3,7 @@
 import math
 
 import cv2
+import hud_sample as sample
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -10,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from shapely import LineString, Point
 
-from hud import sample
 from hud.errors import FrameError
 from hud.markers import breadcrumbs, flagpole, goal_pin
 from hud.projection import CameraView, in_view, pointer_to, project

@@ -13,13 +13,13 @@ NEAR = 1.6  # m; about where an object leaves the lower edge of the view
 def hud_state(view: TaskView) -> HudState:
     """The list of `none` with rooms, and flagpoles over misplaced objects, dimmed where something hides them."""
 
-    def detail(thing: TaskObject) -> str:
-        target = f"→ {view.receptacle(thing.receptacle).label}"
-        return f"{thing.room}\n{target}" if thing.status == "loose" else target
+    def detail(item: TaskObject) -> str:
+        target = f"→ {view.receptacle(item.receptacle).label}"
+        return f"{item.room}\n{target}" if item.status == "loose" else target
 
     markers: list[Marker] = []
-    for thing in view.objects:
-        if thing.status == "loose":
-            low = math.dist(thing.position[:2], view.position) < NEAR
-            markers += flagpole(thing.position, object=thing.name, low=low, x_ray=True)
+    for item in view.objects:
+        if item.status == "loose":
+            low = math.dist(item.position[:2], view.position) < NEAR
+            markers += flagpole(item.position, object=item.name, low=low, x_ray=True)
     return assemble(view, "To put away", random_order_rows(view, detail), tuple(markers))

@@ -6,9 +6,9 @@ from hud.task import TaskObject, TaskView
 
 
 def hud_state(view: TaskView) -> HudState:
-    """The list of objects and the list of bins, and nothing else."""
+    """The list of objects and the list of bins."""
 
-    def detail(thing: TaskObject) -> str:
-        return f"→ {view.receptacle(thing.receptacle).label}"
+    def detail(item: TaskObject) -> str:
+        return f"→ {view.receptacle(item.receptacle).label}"
 
     return assemble(view, "To put away", random_order_rows(view, detail))

@@ -1,4 +1,4 @@
-"""Optimal: breadcrumbs to the next visit, and the plan as numbered steps (PAPER section 5)."""
+"""Optimal: breadcrumbs to the goal of the next step, and the plan as numbered steps (PAPER section 5)."""
 
 from hud.lists import assemble
 from hud.markers import breadcrumbs, goal_pin, rims
@@ -8,7 +8,7 @@ from hud.task import TaskView
 
 
 def hud_state(view: TaskView) -> HudState:
-    """Steps done and steps planned, the next one highlighted, and the way there."""
+    """Steps done and steps planned, the next one highlighted, and the path to its goal."""
     done = len(view.steps_done)
     steps = (*view.steps_done, *view.plan)
     checklist = tuple(_row(view, i, kind, name, done) for i, (kind, name) in enumerate(steps))
@@ -22,13 +22,13 @@ def hud_state(view: TaskView) -> HudState:
 
 
 def _row(view: TaskView, index: int, kind: str, name: str, done: int) -> ChecklistItem:
-    thing = view.object(name)
-    target = view.receptacle(thing.receptacle)
-    action, room = ("Pick up", thing.room) if kind == "pick" else (f"Put in {target.label}", target.room)
+    item = view.object(name)
+    target = view.receptacle(item.receptacle)
+    action, room = ("Pick up", item.room) if kind == "pick" else (f"Put in {target.label}", target.room)
     return ChecklistItem(
-        text=thing.label,
+        text=item.label,
         detail=action if index < done else f"{action} ·\n{room}",
-        picture=thing.picture,
+        picture=item.picture,
         number=index + 1,
         done=index < done,
         current=index == done,

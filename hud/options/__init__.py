@@ -1,7 +1,7 @@
 """Options of assistance conditions. Every module here is one, named after its file.
 
-An option is a function from a task view and the state that the condition made of it to another state. It is asked for
-by name after the condition's, `optimal-xray-minimap`, and applied in that order.
+An option is a function from a task view and the HUD state of the condition to another HUD state. Options follow the
+condition's name, `optimal-xray-minimap`, and apply in that order.
 """
 
 import importlib

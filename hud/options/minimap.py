@@ -10,7 +10,7 @@ FLOORPLAN = "floorplan"  # key of the picture of the house from above
 
 
 def apply(view: TaskView, state: HudState) -> HudState:
-    """Add the map. It tells no more than the markers do, so that it helps in no other way than the condition."""
+    """Add the map. It shows the markers of the condition and nothing else, so that it tells no more than they do."""
     if view.bounds is None:
         return state
     goals = _places(state, "goal")

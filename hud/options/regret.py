@@ -1,4 +1,4 @@
-"""Regret: beside each thing that can be done next, how many metres longer the rest of the task gets by it."""
+"""Regret: in the list, how many metres longer each possible next step makes the rest of the task."""
 
 import dataclasses
 
@@ -6,11 +6,11 @@ from hud.lists import random_order
 from hud.state import ChecklistItem, HudState
 from hud.task import Alternative, PlannedStep, TaskView
 
-NOTHING = 0.01  # m; less is rounding
+NEGLIGIBLE = 0.01  # m; less is rounding
 
 
 def apply(view: TaskView, state: HudState) -> HudState:
-    """Add the metres to the rows of the task list; as long as they are not known, the list stays as it is."""
+    """Add the metres to the rows of the task list; the list stays as it is until they are known."""
     extras = {(a.kind, a.object): a for a in view.alternatives()}
     steps = _steps(view, state)
     if not extras or len(steps) != len(state.checklist):
@@ -22,7 +22,7 @@ def apply(view: TaskView, state: HudState) -> HudState:
 
 def wording(alternative: Alternative) -> str:
     """How an extra length reads in the list."""
-    if alternative.extra <= NOTHING:
+    if alternative.extra <= NEGLIGIBLE:
         return "+0 m"
     shown = f"+{max(alternative.extra, 0.1):.1f} m"
     return f"over {shown}" if alternative.at_least else shown
@@ -40,7 +40,7 @@ def _noted(item: ChecklistItem, alternative: Alternative | None) -> ChecklistIte
 
 
 def _steps(view: TaskView, state: HudState) -> list[PlannedStep]:
-    """What each row of the list is about: a step of the plan, or what is to be done next with an object."""
+    """The step of each row: one of the plan, or the next one possible with an object."""
     if any(item.number is not None for item in state.checklist):
         return [PlannedStep(*step) for step in view.steps_done] + list(view.plan)
     return [PlannedStep("place" if o.status == "carried" else "pick", o.name) for o in random_order(view)]

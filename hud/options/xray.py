@@ -1,4 +1,4 @@
-"""X-ray: every world-locked object also shows faintly through walls."""
+"""X-ray: every marker also shows, dimmed, through walls."""
 
 import dataclasses
 
@@ -7,6 +7,6 @@ from hud.task import TaskView
 
 
 def apply(view: TaskView, state: HudState) -> HudState:  # noqa: ARG001 - every option takes it
-    """The same markers, seen through walls."""
+    """The same markers, shown through walls."""
     markers = tuple(dataclasses.replace(marker, x_ray=True) for marker in state.markers)
     return dataclasses.replace(state, markers=markers)
