@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.files import replacing, write_text_atomically
 
+_LEVEL = 3  # of compression
+
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Read every array of an NPZ.
@@ -30,9 +32,17 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write a compressed NPZ, whole or not at all."""
-    with replacing(path) as temporary:
-        np.savez_compressed(temporary, allow_pickle=False, **arrays)
+    """Write a compressed NPZ, whole or not at all.
+
+    As `np.savez_compressed`, whose level takes twice the time for files smaller by a tenth.
+    """
+    with (
+        replacing(path) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive,
+    ):
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=False)
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -5,7 +5,7 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,19 +41,7 @@ HEALTH = {
 }
 STATUS_CODE = {ObjectStatus.LOOSE: 0, ObjectStatus.CARRIED: 1, ObjectStatus.DELIVERED: 2}
 
-COLUMNS = (
-    "time",
-    "position",
-    "heading",
-    "pitch",
-    "hands",
-    "object_position",
-    "object_quaternion",
-    "object_status",
-    "action",
-    "health",
-)
-KINDS: Mapping[str, type] = {"hands": np.int16, "object_status": np.int8}  # the others are float64
+_FIRST_CAPACITY = 4096  # rows of a trajectory; doubled when they are full
 
 Event = Mapping[str, Any]
 
@@ -123,92 +111,93 @@ class Trajectory:
     0 loose, 1 carried, 2 delivered; `action` (T, 6): kind (0 move, 1 pick, 2 place), object index or -1, then
     forward, left (m/s), turn, look (rad/s). `penetration_m`, `trunk_penetration_m`, `settle_s` (T,), `weld_error_m` and
     `weld_error_rad` (T, 2) are those of `HealthSample`, NaN where there is none. Row t is the state before action t. An
-    object index of n + i means the i-th of `unknown_objects`: names that were asked for and that the house does not
-    have.
+    object index of n + i means the i-th of `unknown_objects`: names in actions that are no object of the house.
     """
 
     def __init__(self, object_names: Sequence[str]) -> None:
         self._index = {name: i for i, name in enumerate(object_names)}
         self._unknown: list[str] = []
-        self._rows: list[tuple[Any, ...]] = []
-        self._blocks: list[dict[str, NDArray[Any]]] = []
+        self._length = 0
+        self._columns = _Columns.empty(_FIRST_CAPACITY, len(self._index))
         self._hands: tuple[tuple[str | None, ...], list[int]] = ((), [])
         self._status: tuple[tuple[ObjectStatus, ...], list[int]] = ((), [])
 
     def append(self, observation: Observation, action: Action, health: HealthSample) -> None:
         """Add one control step."""
-        self._rows.append((*self._poses(observation), self._encode(action), health.row))
+        row = self._add_rows(1)
+        self._write_state(row, observation, health)
+        self._columns.action[row] = self._encode(action)
 
     def extend(
-        self, observation: Observation, health: HealthSample, stretch: Rollout, moves: NDArray[np.float64]
+        self, observation: Observation, health: HealthSample, rollout: Rollout, moves: NDArray[np.float64]
     ) -> None:
-        """Add the control steps of a stretch.
+        """Add the control steps of a rollout, during which no hand picks up or releases anything.
 
         Args:
             observation: State before its first step.
             health: The physics before its first step.
-            stretch: What came of it; nothing is picked up or let go before its last step.
-            moves: Forward, left, turn and look of every step, shape (n, 4).
+            rollout: The states after its steps.
+            moves: Forward, left (m/s), turn and look (rad/s) of every step, shape (n, 4).
         """
-        self._close_block()
-        count = len(stretch)
-        first = dict(zip(COLUMNS, (*self._poses(observation), None, health.row), strict=True))
-        rows = {
-            "time": stretch.times,
-            "position": stretch.positions,
-            "heading": stretch.headings,
-            "pitch": stretch.pitches,
-            "object_position": stretch.object_positions,
-            "object_quaternion": stretch.object_quaternions,
-            "health": stretch.health,
-        }
-        # A row of the stretch is the state after its action, one of the trajectory the state before it.
-        block = {n: np.concatenate([np.asarray(first[n])[None], r[:-1]]) for n, r in rows.items()}
-        for name in ("hands", "object_status"):
-            block[name] = np.tile(np.asarray(first[name], KINDS[name]), (count, 1))
-        block["action"] = np.hstack([np.tile([0.0, -1.0], (count, 1)), moves])
-        self._blocks.append(block)
+        if not len(rollout):
+            return
+        first, columns = self._add_rows(len(rollout)), self._columns
+        self._write_state(first, observation, health)
+        # A row of the rollout is the state after its action, one of the trajectory the state before it.
+        rest = slice(first + 1, self._length)
+        columns.time[rest], columns.position[rest] = rollout.times[:-1], rollout.positions[:-1]
+        columns.heading[rest], columns.pitch[rest] = rollout.headings[:-1], rollout.pitches[:-1]
+        columns.object_position[rest] = rollout.object_positions[:-1]
+        columns.object_quaternion[rest] = rollout.object_quaternions[:-1]
+        columns.health[rest] = rollout.health[:-1]
+        columns.hands[rest], columns.object_status[rest] = columns.hands[first], columns.object_status[first]
+        columns.action[first : self._length, :2] = 0.0, -1.0
+        columns.action[first : self._length, 2:] = moves
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Everything so far, as arrays by name."""
-        self._close_block()
-        blocks = self._blocks or [_block([])]
-        arrays = {name: np.concatenate([block[name] for block in blocks]) for name in COLUMNS}
-        columns = arrays.pop("health").reshape(-1, sum(HEALTH.values()))
-        ends = np.cumsum(list(HEALTH.values()))
-        for (name, width), part in zip(HEALTH.items(), np.split(columns, ends[:-1], axis=1), strict=True):
-            arrays[name] = part if width > 1 else part[:, 0]
+        """Everything so far, as arrays by name; views that further steps leave unchanged."""
+        arrays = {name: column[: self._length] for name, column in self._columns._asdict().items()}
+        health, first = arrays.pop("health"), 0
+        for name, width in HEALTH.items():
+            arrays[name] = health[:, first : first + width] if width > 1 else health[:, first]
+            first += width
         return {**arrays, "unknown_objects": np.array(self._unknown, dtype=np.str_)}
 
     def save(self, path: Path) -> None:
         """Write a compressed NPZ, whole or not at all."""
         save_arrays(path, self.arrays())
 
-    def _poses(self, o: Observation) -> tuple[Any, ...]:
-        """All columns but the last two."""
+    def _add_rows(self, count: int) -> int:
+        """Make room for more rows; the first of them."""
+        first = self._length
+        self._length += count
+        capacity = len(self._columns.time)
+        if self._length > capacity:
+            grown = _Columns.empty(max(self._length, 2 * capacity), len(self._index))
+            for name in _Columns._fields:
+                getattr(grown, name)[:first] = getattr(self._columns, name)[:first]
+            self._columns = grown
+        return first
+
+    def _write_state(self, row: int, o: Observation, health: HealthSample) -> None:
         if o.hands != self._hands[0]:
             self._hands = o.hands, [-1 if name is None else self._index[name] for name in o.hands]
         if o.object_status != self._status[0]:
             self._status = o.object_status, [STATUS_CODE[s] for s in o.object_status]
-        seen = o.object_positions, o.object_quaternions, self._status[1]
-        return o.time, o.position, o.heading, o.pitch, self._hands[1], *seen
+        columns = self._columns
+        columns.time[row], columns.position[row] = o.time, o.position
+        columns.heading[row], columns.pitch[row] = o.heading, o.pitch
+        columns.object_position[row], columns.object_quaternion[row] = (
+            o.object_positions,
+            o.object_quaternions,
+        )
+        columns.hands[row], columns.object_status[row] = self._hands[1], self._status[1]
+        columns.health[row] = health.row
 
-    def _close_block(self) -> None:
-        if self._rows:
-            self._blocks.append(_block(self._rows))
-            self._rows = []
-
-    def _encode(self, action: Action) -> list[float]:
+    def _encode(self, action: Action) -> tuple[float, ...]:
         if isinstance(action, Move):
-            return [0.0, -1.0, action.forward, action.left, action.turn, action.look]
-        return [
-            1.0 if isinstance(action, Pick) else 2.0,
-            float(self._number(action.object)),
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ]
+            return 0.0, -1.0, action.forward, action.left, action.turn, action.look
+        return 1.0 if isinstance(action, Pick) else 2.0, self._number(action.object), 0.0, 0.0, 0.0, 0.0
 
     def _number(self, name: str | None) -> int:
         if name is None:
@@ -220,10 +209,34 @@ class Trajectory:
         return len(self._index) + self._unknown.index(name)
 
 
-def _block(rows: Sequence[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
-    """Rows of a trajectory as arrays by column."""
-    columns: list[Sequence[Any]] = list(zip(*rows, strict=True)) or [()] * len(COLUMNS)
-    return {n: np.asarray(c, dtype=KINDS.get(n, np.float64)) for n, c in zip(COLUMNS, columns, strict=True)}
+class _Columns(NamedTuple):
+    """The columns of a trajectory, in the order in which they are stored."""
+
+    time: NDArray[np.float64]
+    position: NDArray[np.float64]
+    heading: NDArray[np.float64]
+    pitch: NDArray[np.float64]
+    hands: NDArray[np.int16]
+    object_position: NDArray[np.float64]
+    object_quaternion: NDArray[np.float64]
+    object_status: NDArray[np.int8]
+    action: NDArray[np.float64]
+    health: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, rows: int, objects: int) -> "_Columns":
+        return cls(
+            time=np.empty(rows),
+            position=np.empty((rows, 2)),
+            heading=np.empty(rows),
+            pitch=np.empty(rows),
+            hands=np.empty((rows, 2), np.int16),
+            object_position=np.empty((rows, objects, 3)),
+            object_quaternion=np.empty((rows, objects, 4)),
+            object_status=np.empty((rows, objects), np.int8),
+            action=np.empty((rows, 6)),
+            health=np.empty((rows, sum(HEALTH.values()))),
+        )
 
 
 def decode_action(row: NDArray[np.float64], names: Sequence[str]) -> Action:

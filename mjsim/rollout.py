@@ -1,6 +1,7 @@
 """Many control steps as one value."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -70,6 +71,26 @@ class Rollout:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @classmethod
+    def of_steps(
+        cls,
+        observations: Sequence[Observation],
+        state_hashes: Sequence[int],
+        health: Sequence[tuple[float, ...]],
+        last: Observation,
+        events: tuple[WorldEvent, ...],
+    ) -> "Rollout":
+        """The rollout of single steps; `last` is the present state, also where there are no steps."""
+        arrays = RolloutArrays.empty(len(observations), len(last.object_names))
+        arrays.state_hashes[:] = state_hashes
+        for step, o in enumerate(observations):
+            arrays.times[step], arrays.positions[step] = o.time, o.position
+            arrays.headings[step], arrays.pitches[step] = o.heading, o.pitch
+            arrays.object_positions[step] = o.object_positions
+            arrays.object_quaternions[step] = o.object_quaternions
+            arrays.health[step] = health[step]
+        return cls(*arrays, last, events)
 
     def followed_by(self, later: "Rollout") -> "Rollout":
         """This rollout and the one that continues it, as one."""

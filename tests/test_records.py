@@ -123,20 +123,20 @@ def test_a_trajectory_round_trips_and_repeats_byte_for_byte(tmp_path):
     ]
 
 
-def test_a_stretch_is_recorded_as_its_single_steps(tmp_path):
+def test_a_rollout_is_recorded_as_its_single_steps(tmp_path):
     moves = np.random.default_rng(0).normal(size=(5, 4))
     seen = [
         dataclasses.replace(observation(step * 0.04), position=np.array([step, 1.0]), heading=0.1 * step)
         for step in range(7)
     ]
     healths = [HealthSample(penetration_m=0.001 * step, weld_error_m=(math.nan, 0.1)) for step in range(7)]
-    stretch = Rollout.of(seen[2:], list(range(5)), seen[-1], (), [h.row for h in healths[2:]])
+    rollout = Rollout.of_steps(seen[2:], range(5), [h.row for h in healths[2:]], seen[-1], ())
     single, at_once = Trajectory(["a", "b"]), Trajectory(["a", "b"])
     for trajectory in (single, at_once):
         trajectory.append(seen[0], Pick("b"), healths[0])
     for step, move in enumerate(moves, start=1):
         single.append(seen[step], Move(*move), healths[step])
-    at_once.extend(seen[1], healths[1], stretch, moves)
+    at_once.extend(seen[1], healths[1], rollout, moves)
     for trajectory in (single, at_once):
         trajectory.append(seen[-1], Move(), healths[-1])
         trajectory.save(tmp_path / f"{trajectory is single}.npz")

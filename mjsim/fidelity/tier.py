@@ -12,7 +12,7 @@ from mjsim.fidelity.episode_state import EpisodeState
 from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.health.values import Health, HealthSample
 from mjsim.observation import Observation
-from mjsim.rollout import Rollout, RolloutArrays
+from mjsim.rollout import Rollout
 from mjsim.world_state import WorldState
 
 
@@ -105,14 +105,5 @@ def by_steps(tier: Tier, actions: Iterable[Action]) -> Rollout:
         if tier.episode_state.events:
             break
     last = observations[-1] if observations else tier.observation()
-    arrays = RolloutArrays.empty(len(observations), len(last.object_names))
-    arrays.state_hashes[:] = hashes
-    for step, o in enumerate(observations):
-        arrays.times[step], arrays.positions[step] = o.time, o.position
-        arrays.headings[step], arrays.pitches[step] = o.heading, o.pitch
-        arrays.object_positions[step], arrays.object_quaternions[step] = (
-            o.object_positions,
-            o.object_quaternions,
-        )
-        arrays.health[step] = health[step]
-    return Rollout(*arrays, last, tuple(tier.episode_state.events) if observations else ())
+    events = tuple(tier.episode_state.events) if observations else ()
+    return Rollout.of_steps(observations, hashes, health, last, events)
