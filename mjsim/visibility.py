@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from mjsim.kernels import kernel
 from mjsim.model.scene import Scene
 
-SHOWN_GROUPS = (0, 1, 2)  # what the first-person view draws of the house and the objects
+DRAWN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # what the first-person view draws
 SKIP = 1e-4  # share of a ray that is skipped to get through a surface of the person
 INSET = 0.7  # of the half extents: box corners and face centres of round objects are empty
 OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
-MIN_OCCLUDER = 0.25  # m, half extent: large boxes are tested before any ray is cast
+MIN_WALL = 0.25  # m, half extents of the boxes that are tested before any ray is cast
 MARGIN = 1e-6  # m, for rounding
 
 
@@ -38,38 +38,30 @@ class FieldOfView:
     range: float = 8.0
 
 
-class ShownGeoms(NamedTuple):
-    """The drawn geoms of all objects: what of them the model alone decides.
+class SightGeometry(NamedTuple):
+    """What looking needs of a scene and no step changes.
 
     Attributes:
-        ids: Geom ids, (g,).
-        owners: Position of each geom's object in the episode's order, (g,).
-        centers: Centres of the geoms' own bounding boxes in the geoms' frames, m, (g, 3).
-        half_sizes: Half extents of those boxes, m, (g, 3).
+        geoms: Ids of the objects' drawn geoms, (g,).
+        owners: Position of each one's object in the episode's order, (g,).
+        boxes: Centre and half extents of each one's bounding box, in its own frame, m, (g, 6).
+        wall_centers: Centres of large static boxes (walls, cupboards), the largest first, m, (w, 3).
+        wall_axes: Their axes as columns, (w, 3, 3).
+        wall_half_sizes: Their half extents, m, (w, 3).
+        person: Which geoms belong to the person, (ngeom,).
     """
 
-    ids: NDArray[np.int64]
+    geoms: NDArray[np.int64]
     owners: NDArray[np.int64]
-    centers: NDArray[np.float64]
-    half_sizes: NDArray[np.float64]
-
-
-class Occluders(NamedTuple):
-    """Large static boxes (walls, cupboards), the largest first.
-
-    Attributes:
-        centers: m, (w, 3).
-        axes: Their axes as columns, (w, 3, 3).
-        half_sizes: Half extents, m, (w, 3).
-    """
-
-    centers: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    half_sizes: NDArray[np.float64]
+    boxes: NDArray[np.float64]
+    wall_centers: NDArray[np.float64]
+    wall_axes: NDArray[np.float64]
+    wall_half_sizes: NDArray[np.float64]
+    person: NDArray[np.bool_]
 
 
 class Gaze(NamedTuple):
-    """Where the eye is and what it could see if nothing were in between.
+    """Where the eye is, and what it could see if nothing were in between.
 
     Attributes:
         eye: m, (3,).
@@ -82,15 +74,6 @@ class Gaze(NamedTuple):
     axes: NDArray[np.float64]
     slopes: NDArray[np.float64]
     range: float
-
-
-class _SightModel(NamedTuple):
-    """What does not change while a scene lasts."""
-
-    shown: ShownGeoms
-    occluders: Occluders
-    groups: NDArray[np.uint8]
-    person: NDArray[np.bool_]  # per geom: whether it belongs to the person
 
 
 def visible_objects(
@@ -118,17 +101,15 @@ def visible_objects(
         field: Field of view; by default 80 by 65 degrees and 8 m.
         among: Instance names to look for; None for all. The fewer, the quicker.
     """
-    sight = scene.once("sight", lambda: _sight_model(scene, data))
+    sight = scene.once("sight", lambda: _sight_geometry(scene, data))
     names = scene.index.names
-    wanted = np.ones(len(names), np.bool_)
-    if among is not None:
-        wanted[:] = [name in among for name in names]
+    wanted = np.array([among is None or name in among for name in names], np.bool_)
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView())
-    owners, rays = open_rays(sight.shown, data.geom_xpos, data.geom_xmat, wanted, gaze, sight.occluders)
+    owners, rays = open_rays(sight, data.geom_xpos, data.geom_xmat, wanted, gaze)
     seen: set[int] = set()
     for owner, ray in zip(owners.tolist(), rays, strict=True):
         if owner not in seen:
-            geom = _first_hit(scene.model, data, gaze.eye, ray, sight)
+            geom = _first_hit(scene.model, data, gaze.eye, ray, sight.person)
             if geom >= 0 and scene.index.geom_owner[geom] == owner:
                 seen.add(owner)
     return tuple(names[i] for i in sorted(seen))
@@ -139,40 +120,39 @@ def _first_hit(
     data: mujoco.MjData,
     eye: NDArray[np.float64],
     ray: NDArray[np.float64],
-    sight: _SightModel,
+    person: NDArray[np.bool_],
 ) -> int:
     """Geom that a ray (3,) from the eye meets first, the person's aside; -1 for none."""
-    geom, gone = np.full(1, -1, np.int32), 0.0
-    gone = mujoco.mj_ray(model, data, eye, ray, sight.groups, True, -1, geom)
+    geom = np.full(1, -1, np.int32)
+    distance = mujoco.mj_ray(model, data, eye, ray, DRAWN_GROUPS, True, -1, geom)
     # The hands are drawn, but they do not hide anything from the person.
-    while geom[0] >= 0 and sight.person[geom[0]]:
-        gone += SKIP
-        gone += mujoco.mj_ray(model, data, eye + gone * ray, ray, sight.groups, True, -1, geom)
+    while geom[0] >= 0 and person[geom[0]]:
+        distance += SKIP
+        distance += mujoco.mj_ray(model, data, eye + distance * ray, ray, DRAWN_GROUPS, True, -1, geom)
     return int(geom[0])
 
 
-def _sight_model(scene: Scene, data: mujoco.MjData) -> _SightModel:
+def _sight_geometry(scene: Scene, data: mujoco.MjData) -> SightGeometry:
     model, owner = scene.model, scene.index.geom_owner
-    drawn = np.isin(model.geom_group, SHOWN_GROUPS)
+    drawn = DRAWN_GROUPS[model.geom_group] > 0
     static = model.body_weldid[model.geom_bodyid] == 0
-    groups = np.zeros(mujoco.mjNGROUP, np.uint8)
-    groups[list(SHOWN_GROUPS)] = 1
-    ids = np.flatnonzero((owner >= 0) & drawn)
-    boxes = model.geom_aabb[ids]
-    shown = ShownGeoms(ids, owner[ids].astype(np.int64), boxes[:, :3].copy(), boxes[:, 3:].copy())
+    geoms = np.flatnonzero((owner >= 0) & drawn)
     alpha = model.geom_rgba[:, 3].copy()  # a ray passes through what is fully transparent
     textured = model.geom_matid >= 0
     alpha[textured] *= model.mat_rgba[model.geom_matid[textured], 3]
     extents = np.sort(model.geom_size, axis=1)
-    large = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (extents[:, 1] >= MIN_OCCLUDER)
+    large = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (extents[:, 1] >= MIN_WALL)
     walls = np.flatnonzero(large & static & drawn & (alpha > 0))
     walls = walls[np.argsort(-extents[walls, 1] * extents[walls, 2], kind="stable")]
-    occluders = Occluders(
-        data.geom_xpos[walls].copy(),
-        data.geom_xmat[walls].reshape(-1, 3, 3).copy(),
-        model.geom_size[walls].copy(),
+    return SightGeometry(
+        geoms=geoms,
+        owners=owner[geoms].astype(np.int64),
+        boxes=model.geom_aabb[geoms],
+        wall_centers=data.geom_xpos[walls],
+        wall_axes=data.geom_xmat[walls].reshape(-1, 3, 3),
+        wall_half_sizes=model.geom_size[walls],
+        person=(owner == -1) & ~static,
     )
-    return _SightModel(shown, occluders, groups, (owner == -1) & ~static)
 
 
 def _gaze(eye: NDArray[np.float64], heading: float, pitch: float, field: FieldOfView) -> Gaze:
@@ -184,38 +164,34 @@ def _gaze(eye: NDArray[np.float64], heading: float, pitch: float, field: FieldOf
 
 @kernel
 def open_rays(
-    shown: ShownGeoms,
+    sight: SightGeometry,
     positions: NDArray[np.float64],
     rotations: NDArray[np.float64],
     wanted: NDArray[np.bool_],
     gaze: Gaze,
-    occluders: Occluders,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Rays worth casting: inside the field of view, and no occluder certainly in front of the object.
+    """Rays worth casting: inside the field of view, and no wall certainly in front of the object.
 
     Args:
-        shown: Drawn geoms of the objects.
+        sight: Objects and walls.
         positions: Geom positions, m, (ngeom, 3).
         rotations: Geom rotations, row by row, (ngeom, 9).
         wanted: Which objects count, (n,).
         gaze: Eye and field of view.
-        occluders: Boxes that block.
 
     Returns:
         Object of each ray, (k,), in order, and vectors from the eye to points in its bounding box, m, (k, 3).
     """
-    low, high = bounding_boxes(shown, positions, rotations, wanted)
+    low, high = bounding_boxes(sight, positions, rotations, wanted)
     owners, rays = np.empty(7 * len(wanted), np.int64), np.empty((7 * len(wanted), 3))
     count = 0
-    for i in range(len(wanted)):
-        if low[i, 0] > high[i, 0]:
-            continue
+    for i in np.flatnonzero(low[:, 0] <= high[:, 0]):
         for offset in OFFSETS:
             ray = rays[count]
             for k in range(3):
                 middle, half = (low[i, k] + high[i, k]) / 2, (high[i, k] - low[i, k]) / 2
                 ray[k] = middle + half * offset[k] - gaze.eye[k]
-            if in_field(ray, gaze) and not is_blocked(ray, low[i], high[i], gaze.eye, occluders):
+            if in_field(ray, gaze) and not is_blocked(ray, low[i], high[i], gaze.eye, sight):
                 owners[count] = i
                 count += 1
     return owners[:count], rays[:count]
@@ -223,22 +199,20 @@ def open_rays(
 
 @kernel
 def bounding_boxes(
-    shown: ShownGeoms,
+    sight: SightGeometry,
     positions: NDArray[np.float64],
     rotations: NDArray[np.float64],
     wanted: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower and upper corners of the upright boxes around the wanted objects, m, each (n, 3); else inf, -inf."""
+    """Corners of the upright boxes around wanted objects, m, each (n, 3); infinity and -infinity for the others."""
     low, high = np.full((len(wanted), 3), np.inf), np.full((len(wanted), 3), -np.inf)
-    for g in range(len(shown.ids)):
-        geom, i = shown.ids[g], shown.owners[g]
+    for geom, i, box in zip(sight.geoms, sight.owners, sight.boxes):  # noqa: B905 - numba knows no `strict`
         if not wanted[i]:
             continue
         for k in range(3):
             r0, r1, r2 = rotations[geom, 3 * k], rotations[geom, 3 * k + 1], rotations[geom, 3 * k + 2]
-            c, h = shown.centers[g], shown.half_sizes[g]
-            center = positions[geom, k] + (r0 * c[0] + r1 * c[1] + r2 * c[2])
-            half = abs(r0) * h[0] + abs(r1) * h[1] + abs(r2) * h[2]
+            center = positions[geom, k] + (r0 * box[0] + r1 * box[1] + r2 * box[2])
+            half = abs(r0) * box[3] + abs(r1) * box[4] + abs(r2) * box[5]
             low[i, k] = min(low[i, k], center - half)
             high[i, k] = max(high[i, k], center + half)
     return low, high
@@ -261,11 +235,11 @@ def is_blocked(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
     eye: NDArray[np.float64],
-    occluders: Occluders,
+    sight: SightGeometry,
 ) -> bool:
-    """Whether a ray (3,) from the eye enters an occluder before the box from `low` to `high` (3,), m.
+    """Whether a ray (3,) from the eye enters a wall before the box from `low` to `high`, each (3,), m.
 
-    Occluders are taken as a little smaller than they are, and the box as a little larger.
+    Walls are taken as a little smaller than they are, and the box as a little larger.
     """
     reach = 0.0  # share of the ray at which it enters the object's box
     for k in range(3):
@@ -273,22 +247,21 @@ def is_blocked(
             reach = max(reach, (low[k] - MARGIN - eye[k]) / ray[k])
         elif ray[k] < -MARGIN:
             reach = max(reach, (high[k] + MARGIN - eye[k]) / ray[k])
-    for w in range(len(occluders.centers)):
-        entry, leave = -np.inf, reach
+    for w in range(len(sight.wall_centers)):
+        enter, leave = -np.inf, reach
         for k in range(3):
-            axis = occluders.axes[w, :, k]
-            along = ray[0] * axis[0] + ray[1] * axis[1] + ray[2] * axis[2]
-            start = 0.0
+            along = start = 0.0
             for j in range(3):
-                start += (eye[j] - occluders.centers[w, j]) * axis[j]
-            half = occluders.half_sizes[w, k] - MARGIN
+                along += ray[j] * sight.wall_axes[w, j, k]
+                start += (eye[j] - sight.wall_centers[w, j]) * sight.wall_axes[w, j, k]
+            half = sight.wall_half_sizes[w, k] - MARGIN
             if abs(along) > MARGIN:
                 near, far = (-half - start) / along, (half - start) / along
-                entry, leave = max(entry, min(near, far)), min(leave, max(near, far))
+                enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
             elif abs(start) > half:
                 leave = -np.inf
-            if entry >= leave:
+            if enter >= leave:
                 break
-        if 0.0 < entry < leave:
+        if 0.0 < enter < leave:
             return True
     return False

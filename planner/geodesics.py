@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from planner.errors import NotNavigableError, UnreachableError
+from planner.errors import UnreachableError
 from planner.navmesh import TOLERANCE, NavMesh
 from planner.visibility_graph import VisibilityGraph, direct_distances, join, point_vertices
 
@@ -106,10 +106,8 @@ class Geodesics:
             UnreachableError: Two points lie on different islands.
         """
         targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-        row: NDArray[np.float64] = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)[
-            0
-        ]
-        return row
+        between = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)
+        return np.asarray(between[0])
 
     def distances_between(self, sources: ArrayLike, targets: ArrayLike) -> NDArray[np.float64]:
         """Geodesic distances from points (s, 2) to points (t, 2), m; (s, t), m.
@@ -121,25 +119,9 @@ class Geodesics:
         source = self._query(sources)
         return self._between(source, self._query(targets), len(source.points))
 
-    def reachable(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the points (m, 2), m, can be reached from a point (2,), m; (m,) bool."""
-        home = self._island(np.asarray(point, dtype=np.float64))
-        targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-        return np.array([home is not None and self._island(p) == home for p in targets], dtype=np.bool_)
-
     @property
     def _size(self) -> int:
         return len(self._graph.vertices)
-
-    def _island(self, point: NDArray[np.float64]) -> int | None:
-        island = self.navmesh.island_of(point)
-        if island is None:
-            try:
-                self.navmesh.snap(point, self.max_snap)
-            except NotNavigableError:
-                return None
-            return 0
-        return island
 
     def _query(self, points: ArrayLike) -> _Query:
         array = np.array(points, dtype=np.float64).reshape(-1, 2)
@@ -190,7 +172,7 @@ def path_length(points: ArrayLike | Sequence[ArrayLike]) -> float:
 
 def _unreachable(a: NDArray[np.float64], b: NDArray[np.float64]) -> UnreachableError:
     return UnreachableError(
-        f"no way from ({a[0]:.3f}, {a[1]:.3f}) to ({b[0]:.3f}, {b[1]:.3f}): they lie on different islands "
+        f"no path from ({a[0]:.3f}, {a[1]:.3f}) to ({b[0]:.3f}, {b[1]:.3f}): they lie on different islands "
         "of the navmesh; move one, or build the navmesh with a smaller agent_radius"
     )
 
