@@ -49,7 +49,7 @@ TARGETS = (
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Subject:
-    """What is drawn: a scene, views of it, and what the glasses show."""
+    """What is drawn: a scene, views of it, and a HUD state."""
 
     scene: Scene
     data: Any
@@ -98,7 +98,7 @@ def measure() -> dict[str, Any]:
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result for people."""
+    """The result as text."""
     yield f"{result['renderer']}, {result['gl']}; {result['clock']}, {result['views']} views, {result['geoms']} geoms"
     yield f"{'profile':10}{'size':>12}{'ms':>9}{'fps/core':>10}{'raw ms':>9}{'to raw':>8}"
     for row in result["frames"]:
@@ -150,7 +150,7 @@ def measure_profile(subject: Subject, profile: RenderProfile, size: tuple[int, i
     """Milliseconds of a frame with markers, and of raw `mjr_render` at the same drawn size and settings."""
     width, height = size
     poses = subject.poses if profile.name != "quality" else subject.poses[:SLOW_VIEWS]
-    ours: list[float] = []
+    own: list[float] = []
     raw: list[float] = []
     with (
         Renderer(subject.scene.model, width=width, height=height, profile=profile) as renderer,
@@ -164,10 +164,10 @@ def measure_profile(subject: Subject, profile: RenderProfile, size: tuple[int, i
                 )
                 for _ in range(REPEATS[profile.name] + 1)
             ][1:]
-            mine, theirs = np.median(pairs, axis=0)
-            ours.append(float(mine))
-            raw.append(float(theirs))
-    ms, raw_ms = 1e3 * float(np.mean(ours)), 1e3 * float(np.mean(raw))
+            medians = np.median(pairs, axis=0)
+            own.append(float(medians[0]))
+            raw.append(float(medians[1]))
+    ms, raw_ms = 1e3 * float(np.mean(own)), 1e3 * float(np.mean(raw))
     return {
         "profile": profile.name,
         "width": width,
@@ -226,19 +226,19 @@ def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[st
     with buffer_settings(model, (640, 480), samples=4, shadow_size=4096), off_screen():
         default = mujoco.Renderer(model, 480, 640)
     option = mujoco.MjvOption()
-    theirs: list[float] = []
-    ours: list[float] = []
+    defaults: list[float] = []
+    fasts: list[float] = []
     with Renderer(model) as fast:
         for pose in subject.poses[:SLOW_VIEWS]:
             default.update_scene(subject.data, scene_option=option)
             View.of(pose).aim(default.scene)
             default.render()
             fast.rgb(subject.data, pose)
-            theirs.append(timed(subject.clock, default.render))
-            ours.append(min(timed(subject.clock, lambda: fast.rgb(subject.data, pose)) for _ in range(5)))  # noqa: B023
+            defaults.append(timed(subject.clock, default.render))
+            fasts.append(min(timed(subject.clock, lambda: fast.rgb(subject.data, pose)) for _ in range(5)))  # noqa: B023
     default.close()
     model.light_castshadow[:] = authored
-    return {"ms": 1e3 * float(np.mean(theirs)), "fast_ms": 1e3 * float(np.mean(ours))}
+    return {"ms": 1e3 * float(np.mean(defaults)), "fast_ms": 1e3 * float(np.mean(fasts))}
 
 
 def measure_hud(subject: Subject, trial: TrialConfig = SESSION) -> dict[str, Any]:

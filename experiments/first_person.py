@@ -84,14 +84,14 @@ class FirstPersonRenderer:
 class Filming:
     """A viewer of a session that writes every frame to a video."""
 
-    def __init__(self, glasses: FirstPersonRenderer, video: VideoWriter) -> None:
-        self._glasses = glasses
+    def __init__(self, renderer: FirstPersonRenderer, video: VideoWriter) -> None:
+        self._renderer = renderer
         self._video = video
 
     def camera(self, world: World) -> CameraView:
         """The eye camera."""
-        return self._glasses.camera_view(world.data)
+        return self._renderer.camera_view(world.data)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - all is in the world
         """Film one frame."""
-        self._video.write(self._glasses.frame(world.data, hud_state))
+        self._video.write(self._renderer.frame(world.data, hud_state))

@@ -26,18 +26,16 @@ from mjsim.world import World
 
 Image = NDArray[np.uint8]
 
-APPROACHING = (
-    2.3,
-    3.3,
-)  # m to an object: nearer ones lie below the view of somebody who looks straight ahead
-AT_A_BIN = (0.0, 2.2)  # m to the middle of a bin
-SETTLED = 1.0  # s; what lies near the start is not approached yet
+# Distances to an object, m: nearer ones lie below the view of somebody who looks straight ahead.
+APPROACHING = (2.3, 3.3)
+AT_A_BIN = (0.0, 2.2)  # distances to the middle of a bin, m
+MIN_WALK = 1.0  # s; before that, objects near the start have not been approached
 FACING = math.radians(20.0)
-PATIENCE = 240.0  # s of simulated time until every moment must have come
+MAX_TIME = 240.0  # simulated time within which every picture must have been taken, s
 
 
 @dataclass(frozen=True, eq=False)
-class Now:
+class Snapshot:
     """A moment of a trial.
 
     Attributes:
@@ -66,81 +64,81 @@ class Now:
         return visible_objects(self.world.scene, self.world.data, seen.eye, seen.heading, seen.pitch)
 
 
-Moment = Callable[[Now], bool]
+Trigger = Callable[[Snapshot], bool]
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture of a trial, taken when its moment has come.
+    """One picture of a trial, taken at the first snapshot that triggers it.
 
     Attributes:
         name: Of the picture.
         trial: The trial.
-        moment: Whether to take it now.
+        trigger: Whether to take it at a snapshot.
     """
 
     name: str
     trial: TrialConfig
-    moment: Moment
+    trigger: Trigger
 
 
 class _Done(Exception):  # noqa: N818 - ends a session early, which is no error
     """All pictures are taken."""
 
 
-class _Photographer:
-    """A viewer that takes pictures when their moments come."""
+class _ShotTaker:
+    """A viewer that takes pictures when they are due."""
 
     def __init__(
-        self, glasses: FirstPersonRenderer, shots: Sequence[Shot], targets: Mapping[str, NDArray[np.float64]]
+        self, renderer: FirstPersonRenderer, shots: Sequence[Shot], targets: Mapping[str, NDArray[np.float64]]
     ) -> None:
-        self._glasses = glasses
-        self._due = list(shots)
+        self._renderer = renderer
+        self._open = list(shots)
         self._targets = targets
         self.taken: dict[str, Image] = {}
 
     def camera(self, world: World) -> CameraView:
         """The eye camera."""
-        return self._glasses.camera_view(world.data)
+        return self._renderer.camera_view(world.data)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Take the pictures whose moment this is."""
-        now = Now(world, observation, self._targets)
-        come = [shot for shot in self._due if shot.moment(now)]
-        if come:
-            frame = self._glasses.frame(world.data, hud_state)
-            self.taken |= {shot.name: frame for shot in come}
-            self._due = [shot for shot in self._due if shot not in come]
-        if not self._due:
+        """Take the pictures that are due."""
+        snapshot = Snapshot(world, observation, self._targets)
+        due = [shot for shot in self._open if shot.trigger(snapshot)]
+        if due:
+            frame = self._renderer.frame(world.data, hud_state)
+            self.taken |= {shot.name: frame for shot in due}
+            self._open = [shot for shot in self._open if shot not in due]
+        if not self._open:
             raise _Done
 
 
-def after(seconds: float) -> Moment:
+def after(seconds: float) -> Trigger:
     """The first moment from a simulated time on, s."""
-    return lambda now: now.observation.time >= seconds
+    return lambda snapshot: snapshot.observation.time >= seconds
 
 
-def approaching(now: Now) -> bool:
+def approaching(snapshot: Snapshot) -> bool:
     """Hands not full, and an object in view ahead."""
-    seen = now.observation
-    if len(seen.carried) > 1 or seen.busy or seen.time < SETTLED:
+    seen = snapshot.observation
+    if len(seen.carried) > 1 or seen.busy or seen.time < MIN_WALK:
         return False
     places = dict(zip(seen.object_names, seen.object_positions, strict=True))
-    near = [n for n in seen.names_with(ObjectStatus.LOOSE) if now.ahead(places[n], APPROACHING)]
-    return bool(near) and not set(near).isdisjoint(now.visible())
+    near = [n for n in seen.names_with(ObjectStatus.LOOSE) if snapshot.ahead(places[n], APPROACHING)]
+    return bool(near) and not set(near).isdisjoint(snapshot.visible())
 
 
-def carrying_two(now: Now) -> bool:
+def carrying_two(snapshot: Snapshot) -> bool:
     """Both hands full, on the way."""
-    return len(now.observation.carried) == 2 and not now.observation.busy and now.walking()
+    return len(snapshot.observation.carried) == 2 and not snapshot.observation.busy and snapshot.walking()
 
 
-def at_a_bin(now: Now) -> bool:
+def at_a_bin(snapshot: Snapshot) -> bool:
     """The bin of something carried is close ahead."""
-    return any(now.ahead(now.targets[name], AT_A_BIN) for name in now.observation.carried)
+    return any(snapshot.ahead(snapshot.targets[name], AT_A_BIN) for name in snapshot.observation.carried)
 
 
-SITUATIONS: Mapping[str, tuple[str, Moment]] = {
+SITUATIONS: Mapping[str, tuple[str, Trigger]] = {
     "start": ("At the start", after(0.4)),
     "object": ("Approaching an object", approaching),
     "carrying": ("Carrying two", carrying_two),
@@ -155,7 +153,7 @@ def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
         Frames by the names of the shots, uint8 RGB, shape (height, width, 3).
 
     Raises:
-        RecordError: A moment did not come within four simulated minutes.
+        RecordError: A picture was not due within four simulated minutes.
         ExperimentError, MjsimError: A trial cannot be run, or nothing can be rendered.
     """
     taken: dict[str, Image] = {}
@@ -164,18 +162,18 @@ def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
         scene = compose(house.sample_episode(objects=trial.objects, seed=trial.seed), house.catalogue)
         mine = [shot for shot in shots if shot.trial == trial]
         targets = {name: house.receptacles[key].center for name, key in scene.episode.targets.items()}
-        with FirstPersonRenderer(scene, house, film) as glasses:
-            photographer = _Photographer(glasses, mine, targets)
-            patient = dataclasses.replace(trial, time_limit=PATIENCE)
-            session, _ = prepare_session(patient, house, scene, EventLog(), photographer)
+        with FirstPersonRenderer(scene, house, film) as renderer:
+            taker = _ShotTaker(renderer, mine, targets)
+            timed = dataclasses.replace(trial, time_limit=MAX_TIME)
+            session, _ = prepare_session(timed, house, scene, EventLog(), taker)
             with contextlib.suppress(_Done):
                 session.run()
-        missing = [shot.name for shot in mine if shot.name not in photographer.taken]
+        missing = [shot.name for shot in mine if shot.name not in taker.taken]
         if missing:
             raise RecordError(
-                f"the moments of {missing} did not come within {PATIENCE:g} s; take another seed"
+                f"no moment for the pictures {missing} came within {MAX_TIME:g} s; take another seed"
             )
-        taken |= photographer.taken
+        taken |= taker.taken
     return taken
 
 

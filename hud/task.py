@@ -1,8 +1,8 @@
 """TaskView: what an assistance condition knows of the task, as one value."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from hud.state import Message, Vec3
 
 Status = Literal["loose", "carried", "delivered"]
 StepKind = Literal["pick", "place"]
+_Value = TypeVar("_Value")
 
 
 class PlannedStep(NamedTuple):
@@ -148,10 +149,7 @@ class TaskView:
         Raises:
             TaskViewError: There is none.
         """
-        found = next((o for o in self.objects if o.name == name), None)
-        if found is None:
-            raise TaskViewError(f"no object {name!r}; there are {[o.name for o in self.objects]}")
-        return found
+        return _named("object", {o.name: o for o in self.objects}, name)
 
     def receptacle(self, key: str) -> TaskReceptacle:
         """The receptacle called `key`.
@@ -159,10 +157,13 @@ class TaskView:
         Raises:
             TaskViewError: There is none.
         """
-        found = next((r for r in self.receptacles if r.key == key), None)
-        if found is None:
-            raise TaskViewError(f"no receptacle {key!r}; there are {[r.key for r in self.receptacles]}")
-        return found
+        return _named("receptacle", {r.key: r for r in self.receptacles}, key)
+
+
+def _named(what: str, values: Mapping[str, _Value], name: str) -> _Value:
+    if name not in values:
+        raise TaskViewError(f"no {what} {name!r}; there are {list(values)}")
+    return values[name]
 
 
 def _check_path(path: NDArray[np.float64]) -> None:

@@ -1,4 +1,4 @@
-"""What drawing the HUD costs in a real session: every state that the glasses go through in one trial is drawn in turn.
+"""What drawing the HUD costs in a real session: every HUD state of one trial is drawn in turn.
 
 python -m experiments.examples.hud_speed --assistance optimal --objects 6
 """
@@ -25,13 +25,12 @@ from mjsim.render.cameras import camera_pose
 from mjsim.world import World
 
 SIZE = (640, 480)
-COLD = (
-    16 << 20
-)  # bytes written between two frames, as rendering does, so that no cache still holds the panels
+# Bytes written between two frames, as rendering does, so that no processor cache still holds the panels.
+BETWEEN_FRAMES = 16 << 20
 
 
 class _Recorder:
-    """A viewer that keeps what the glasses are to show, and draws nothing."""
+    """A viewer that keeps the HUD states and draws nothing."""
 
     def __init__(self) -> None:
         self.states: list[HudState] = []
@@ -70,7 +69,7 @@ def hud_milliseconds(
         clock: Counts seconds.
     """
     frame = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
-    elsewhere = np.zeros(COLD, np.uint8)
+    elsewhere = np.zeros(BETWEEN_FRAMES, np.uint8)
     times = np.empty(len(states))
     for i, state in enumerate(states):
         elsewhere += 1

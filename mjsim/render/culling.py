@@ -1,4 +1,4 @@
-"""Leaving out geoms that a view cannot show: most of a house lies behind the eye or beside the view.
+"""View culling: leaving out geoms behind the eye or beside the view, which most of a house is.
 
 The rasteriser submits every geom of the scene, and on a CPU transforming their vertices costs more than the
 pixels do. Leaving those out does not change a frame as long as nothing casts shadows or is mirrored into it.

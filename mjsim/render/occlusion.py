@@ -1,7 +1,7 @@
-"""Leaving out geoms that stand wholly behind one wall: in a house of rooms, most of what the view points at.
+"""Occlusion culling: leaving out geoms that stand wholly behind one wall, as most do in a house of rooms.
 
-Each large opaque box in view is taken for the rectangle through its middle. What lies wholly in the shadow that
-this rectangle throws from the eye cannot leave a trace in the frame, because the box covers it.
+Each large opaque box in view is replaced by the rectangle through its middle. A geom that lies wholly in the shadow of
+this rectangle, with the eye as the light, cannot be seen, because the box covers it.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ _MARGIN = 0.01
 
 
 class BoxOccluders:
-    """The large boxes of a model.
+    """The large boxes of a model, which may hide other geoms.
 
     Args:
         model: Compiled model.
@@ -71,47 +71,47 @@ class BoxOccluders:
     def _shadows(
         self, view: View, aspect: float, positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Inward normals (k, 5, 3) and distances from the eye (k, 5) of the planes around each shadow."""
+        """Inward normals (k, 5, 3) and distances from the eye, m, (k, 5), of the planes around each box's shadow.
+
+        Four planes run from the eye through the edges of the rectangle; the fifth is the rectangle's own.
+        """
         ids, rows = self._ids, np.arange(len(self._ids))
-        rotation = rotations.transpose(0, 2, 1)  # rows are the box's axes
+        axes = rotations.transpose(0, 2, 1)  # rows are the box's axes
         size = self._model.geom_size[ids]
         one, two = (self._thin + 1) % 3, (self._thin + 2) % 3
-        centre = positions - view.position
-        normal = rotation[rows, self._thin]
-        across, along = (
-            rotation[rows, one] * size[rows, one, None],
-            rotation[rows, two] * size[rows, two, None],
-        )
+        centre, normal = positions - view.position, axes[rows, self._thin]
+        across, along = axes[rows, one] * size[rows, one, None], axes[rows, two] * size[rows, two, None]
         ahead = np.einsum("ij,ij->i", normal, centre)
         # Nearer than this, the near plane could cut a hole into the box.
         clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
         usable = (np.abs(ahead) - size[rows, self._thin] > clear) & _opaque(self._model, ids)
-        looks = (
-            size[rows, one]
-            * size[rows, two]
-            * np.abs(ahead)
-            / np.maximum(np.linalg.norm(centre, axis=1), 1e-6) ** 3
-        )
+        distance = np.maximum(np.linalg.norm(centre, axis=1), 1e-6)
+        looks = size[rows, one] * size[rows, two] * np.abs(ahead) / distance**3
         chosen = np.argsort(-np.where(usable, looks, 0.0), kind="stable")[:_TESTED]
         chosen = chosen[usable[chosen]]
-        centre, across, along = centre[chosen], across[chosen], along[chosen]
-        corners = np.stack(
-            [
-                centre + across + along,
-                centre - across + along,
-                centre - across - along,
-                centre + across - along,
-            ],
-            axis=1,
-        )
-        sides = np.cross(corners, np.roll(corners, -1, axis=1))
-        sides /= np.linalg.norm(sides, axis=2, keepdims=True)
-        sides *= np.sign(np.einsum("kij,kj->ki", sides, centre))[..., None]
+        sides = _side_planes(centre[chosen], across[chosen], along[chosen])
         away = normal[chosen] * np.sign(ahead[chosen])[:, None]
         planes = np.concatenate([sides, away[:, None]], axis=1)
         offsets = np.zeros(planes.shape[:2])
         offsets[:, 4] = np.abs(ahead[chosen])
         return planes, offsets
+
+
+def _side_planes(
+    centre: NDArray[np.float64], across: NDArray[np.float64], along: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Inward unit normals (k, 4, 3) of the planes through the eye and the edges of rectangles.
+
+    Args:
+        centre: Of the rectangles, seen from the eye, m, shape (k, 3).
+        across: From the centre to the middle of one edge, m, shape (k, 3).
+        along: From the centre to the middle of the next edge, m, shape (k, 3).
+    """
+    one, other = centre + across, centre - across
+    corners = np.stack([one + along, other + along, other - along, one - along], axis=1)
+    sides = np.cross(corners, np.roll(corners, -1, axis=1))
+    sides /= np.linalg.norm(sides, axis=2, keepdims=True)
+    return np.asarray(sides * np.sign(np.einsum("kij,kj->ki", sides, centre))[..., None])
 
 
 def _inside(
