@@ -1,4 +1,4 @@
-"""Writing files whole or not at all."""
+"""Atomic writing of files: complete, or not at all."""
 
 import os
 import tempfile

@@ -1,23 +1,21 @@
-"""The person's body: two slides and a yaw for walking, a pitching head with the eye, two welding hands.
+"""The person's body: two slides and a yaw joint for walking, a head that pitches, and two hands that hold by welds.
 
-Contact bits (the only place where they are decided). A pair meets when contype of one shares a bit with
-conaffinity of the other:
+Contact bits are set here only. Two geoms collide when contype of one shares a bit with conaffinity of the other:
 
-    geoms                     contype   conaffinity   meets
+    geoms                     contype   conaffinity   collides with
     static (MuJoCo default)   1         1             objects, trunk
     objects (set here)        4         1 | 4         static, objects, foot
     avatar trunk              0         1             static
     avatar foot               0         4             objects
     hands                     0         0             nothing
 
-Joint coordinates are body-frame or house-frame positions themselves: every joint's `ref` is where its body
-starts, so `qpos` of `avatar/x` is the person's x in the house, and that of `avatar/left/z` the hand's height.
+Each joint's `ref` is the start position of its body, so joint coordinates are positions: `qpos` of `avatar/x` is the
+person's x in the house, m, and `qpos` of `avatar/left/z` is the height of the left hand, m.
 """
 
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -29,9 +27,9 @@ STATIC_BIT = 1
 OBJECT_BIT = 4
 
 PREFIX = "avatar/"
-BASE = "avatar/base"  # walks; does not turn
-SOLE = "avatar/sole"  # pushes objects; fixed to the base
-BODY = "avatar/body"  # turns on the base, and carries head and hands
+BASE = "avatar/base"  # slides along x and y
+SOLE = "avatar/sole"  # fixed to the base; collides with objects
+BODY = "avatar/body"  # yaws on the base; parent of head and hands
 HEAD = "avatar/head"
 EYE = "avatar/eye"
 TRUNK = "avatar/trunk"
@@ -41,11 +39,11 @@ GRIPS = (0, 1)
 GENTLE, FIRM = "gentle", "firm"  # how a hand holds
 
 TRUNK_RADIUS = 0.20
-SIDES = 64  # of trunk and foot
-# The foot's time constant, s, damping ratio and impedance. With a low impedance the force is that of so many weights
-# of the thing, whatever is behind it: who pinches it against a wall steps over it. With high damping it is the force
-# of being run into, not of standing in it: a pinched thing does not push the person away, and nothing is flung out.
-_YIELDING = (0.1, 3.0, 0.2)
+SIDES = 64  # of the prisms of trunk and foot
+# Contact of the foot: time constant, s, damping ratio and impedance. The low impedance limits the force to a multiple
+# of the object's weight, so that a person steps over an object which a wall holds back. The high damping ties the
+# force to speed, so that such an object neither pushes the person away nor flies off.
+_FOOT_CONTACT = (0.1, 3.0, 0.2)
 EYE_HEIGHT = 1.60
 EYE_FORWARD = 0.06
 FIELD_OF_VIEW = 70.0  # vertical, degrees
@@ -60,25 +58,15 @@ HAND_KP = 2000.0
 HAND_KV = 130.0
 HAND_FORCE = 80.0
 
-# Kind of weld -> time constant, s, torque scale, and least and most impedance. A gentle one turns a fallen thing
-# upright within the lift, slowly enough that it kicks nothing beside it. A firm one stretches by less than 2 mm and
-# twists by less than 2 degrees even where a load brushes a door frame at walking speed.
+# Kind of weld -> time constant, s, torque scale, minimum and maximum impedance. A gentle weld turns a fallen object
+# upright during the lift without kicking its neighbours. A firm weld stretches by less than 2 mm and twists by less
+# than 2 degrees even when the object brushes a door frame at walking speed.
 WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
 
 _TORQUESCALE = 10  # index in a weld's data
 _VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
 _GLOVE = (0.93, 0.74, 0.22, 1.0)
 _SLEEVE = (0.24, 0.34, 0.47, 1.0)
-
-
-@dataclass(frozen=True)
-class _Slide:
-    """A slide joint with its servo: names, axis, where it starts and how far it goes (m)."""
-
-    name: str
-    axis: tuple[float, float, float]
-    start: float
-    range: tuple[float, float]
 
 
 def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
@@ -89,11 +77,11 @@ def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
 def posture(hand: int, place: tuple[float, float, float]) -> tuple[float, float, float]:
     """A posture such as `CARRY` for hand 0 (left) or 1 (right): x, y, z in the body frame, m."""
     forward, side, up = place
-    return (forward, side if hand == 0 else -side, up)
+    return forward, side if hand == 0 else -side, up
 
 
 def eye_position(x: float, y: float, heading: float, pitch: float) -> tuple[float, float, float]:
-    """Where the eye is in the house, m, of a person at x, y, m, who looks along a heading and a pitch, rad."""
+    """Eye position in the house, m, of a person at (x, y), m, with this heading and head pitch, rad."""
     out = EYE_FORWARD * math.cos(pitch)
     height = EYE_HEIGHT + EYE_FORWARD * math.sin(pitch)
     return x + out * math.cos(heading), y + out * math.sin(heading), height
@@ -102,7 +90,7 @@ def eye_position(x: float, y: float, heading: float, pitch: float) -> tuple[floa
 def attach_avatar(
     spec: mujoco.MjSpec, object_names: Sequence[str], *, start: tuple[float, float, float]
 ) -> None:
-    """Add the person to a house with its objects, and the pool of welds with which hands hold objects.
+    """Add the person, and inactive welds between each hand and each object.
 
     Args:
         spec: House with objects attached under `<instance>/`; modified in place.
@@ -153,7 +141,7 @@ def _set_inertia(
 
 def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
     x, y, heading = start
-    # The colliders sit on a base that does not turn: a contact a little off the axis would spin the body.
+    # The base does not turn, because a contact off its axis would spin the body.
     base = spec.worldbody.add_body(name=BASE, pos=[x, y, 0.0])
     _set_inertia(base, 60.0, (8.0, 8.0, 1.5), (0.0, 0.0, 0.9))
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -174,9 +162,9 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
         solimp=[0.98, 0.995, 0.001, 0.5, 2],
         **_prism(spec, TRUNK, 0.84),
     )
-    # Yielding, and lower than any carried object: light things are pushed along the floor, never launched. It reaches
-    # below the floor, so that it meets flat things with its side and never treads on them.
-    # A body of its own, since it never meets the house: what a body might meet is decided body by body.
+    # Soft, and lower than any carried object: it pushes light objects along the floor without launching them. It
+    # reaches below the floor, so that it touches flat objects with its side and never stands on them.
+    # It has its own body because the broad phase filters by body, and the foot never collides with the house.
     sole = base.add_body(name=SOLE)
     sole.fuse = 0
     _set_inertia(sole, 0.0, (0.0, 0.0, 0.0))
@@ -186,8 +174,8 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
         conaffinity=OBJECT_BIT,
         condim=3,
         priority=1,
-        solref=list(_YIELDING[:2]),
-        solimp=[_YIELDING[2], _YIELDING[2], 0.001, 0.5, 2.0],
+        solref=list(_FOOT_CONTACT[:2]),
+        solimp=[_FOOT_CONTACT[2], _FOOT_CONTACT[2], 0.001, 0.5, 2.0],
         friction=[0.3, 0.005, 0.0001],
         **_prism(spec, FOOT, 0.48),
     )
@@ -195,10 +183,10 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
 
 
 def _prism(spec: mujoco.MjSpec, name: str, half_height: float) -> dict[str, Any]:
-    """What makes a geom an upright prism of `SIDES` sides, as good as round.
+    """Arguments of a geom that is an upright prism of `SIDES` sides, nearly a cylinder.
 
-    MuJoCo's own cylinders meet edges with wrong normals: where a round side touches the edge of a box, the contact
-    may point along either face of it (`multiccd`, 3.17). Meshes meet everything as they should.
+    Cylinders of MuJoCo 3.17 (`multiccd`) have wrong contact normals where the round side touches the edge of a box;
+    meshes do not.
     """
     angles = np.arange(SIDES) * (2.0 * math.pi / SIDES)
     ring = TRUNK_RADIUS * np.column_stack((np.cos(angles), np.sin(angles)))
@@ -208,16 +196,17 @@ def _prism(spec: mujoco.MjSpec, name: str, half_height: float) -> dict[str, Any]
 
 
 def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, force: float) -> None:
-    """A servo: velocity where kp is 0, else position with damping.
+    """A velocity servo if kp is 0, else a position servo with damping.
 
-    Its activation is what it is told, its control how fast that changes: several steps of the physics follow a ramp.
+    The activation is the target and the control its rate of change, so that the target follows a ramp over the physics
+    steps of one control step.
     """
     spec.add_actuator(
         name=PREFIX + joint,
         target=PREFIX + joint,
         trntype=mujoco.mjtTrn.mjTRN_JOINT,
         dyntype=mujoco.mjtDyn.mjDYN_INTEGRATOR,
-        actearly=True,  # the first step follows the ramp as the others do
+        actearly=True,  # the ramp begins with the first physics step
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         gainprm=[kp or kv] + [0.0] * 9,
@@ -262,7 +251,7 @@ def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, 
 
 
 def _draw_hand(node: Any, hand: str, side: float) -> None:
-    """A cleaning glove that holds from above, and a sleeve; visual only, shown in first person."""
+    """A cleaning glove and a sleeve, shown in first person only; they collide with nothing."""
 
     def capsule(name: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
         node.add_geom(
@@ -293,12 +282,12 @@ def _draw_hand(node: Any, hand: str, side: float) -> None:
 
 
 def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
-    """The pool of inactive site-to-site welds: every hand, object, grip and kind. Inactive ones cost nothing."""
+    """An inactive site-to-site weld for each hand, object, grip site and kind; inactive welds cost no time."""
     for name, grip in itertools.product(object_names, GRIPS):
         site = f"{name}/grip_{grip}"
         if spec.site(site) is None:
             raise AssetError(f"object '{name}' has no site '{site}'; see docs/models.md, 'An object'")
-        for hand, (kind, (time, torque, least, most)) in itertools.product(HANDS, WELDS.items()):
+        for hand, (kind, (time, torque, low, high)) in itertools.product(HANDS, WELDS.items()):
             weld = spec.add_equality(
                 name=grip_name(hand, name, grip, kind),
                 type=mujoco.mjtEq.mjEQ_WELD,
@@ -307,6 +296,6 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
                 name2=site,
                 active=False,
                 solref=[time, 1.0],
-                solimp=[least, most, 0.001, 0.5, 2.0],
+                solimp=[low, high, 0.001, 0.5, 2.0],
             )
             weld.data[_TORQUESCALE] = torque

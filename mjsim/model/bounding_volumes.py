@@ -1,8 +1,8 @@
-"""Better bounding volumes of the house than the compiler makes: half the box tests when something moves through it.
+"""Tighter bounding volume hierarchies for the house: half as many box tests in collision detection and ray casts.
 
-MuJoCo halves the sorted geoms of a body again and again. In a house that mixes table legs with walls and floors, and
-the halves overlap. Here the tree is built anew from the same leaves by the surface area heuristic (MacDonald and Booth,
-1990). Which geoms meet, and what a ray hits, stays as it is.
+MuJoCo's compiler splits the sorted geoms of a body in half, level by level. In a house this groups table legs with
+walls and floors, and the boxes overlap. Here the tree is rebuilt over the same leaves with the surface area heuristic
+(MacDonald and Booth, 1990). Contacts and ray hits do not change.
 """
 
 import math
@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
 
-_FEW = 16  # leaves that are not worth it
+_MIN_LEAVES = 16
 
 
 def tighten(model: mujoco.MjModel) -> None:
     """Rebuild the bounding volume hierarchies of static bodies, in place."""
     for body in np.flatnonzero(model.body_weldid == 0).tolist():
         first, count = int(model.body_bvhadr[body]), int(model.body_bvhnum[body])
-        if count < 2 * _FEW:
+        if count < 2 * _MIN_LEAVES:
             continue
         nodes = slice(first, first + count)
         leaves = first + np.flatnonzero(model.bvh_nodeid[nodes] >= 0)
@@ -42,15 +42,15 @@ def tighten(model: mujoco.MjModel) -> None:
 def surface_area_tree(
     low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """A binary tree over boxes that puts together what is small together.
+    """A binary tree over boxes, split where the surface area heuristic is lowest.
 
     Args:
         low: Lowest corners, (n, 3).
         high: Highest corners, (n, 3).
 
     Returns:
-        Per node its box as centre and half size (2n - 1, 6), its children or -1 (2n - 1, 2), the box that it holds
-        or -1 (2n - 1,), and its depth (2n - 1,). Node 0 is the root.
+        Per node: its box as centre and half size, shape (2n - 1, 6); its children or -1, (2n - 1, 2); the index of the
+        box if it is a leaf, else -1, (2n - 1,); and its depth, (2n - 1,). Node 0 is the root.
     """
     count = len(low)
     total = 2 * count - 1
@@ -87,7 +87,7 @@ def surface_area_tree(
 def _split(
     low: NDArray[np.float64], high: NDArray[np.float64], order: NDArray[np.int64], begin: int, end: int
 ) -> int:
-    """Sort order[begin:end] so that the best cut is between two of them; returns where."""
+    """Sort order[begin:end] along the best axis and return the index of the best cut."""
     count = end - begin
     best, best_cut = math.inf, begin + count // 2
     members = order[begin:end].copy()
@@ -110,7 +110,7 @@ def _split(
 def _areas(
     low: NDArray[np.float64], high: NDArray[np.float64], ranked: NDArray[np.int64], areas: NDArray[np.float64]
 ) -> None:
-    """Surface of the box around the first k + 1 boxes, halved, for every k."""
+    """Fill `areas` with half the surface area of the box around the first k + 1 boxes, for every k."""
     lx = ly = lz = math.inf
     hx = hy = hz = -math.inf
     for k in range(len(ranked)):

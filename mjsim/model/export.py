@@ -17,16 +17,15 @@ ASSETS = "assets"
 def export_house(scene: Scene, path: Path) -> None:
     """Write the scene as a self-contained model whose `qpos0` is the scene's.
 
-    Meshes and textures are copied into the folder `assets` beside the file, under names that say their content,
-    and are referred to by relative paths, so that the folder can be moved. The XML file is written last, whole
-    or not at all.
+    Meshes and textures are copied into the folder `assets` beside the file, named by their content, and referred to by
+    relative paths, so that the folder can be moved. The XML file is written last, atomically.
 
     Args:
         scene: What to export: the disorganized house, with the person if it has one.
         path: Where the XML file goes, ending in `.xml`.
 
     Raises:
-        AssetError: The path has another ending, or an asset file cannot be read any more.
+        AssetError: The path does not end in `.xml`, or an asset file is gone.
     """
     if path.suffix != ".xml":
         raise AssetError(f"cannot export to {path}: MuJoCo reads models from files that end in .xml")
@@ -61,7 +60,7 @@ def _copy_asset(source: Path, folder: Path) -> str:
 
 
 def _sharpen_poses(root: ET.Element, model: mujoco.MjModel) -> None:
-    """Give what `qpos0` is made of all its digits; MuJoCo writes six."""
+    """Write the poses that `qpos0` comes from with all digits; MuJoCo writes six."""
     world = root.find("worldbody")
     for body in [] if world is None else _top_level_bodies(world):
         if body.find("joint") is not None or body.find("freejoint") is not None:

@@ -9,8 +9,6 @@ import mujoco
 
 from mjsim.errors import AssetError
 
-_ASSET_FOLDERS = ("meshdir", "texturedir", "assetdir")
-
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
     """Read a model, with its asset files named absolutely, since attaching mixes folders.
@@ -40,29 +38,42 @@ def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
 def content_hash(text: str, models: Iterable[Path]) -> str:
     """64 hex digits over a text and the bytes of MJCF files, with every file that they include or refer to.
 
-    A file that cannot be read or parsed counts as it is: reading the model reports what is wrong with it.
+    A file that is missing or cannot be parsed is no error here: reading the model reports it.
     """
-    digest = hashlib.sha256(text.encode())
-    files = {file for model in models for file in (model, *_references(model, model.parent))}
-    for content in sorted(hashlib.sha256(file.read_bytes()).digest() for file in files):
-        digest.update(content)
-    return digest.hexdigest()
+    files: dict[str, bytes] = {}
+    for model in models:
+        elements = list(_elements(str(model), str(model.parent), files))
+        settings = {name: value for e in elements if e.tag == "compiler" for name, value in e.items()}
+        for element in elements:
+            for name in [name for name in element.attrib if name.startswith("file")]:
+                kind = "texturedir" if element.tag == "texture" else "meshdir"
+                folder = settings.get(kind, settings.get("assetdir", ""))
+                _read(f"{model.parent}/{folder}/{element.get(name)}", files)
+    digests = sorted(hashlib.sha256(content).digest() for content in files.values())
+    return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
 
 
-def _references(path: Path, folder: Path) -> Iterator[Path]:
-    """Existing files that an MJCF file names, included files first; `folder` is that of the outermost file."""
+def _elements(path: str, folder: str, files: dict[str, bytes]) -> Iterator[ET.Element]:
+    """All elements of an MJCF file in a folder and of the files that it includes; adds these to `files`."""
+    if path in files or not _read(path, files):
+        return
     try:
-        root = ET.fromstring(path.read_bytes())
+        root = ET.fromstring(files[path])
     except ET.ParseError:
         return
-    for include in root.iter("include"):
-        included = folder / include.get("file", "")
-        if included.is_file() and included != path:
-            yield included
-            yield from _references(included, folder)
-    folders = {"", *(c.get(name, "") for c in root.iter("compiler") for name in _ASSET_FOLDERS)}
-    names = {value for e in root.iter() for name, value in e.attrib.items() if name.startswith("file")}
-    yield from filter(Path.is_file, (folder / sub / name for sub in folders for name in names))
+    for element in root.iter():
+        yield element
+        if element.tag == "include":
+            yield from _elements(f"{folder}/{element.get('file')}", folder, files)
+
+
+def _read(path: str, files: dict[str, bytes]) -> bool:
+    if path not in files:
+        try:
+            files[path] = Path(path).read_bytes()
+        except OSError:
+            return False
+    return True
 
 
 def _absolute(folder: Path, subfolder: str, file: str) -> str:

@@ -1,4 +1,4 @@
-"""Where the receptacles are: the volume that counts as delivered, and the spot to use each from."""
+"""Receptacle geometry: the volume in which an object counts as delivered, and where a person stands to use it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

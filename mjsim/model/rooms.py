@@ -1,4 +1,4 @@
-"""Which room a point on the floor lies in: the semantic locations of the checklist (PAPER section 5)."""
+"""The room that a point on the floor lies in, as the checklist names it (PAPER section 5)."""
 
 import math
 from collections.abc import Mapping
