@@ -49,7 +49,7 @@ class Snapshot:
     targets: Mapping[str, NDArray[np.float64]]
 
     def ahead(self, place: NDArray[np.float64], distance: tuple[float, float]) -> bool:
-        """Whether the person faces a place within a range of distances, m."""
+        """Whether the person faces a place, m, shape (2,) or (3,), within a range of distances, m."""
         offset = place[:2] - self.observation.position
         turn = math.remainder(math.atan2(offset[1], offset[0]) - self.observation.heading, math.tau)
         return distance[0] < float(np.hypot(*offset)) < distance[1] and abs(turn) < FACING
@@ -188,7 +188,7 @@ def contact_sheet(
         width: Of one picture on the sheet, px.
 
     Returns:
-        RGB, uint8.
+        RGB, uint8, shape (height, width, 3).
     """
     margin, caption = width // 40, width // 12
     height = round(width * 3 / 4)

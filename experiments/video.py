@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from experiments.errors import RecordError
 
-Frame = NDArray[np.uint8]
-QUEUE_LENGTH = 8  # frames; enough to even out the two sides, little enough to hold no memory
+Image = NDArray[np.uint8]
+QUEUE_LENGTH = 8  # frames; enough that neither thread waits often, few enough to take little memory
 
 
 class VideoWriter:
@@ -36,7 +36,7 @@ class VideoWriter:
         self._path = path
         self._shape = (height, width, 3)
         self._fps = fps
-        self._queue: queue.Queue[Frame | None] = queue.Queue(QUEUE_LENGTH)
+        self._queue: queue.Queue[Image | None] = queue.Queue(QUEUE_LENGTH)
         self._hash = hashlib.sha256()
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._encode, name="video", daemon=True)
@@ -47,15 +47,23 @@ class VideoWriter:
         """Hash of the frames that the encoder has taken, pixel for pixel; of all of them once closed."""
         return self._hash.hexdigest()
 
-    def write(self, frame: Frame) -> None:
-        """Append a frame, uint8 RGB of shape (height, width, 3); the caller must not change it afterwards."""
+    def write(self, frame: Image) -> None:
+        """Append a frame, uint8 RGB of shape (height, width, 3); the caller must not change it afterwards.
+
+        Raises:
+            RecordError: The frame has another shape, or the encoder failed.
+        """
         if frame.shape != self._shape:
             raise RecordError(f"frame of shape {frame.shape} does not fit a video of shape {self._shape}")
         self._raise_failure()
         self._queue.put(frame)
 
     def close(self) -> None:
-        """Encode what is queued and finish the file."""
+        """Encode what is queued and finish the file.
+
+        Raises:
+            RecordError: The encoder failed.
+        """
         self._queue.put(None)
         self._thread.join()
         self._raise_failure()

@@ -1,1 +1,1 @@
-"""What the person sees through the glasses: assistance conditions, HUD state and its drawing."""
+"""The heads-up display: assistance conditions, the HUD state that they make, and its drawing."""

@@ -80,7 +80,7 @@ def hud_milliseconds(
 
 
 def summary(times: NDArray[np.float64]) -> dict[str, float]:
-    """Mean, median, 99th percentile and the most of the frames after the first, and the first one, ms."""
+    """Mean, median, 99th percentile and maximum of times (frames,), ms, without the first; and the first, ms."""
     later = times[1:]
     return {
         "frames": len(times),
