@@ -65,7 +65,7 @@ class Labels:
         return np.asarray(self.category_of_instance[self.instance_of_geom[segmentation]])
 
     def pixel_counts(self, segmentation: NDArray[np.int32]) -> dict[str, int]:
-        """How many pixels of geom ids of any shape each instance has, by its name; instances without any are left out."""
+        """Pixels of each instance by its name, from geom ids of any shape; instances without any are left out."""
         seen = self.instance_of_geom[segmentation].ravel()
         counts = np.bincount(seen[seen >= 0], minlength=len(self.instances))
         return {name: int(count) for name, count in zip(self.instances, counts, strict=True) if count}
