@@ -8,7 +8,7 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -19,7 +19,6 @@ from platformdirs import user_cache_path
 F = TypeVar("F", bound=Callable[..., Any])
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("mjsim", "planner", "experiments")
 MARK = b"@kernel\n"
 UNUSED = 30 * 24 * 3600  # s after which machine code that no process has asked for is deleted
 
@@ -31,14 +30,14 @@ def kernel(function: F) -> F:
 
     Where no cache folder is writable (no home, a full disk), each process compiles anew.
     """
-    folder, chosen = cache_folder(), numba.config.CACHE_DIR
+    folder, chosen = cache_folder(Path(function.__code__.co_filename)), numba.config.CACHE_DIR
     if folder is not None:
         numba.config.CACHE_DIR = str(
             folder
-        )  # read when decorating; other people's kernels keep their own folder
+        )  # read when decorating; other packages' kernels keep their folder
         try:
             return cast(F, numba.njit(cache=True, nogil=True)(function))
-        except RuntimeError:  # how numba says that it cannot cache, for a function without a file, say
+        except RuntimeError:  # how numba says that it cannot cache
             pass
         finally:
             numba.config.CACHE_DIR = chosen
@@ -46,19 +45,19 @@ def kernel(function: F) -> F:
 
 
 @cache
-def cache_folder() -> Path | None:
-    """Folder for the machine code of the present sources, None where none is writable.
+def cache_folder(source: Path) -> Path | None:
+    """Folder for the machine code of a module's kernels, None where none is writable.
 
     It lies in `NUMBA_CACHE_DIR` where that is set, else in the user's cache folder. Its name holds a hash of all
-    sources with kernels: numba itself notices a change in a kernel's own file only, not in the kernels that it calls.
+    that is compiled in: numba itself notices a change in a kernel's own file only, not in the kernels that it calls.
     """
     chosen = numba.config.CACHE_DIR
     base = Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
     digest = hashlib.sha256()
-    for path in sorted(set(_kernel_sources())):
-        digest.update(path.read_bytes())
-    folder = base / f"mjsim-kernels-{digest.hexdigest()[:16]}"
     try:
+        for path in sorted(_compiled_in(source)):
+            digest.update(path.read_bytes())
+        folder = base / f"mjsim-{source.stem}-{digest.hexdigest()[:16]}"
         if not folder.is_dir():
             _delete_unused(base)
             folder.mkdir(parents=True, exist_ok=True)
@@ -68,22 +67,27 @@ def cache_folder() -> Path | None:
     return folder
 
 
-def _kernel_sources() -> Iterator[Path]:
-    """Modules with kernels, and those whose constants these import: numba compiles constants in."""
-    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
-        source = path.read_bytes()
-        if MARK not in source:
-            continue
-        yield path
-        for module, imported in _IMPORT.findall(source.decode()):
+def _compiled_in(source: Path) -> set[Path]:
+    """The module, the modules whose kernels or constants it imports, and those that they import."""
+    found, new = set(), {source}
+    while new:
+        path = new.pop()
+        found.add(path)
+        for module, imported in _IMPORT.findall(path.read_text(encoding="utf-8")):
             folder, names = ROOT.joinpath(*module.split(".")), re.findall(r"\w+", imported)
-            used = [folder / f"{name}.py" for name in names]  # a module whose constants are used by its name
-            if any(name.isupper() for name in names):
-                used.append(folder.with_suffix(".py"))
-            yield from filter(Path.is_file, used)
+            used = {folder / f"{name}.py" for name in names}
+            if any(name.isupper() for name in names) or _has_kernels(folder.with_suffix(".py")):
+                used.add(folder.with_suffix(".py"))
+            new |= {other for other in used if other.is_file()} - found
+    return found
+
+
+@cache
+def _has_kernels(path: Path) -> bool:
+    return path.is_file() and MARK in path.read_bytes()
 
 
 def _delete_unused(base: Path) -> None:
-    for folder in base.glob("mjsim-kernels-*"):
+    for folder in base.glob("mjsim-*"):
         if time.time() - folder.stat().st_mtime > UNUSED:
             shutil.rmtree(folder, ignore_errors=True)
