@@ -11,7 +11,7 @@ from experiments.house import House
 from hud.messages import fade, message
 from hud.projection import CameraView
 from hud.state import Message
-from hud.task import Alternative, PlannedStep, StepKind, TaskObject, TaskReceptacle, TaskView
+from hud.task import Alternative, StepKind, TaskObject, TaskReceptacle, TaskStep, TaskView
 from mjsim.episode import Episode
 from mjsim.observation import Observation
 from planner.plan import VisitKind
@@ -52,14 +52,14 @@ class TaskBoard:
         self._house = house
         self._episode = episode
         self._order = tuple(order)
-        self._done: list[tuple[StepKind, str]] = []
+        self._done: list[TaskStep] = []
         self._latest = _Said("started", -math.inf)
         self._replanned_at: float | None = None
         self._receptacles = tuple(self._task_receptacle(key) for key in episode.receptacles)
 
     def did(self, kind: StepKind, object_name: str) -> None:
         """Note a feasible visit."""
-        self._done.append((kind, object_name))
+        self._done.append(TaskStep(kind, object_name))
 
     def say(self, key: str, time: float, object_name: str | None = None) -> None:
         """Show a message about an event or refusal from `time` s on; it replaces the one before."""
@@ -96,7 +96,7 @@ class TaskBoard:
             order=self._order,
             hands=observation.hands,
             steps_done=tuple(self._done),
-            plan=tuple(PlannedStep(kind, name) for kind, name in plan),
+            plan=tuple(TaskStep(kind, name) for kind, name in plan),
             path=path,
             goal=self._goal(observation, *plan[0]) if plan else None,
             position=(float(observation.position[0]), float(observation.position[1])),

@@ -16,8 +16,8 @@ StepKind = Literal["pick", "place"]
 _Value = TypeVar("_Value")
 
 
-class PlannedStep(NamedTuple):
-    """A step of the plan: pick an object up, or place it into its receptacle."""
+class TaskStep(NamedTuple):
+    """A step of the task: pick an object up, or place it into its receptacle."""
 
     kind: StepKind
     object: str
@@ -108,8 +108,8 @@ class TaskView:
     receptacles: tuple[TaskReceptacle, ...]
     order: tuple[str, ...]
     hands: tuple[str | None, str | None] = (None, None)
-    steps_done: tuple[tuple[StepKind, str], ...] = ()
-    plan: tuple[PlannedStep, ...] = ()
+    steps_done: tuple[TaskStep, ...] = ()
+    plan: tuple[TaskStep, ...] = ()
     path: NDArray[np.float64] | None = None
     goal: Vec3 | None = None
     position: tuple[float, float] = (0.0, 0.0)

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from hud.projection import CameraView
 from hud.state import Message
-from hud.task import PlannedStep, Status, TaskObject, TaskReceptacle, TaskView
+from hud.task import Status, TaskObject, TaskReceptacle, TaskStep, TaskView
 
 EYE = (0.0, 0.0, 1.6)
 ROOMS = ("Kitchen", "Living room", "Bedroom", "Office", "Hallway")
@@ -71,10 +71,10 @@ def task(
         clock: Elapsed time, s.
     """
     things = objects(count)
-    plan: list[PlannedStep] = []
+    plan: list[TaskStep] = []
     for i in range(0, count, 2):
         pair = [o.name for o in things[i : i + 2]]
-        plan += [PlannedStep("pick", n) for n in pair] + [PlannedStep("place", n) for n in pair]
+        plan += [TaskStep("pick", n) for n in pair] + [TaskStep("place", n) for n in pair]
     done, left = plan[:steps], tuple(plan[steps:])
     things = tuple(_with_status(o, done) for o in things)
     carried = [o.name for o in things if o.status == "carried"]
@@ -128,11 +128,11 @@ def backdrop(width: int, height: int) -> NDArray[np.uint8]:
     return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
 
 
-def _with_status(thing: TaskObject, done: list[PlannedStep]) -> TaskObject:
+def _with_status(thing: TaskObject, done: list[TaskStep]) -> TaskObject:
     status: Status = "loose"
-    if PlannedStep("place", thing.name) in done:
+    if TaskStep("place", thing.name) in done:
         status = "delivered"
-    elif PlannedStep("pick", thing.name) in done:
+    elif TaskStep("pick", thing.name) in done:
         status = "carried"
     return TaskObject(**{**vars(thing), "status": status})
 

@@ -24,7 +24,7 @@ from hud.messages import message
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView, in_view
 from hud.state import HudState, Marker
-from hud.task import PlannedStep, TaskView
+from hud.task import TaskStep, TaskView
 from mjsim.episode import Episode
 from mjsim.model.scene import Scene, compose
 from mjsim.render import CameraPose, Renderer, render_house_map, render_pictures
@@ -110,7 +110,7 @@ def test_each_condition(studio: Studio, golden_frame: Compare, name: str) -> Non
 def holding(view: TaskView, *held: str) -> TaskView:
     objects = tuple(dataclasses.replace(o, status="carried") if o.name in held else o for o in view.objects)
     hands = (held[0] if held else None, held[1] if len(held) > 1 else None)
-    done = tuple(PlannedStep("pick", name) for name in held)
+    done = tuple(TaskStep("pick", name) for name in held)
     return dataclasses.replace(view, objects=objects, hands=hands, steps_done=done, message=None)
 
 

@@ -12,7 +12,7 @@ from hud.lists import in_sentence
 from hud.markers import flagpoles
 from hud.messages import FADE, SHOWN, TEXTS, fade, message
 from hud.state import ChecklistItem, HudState, MessageKind
-from hud.task import Alternative, PlannedStep, TaskView
+from hud.task import Alternative, TaskStep, TaskView
 
 COUNTS = (6, 12, 18, 24)
 
@@ -151,7 +151,7 @@ def test_optimal_numbers_the_steps_and_highlights_the_next() -> None:
 
 def test_optimal_keeps_the_order_in_which_steps_were_really_done() -> None:
     view = sample.task(6)
-    deviated = dataclasses.replace(view, steps_done=(PlannedStep("pick", "object_05"),), plan=view.plan[:3])
+    deviated = dataclasses.replace(view, steps_done=(TaskStep("pick", "object_05"),), plan=view.plan[:3])
     assert [r.text for r in shown("optimal", deviated).checklist] == [
         view.object(n).label for n in ("object_05", "object_00", "object_01", "object_00")
     ]
@@ -178,7 +178,7 @@ def test_optimal_points_to_the_goal_only_when_it_is_out_of_view() -> None:
     [
         ({"order": ("object_00",)}, "order"),
         ({"hands": ("ghost", None)}, "ghost"),
-        ({"plan": (PlannedStep("pick", "ghost"),)}, "ghost"),
+        ({"plan": (TaskStep("pick", "ghost"),)}, "ghost"),
         ({"steps_done": (("throw", "object_00"),)}, "throw"),
         ({"receptacles": ()}, "dish_bin"),
         ({"path": np.zeros((2, 3))}, r"\(2, 3\)"),
@@ -341,7 +341,7 @@ def test_a_step_that_was_done_and_can_be_done_again_is_noted_once() -> None:
     """The mug was dropped: picking it up is a step that is done and one that is possible."""
     plain = sample.task(6, steps=1)
     mug = dataclasses.replace(plain.objects[0], status="loose")
-    again = (PlannedStep("pick", plain.objects[1].name), PlannedStep("pick", mug.name))
+    again = (TaskStep("pick", plain.objects[1].name), TaskStep("pick", mug.name))
     view = dataclasses.replace(
         plain, objects=(mug, *plain.objects[1:]), hands=(None, None), plan=again + plain.plan[2:]
     )

@@ -4,7 +4,7 @@ import dataclasses
 
 from hud.lists import random_order
 from hud.state import ChecklistItem, HudState
-from hud.task import Alternative, PlannedStep, TaskView
+from hud.task import Alternative, TaskStep, TaskView
 
 NEGLIGIBLE = 0.01  # m; less is rounding
 
@@ -39,8 +39,8 @@ def _noted(item: ChecklistItem, alternative: Alternative | None) -> ChecklistIte
     return dataclasses.replace(item, detail="\n".join(parts))
 
 
-def _steps(view: TaskView, state: HudState) -> list[PlannedStep]:
+def _steps(view: TaskView, state: HudState) -> list[TaskStep]:
     """The step of each row: one of the plan, or the next one possible with an object."""
     if any(item.number is not None for item in state.checklist):
-        return [PlannedStep(*step) for step in view.steps_done] + list(view.plan)
-    return [PlannedStep("place" if o.status == "carried" else "pick", o.name) for o in random_order(view)]
+        return [*view.steps_done, *view.plan]
+    return [TaskStep("place" if o.status == "carried" else "pick", o.name) for o in random_order(view)]
