@@ -55,7 +55,7 @@ class Snapshot:
         return distance[0] < float(np.hypot(*offset)) < distance[1] and abs(turn) < FACING
 
     def walking(self) -> bool:
-        """Whether the person is on the way."""
+        """Whether the person walks."""
         return float(np.linalg.norm(self.observation.velocity)) > 0.5
 
     def visible(self) -> tuple[str, ...]:
@@ -129,7 +129,7 @@ def approaching(snapshot: Snapshot) -> bool:
 
 
 def carrying_two(snapshot: Snapshot) -> bool:
-    """Both hands full, on the way."""
+    """Both hands full, walking."""
     return len(snapshot.observation.carried) == 2 and not snapshot.observation.busy and snapshot.walking()
 
 

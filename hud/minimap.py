@@ -43,7 +43,7 @@ class Mark:
 def draw_base(
     stencils: Stencils, rect: Rect, picture_key: str, bounds: tuple[float, float, float, float]
 ) -> Patch:
-    """The panel with the house in it, in muted colours, so that what is drawn on top stands out for everybody."""
+    """The panel with the house in it, in muted colours, so that the marks on top stand out."""
     canvas = Canvas.panel(stencils, rect)
     area, _ = _map_area(bounds, rect, stencils.unit)
     picture = stencils.pictures.get(picture_key)

@@ -85,13 +85,17 @@ def in_view(camera: CameraView, point: Vec3, margin: float = 0.0) -> bool:
     pixels, _ = project(camera, [point])
     x, y = pixels[0]
     inset = margin * camera.height
-    return bool(
-        inset <= x <= camera.width - inset and inset <= y <= camera.height - inset
-    )  # NaN compares false
+    # NaN, behind the eye, compares false.
+    return bool(inset <= x <= camera.width - inset and inset <= y <= camera.height - inset)
 
 
 def pointer_to(camera: CameraView, target: Vec3, margin: float = 0.02) -> Pointer | None:
-    """Where on the edge of the view to point so that turning that way brings `target` into view.
+    """A pointer at the edge of the view; turning that way brings a target into view.
+
+    Args:
+        camera: The eye camera.
+        target: House frame, m.
+        margin: Share of the image's height from its edge within which the target counts as out of view.
 
     Returns:
         None when the target is in view already.
@@ -100,6 +104,6 @@ def pointer_to(camera: CameraView, target: Vec3, margin: float = 0.02) -> Pointe
         return None
     right, up, forward = (float(v) for v in camera.to_eye(target))
     if forward <= 0.0:
-        # Behind: people turn about the vertical, so say left or right and nothing of up or down.
+        # Behind: people turn about the vertical, so point left or right.
         return Pointer(angle=0.0 if right >= 0.0 else math.pi)
     return Pointer(angle=math.atan2(up, right))

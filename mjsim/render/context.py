@@ -24,7 +24,7 @@ EGL_REMEDY = (
     "`mjsim doctor` shows what is there"
 )
 TIMEOUT_VARIABLE = "MJSIM_GL_TIMEOUT"
-START_LIMIT = 60.0  # s; the slowest drivers take a few
+MAX_START_TIME = 60.0  # s; the slowest drivers take a few
 _BACKENDS = ("egl", "osmesa", "glfw", "cgl")
 _MAIN_THREAD_ONLY = ("glfw", "cgl")
 _DISABLED = ("disable", "disabled", "off", "false", "0")
@@ -33,7 +33,7 @@ _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshade
 
 @dataclass(frozen=True)
 class GlInfo:
-    """What draws.
+    """The OpenGL driver in use.
 
     Attributes:
         vendor: GL_VENDOR.
@@ -107,7 +107,7 @@ class _ProcessContext:
                     self.release(key)
                 self._gl.free()
             else:
-                self._gl._context = None  # went with the display; the finalizer would destroy it once more
+                self._gl._context = None  # gone with the display; the finalizer would destroy it again
             self._gl = None
 
     def _display_lives(self) -> bool:
@@ -152,12 +152,12 @@ class _ProcessContext:
 def _start() -> tuple[ModuleType, Any]:
     """The backend and a new context of it, or an error when the driver gives no answer in time.
 
-    A driver that hangs cannot be interrupted, so it is asked in a thread that is left behind when it does.
+    A driver that hangs cannot be interrupted, so it is started in a thread, which is abandoned if it hangs.
     """
     limit = _time_limit()
     answers: queue.SimpleQueue[tuple[ModuleType, Any] | RenderError] = queue.SimpleQueue()
 
-    def ask() -> None:
+    def start() -> None:
         try:
             module = _backend()
             answers.put((module, module.GLContext(1, 1)))
@@ -167,9 +167,9 @@ def _start() -> tuple[ModuleType, Any]:
             answers.put(RenderError(f"no OpenGL context ({error}); {EGL_REMEDY}"))
 
     if os.environ.get("MUJOCO_GL", "").lower().strip() in _MAIN_THREAD_ONLY:
-        ask()
+        start()
     else:
-        threading.Thread(target=ask, name="gl-start", daemon=True).start()
+        threading.Thread(target=start, name="gl-start", daemon=True).start()
     try:
         answer = answers.get(timeout=limit)
     except queue.Empty:
@@ -185,7 +185,7 @@ def _start() -> tuple[ModuleType, Any]:
 def _time_limit() -> float:
     text = os.environ.get(TIMEOUT_VARIABLE, "")
     try:
-        limit = float(text) if text else START_LIMIT
+        limit = float(text) if text else MAX_START_TIME
     except ValueError:
         limit = 0.0
     if not 0.0 < limit < float("inf"):
@@ -214,7 +214,7 @@ release = _PROCESS.release
 def gl_info() -> GlInfo:
     """Vendor, renderer and version of the OpenGL that draws in this process.
 
-    A missing GPU driver falls back to software without a word, so records of a run should keep this.
+    A missing GPU driver falls back to software silently, so records of a run should keep this.
 
     Raises:
         RenderError: No OpenGL context can be made.

@@ -13,7 +13,7 @@ from mjsim.model.scene import Scene
 BACKGROUND = -1
 HOUSE, PERSON, RECEPTACLE = "house", "person", "receptacle"
 _PERSON_ROOT = "avatar/base"
-# Poses of the same geom by two ways of composing, m.
+# How far apart the same geom may lie in two compositions, m.
 _SAME = 1e-6
 
 

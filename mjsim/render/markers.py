@@ -121,7 +121,7 @@ def in_view(view: View, aspect: float, markers: Sequence[MarkerLike]) -> list[Ma
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
     if not markers:
         return []
-    for marker in markers:  # also those that are not drawn, so that a mistake shows wherever one looks
+    for marker in markers:  # also those out of view, so that a mistake is found in every view
         _numbers(marker, "rgba", 4)
     centres = np.array([_numbers(marker, "position", 3) for marker in markers])
     radii = np.array([np.linalg.norm(geom_size(marker)) for marker in markers])

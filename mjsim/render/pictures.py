@@ -19,7 +19,7 @@ from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, DirectionalLight, Raste
 SUPERSAMPLING = 3
 # Share of the picture's side that its subject fills.
 FILL = 0.92
-# Seen from the front right, where the near side of a receptacle faces -y; flat things from higher up.
+# Seen from the front right, where the near side of a receptacle faces -y; flat objects from higher up.
 _AZIMUTH = np.deg2rad(28.0)
 _ELEVATION = np.deg2rad(32.0)
 _ELEVATION_FLAT = np.deg2rad(52.0)

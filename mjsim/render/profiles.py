@@ -17,7 +17,7 @@ class RenderProfile:
         reflections: Whether reflective materials mirror the scene.
         skybox: Whether the model's skybox shows where nothing else does.
         textures: Whether materials show their textures.
-        contact_shadows: Whether loose things near the floor get a dark spot under them; for where there are no
+        contact_shadows: Whether free objects near the floor get a dark spot under them; for profiles without
             shadow maps.
     """
 

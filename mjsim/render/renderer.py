@@ -87,7 +87,7 @@ class Renderer:
         Args:
             data: State of the renderer's model.
             camera: A camera of the model, or a pose.
-            markers: World-locked objects to draw; the scene hides them as it would hide real ones.
+            markers: World-locked objects to draw; the scene hides them as it hides real ones, except for `x_ray` ones.
 
         Raises:
             RenderError: Unknown camera, unusable marker, foreign data, or the renderer is closed.

@@ -1,7 +1,7 @@
 """Golden frames: exact on a driver that is known, close on any other.
 
-Beside `name.png` lies `name.json`: the SHA-256 of the frame for each driver on which somebody looked at it and found it
-right. On such a driver every pixel must be the same. On another the frame must come within a PSNR of the picture.
+Beside `name.png` lies `name.json`: the SHA-256 of the frame for each driver on which it was looked at and accepted. On
+such a driver every pixel must be the same. On another the frame must come within a PSNR of the picture.
 """
 
 import hashlib
@@ -23,7 +23,7 @@ from mjsim.render import gl_info
 
 UPDATE_VARIABLE = "MJSIM_UPDATE_GOLDEN"
 CLOSE_ENOUGH = 45.0  # dB
-_GAIN = 4  # of the difference image, so that few levels can be seen
+_GAIN = 4  # of the difference image, so that small differences can be seen
 
 Image = NDArray[np.uint8]
 
@@ -40,7 +40,7 @@ class Comparison:
         exact: Every pixel is the same.
         known_driver: A hash is stored for this driver.
         psnr: Peak signal-to-noise ratio, dB; inf where exact.
-        updated: The golden frame was written anew.
+        updated: The frame was stored as the golden one.
     """
 
     exact: bool
@@ -173,7 +173,7 @@ def _store(frame: Image, path: Path, key: str) -> None:
 def _read(path: Path) -> Image:
     image = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
     if image is None:
-        raise FrameMismatchError(f"{path} is no picture; store it anew with {UPDATE_VARIABLE}=1")
+        raise FrameMismatchError(f"{path} is no picture; store it again with {UPDATE_VARIABLE}=1")
     return np.asarray(image, dtype=np.uint8)
 
 
