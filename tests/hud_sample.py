@@ -70,23 +70,23 @@ def task(
         message: For the message bar.
         clock: Elapsed time, s.
     """
-    things = objects(count)
+    items = objects(count)
     plan: list[TaskStep] = []
     for i in range(0, count, 2):
-        pair = [o.name for o in things[i : i + 2]]
+        pair = [o.name for o in items[i : i + 2]]
         plan += [TaskStep("pick", n) for n in pair] + [TaskStep("place", n) for n in pair]
     done, left = plan[:steps], tuple(plan[steps:])
-    things = tuple(_with_status(o, done) for o in things)
-    carried = [o.name for o in things if o.status == "carried"]
+    items = tuple(_with_status(o, done) for o in items)
+    carried = [o.name for o in items if o.status == "carried"]
     goal = None
     if left:
-        ahead = next(o for o in things if o.name == left[0].object)
+        ahead = next(o for o in items if o.name == left[0].object)
         bins = {r.key: r for r in receptacles()}
         goal = ahead.position if left[0].kind == "pick" else bins[ahead.receptacle].position
     return TaskView(
-        objects=things,
+        objects=items,
         receptacles=receptacles(),
-        order=tuple(o.name for o in sorted(things, key=lambda o: (int(o.name[-2:]) * 7) % 25)),
+        order=tuple(o.name for o in sorted(items, key=lambda o: (int(o.name[-2:]) * 7) % 25)),
         hands=(carried[0] if carried else None, carried[1] if len(carried) > 1 else None),
         steps_done=tuple(done),
         plan=left,
@@ -128,13 +128,13 @@ def backdrop(width: int, height: int) -> NDArray[np.uint8]:
     return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
 
 
-def _with_status(thing: TaskObject, done: list[TaskStep]) -> TaskObject:
+def _with_status(item: TaskObject, done: list[TaskStep]) -> TaskObject:
     status: Status = "loose"
-    if TaskStep("place", thing.name) in done:
+    if TaskStep("place", item.name) in done:
         status = "delivered"
-    elif TaskStep("pick", thing.name) in done:
+    elif TaskStep("pick", item.name) in done:
         status = "carried"
-    return TaskObject(**{**vars(thing), "status": status})
+    return TaskObject(**{**vars(item), "status": status})
 
 
 def _box(colour: tuple[int, int, int], size: int) -> NDArray[np.uint8]:

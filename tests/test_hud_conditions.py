@@ -139,14 +139,14 @@ def test_optimal_numbers_the_steps_and_highlights_the_next() -> None:
     assert [r.current for r in rows] == [False] * 3 + [True] + [False] * 8
     steps = (*view.steps_done, *view.plan)
     for row, (kind, name) in zip(rows, steps, strict=True):
-        thing = view.object(name)
-        assert row.text == thing.label and row.picture == thing.picture
+        item = view.object(name)
+        assert row.text == item.label and row.picture == item.picture
         if kind == "pick":
             assert row.detail.startswith("Pick up")
-            assert (thing.room in row.detail) is not row.done
+            assert (item.room in row.detail) is not row.done
         else:
-            assert row.detail.startswith(f"Put in {view.receptacle(thing.receptacle).label}")
-            assert (view.receptacle(thing.receptacle).room in row.detail) is not row.done
+            assert row.detail.startswith(f"Put in {view.receptacle(item.receptacle).label}")
+            assert (view.receptacle(item.receptacle).room in row.detail) is not row.done
 
 
 def test_optimal_keeps_the_order_in_which_steps_were_really_done() -> None:
@@ -370,8 +370,8 @@ def test_an_unknown_option_is_refused_with_the_choices() -> None:
 def test_flags_of_near_objects_are_low() -> None:
     """So that no flag fills the view of somebody who stands before the object."""
     view = sample.task(6)
-    thing = view.objects[0]
-    x, y, _ = thing.position
+    item = view.objects[0]
+    x, y, _ = item.position
 
     def top(distance: float) -> float:
         markers = shown("highlight", dataclasses.replace(view, position=(x + distance, y))).markers

@@ -16,7 +16,7 @@ from mjsim.render.cameras import View
 from mjsim.render.occlusion import BoxOccluders
 from mjsim.render.rasteriser import Rasteriser, reduced
 
-# Seen from the origin along +x: a wall of 2 x 2 m at x = 2 and small things behind it.
+# Seen from the origin along +x: a wall of 2 x 2 m at x = 2 and small objects behind it.
 WALL = """<mujoco>
   <asset><material name="glass" rgba="1 1 1 .3"/></asset>
   <worldbody>
@@ -100,7 +100,7 @@ FLOOR = """<mujoco>
   <visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>
   <worldbody>
     <geom name="floor" type="box" pos="0 0 -.05" size="3 3 .05" rgba=".9 .9 .9 1"/>
-    <body pos="0 0 .1"><freejoint/><geom name="thing" type="box" size=".1 .2 .1"/></body>
+    <body pos="0 0 .1"><freejoint/><geom name="object" type="box" size=".1 .2 .1"/></body>
   </worldbody></mujoco>"""
 ABOVE = CameraPose.looking_at((0, 0, 3), (0, 0, 0), 0.6)
 PLAIN = RenderProfile("plain", skybox=False)
@@ -122,18 +122,18 @@ def darkening(height: float, *, material: str = "shadow_round", turn: float = 0.
     return frames[0].rgb.astype(int).sum(axis=2) - frames[1].rgb.astype(int).sum(axis=2)
 
 
-def test_a_spot_lies_around_a_thing_on_the_floor_and_nowhere_else():
+def test_a_spot_lies_around_an_object_on_the_floor_and_nowhere_else():
     dark = darkening(0.0)
     assert dark.min() == 0
     rows, columns = np.nonzero(dark)
     metres = 3.0 * 2 * math.tan(0.3) / 80
-    assert np.ptp(columns) * metres == pytest.approx(0.3, abs=0.06)  # the thing and 5 cm on either side
+    assert np.ptp(columns) * metres == pytest.approx(0.3, abs=0.06)  # the object and 5 cm on either side
     assert np.ptp(rows) * metres == pytest.approx(0.5, abs=0.06)
     turned = darkening(0.0, turn=math.pi / 2)
     assert np.ptp(np.nonzero(turned)[1]) > 1.3 * np.ptp(np.nonzero(turned)[0])
 
 
-def test_a_spot_fades_as_its_thing_is_lifted():
+def test_a_spot_fades_as_its_object_is_lifted():
     strongest = [darkening(height).max() for height in (0.0, 0.1, 0.2, 0.31)]
     assert strongest[0] > strongest[1] > strongest[2] > strongest[3] == 0
 
@@ -170,7 +170,7 @@ def flat_things(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[str, f
 
 
 def test_nothing_flat_on_the_floor_covers_what_lies_on_it(scene):
-    """A plate's bottom is 7 mm up. Rugs, drawn shadows and the spots under things all stay below it, on every rug."""
+    """A plate's bottom is 7 mm up. Rugs, drawn shadows and the spots under objects all stay below it, on every rug."""
     model, data = scene.model, mujoco.MjData(scene.model)
     mujoco.mj_kinematics(model, data)
     flat = flat_things(model, data)
