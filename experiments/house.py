@@ -1,12 +1,12 @@
-"""A house made ready once and used for many episodes: catalogue, navmesh, geodesics, rooms, receptacles."""
+"""A house prepared once and used for many episodes: catalogue, navmesh, geodesics, rooms, receptacles."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from experiments.known_house import KnownHouse, spread_viewpoints
 from mjsim.episode import Episode
 from mjsim.model.avatar import TRUNK_RADIUS
 from mjsim.model.catalogue import Catalogue
@@ -17,17 +17,17 @@ from mjsim.model.sampling import sample_episode
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
-VIEWPOINT_SPACING = 2.2  # m; from each one sees what lies within it in spite of furniture
+VIEWPOINT_SPACING = 2.2  # m; from a viewpoint one sees what lies within it in spite of furniture
 VIEWPOINT_CANDIDATES = 3000
 
 
 @dataclass(frozen=True, eq=False)
 class House:
-    """Everything about a house that no episode changes.
+    """What no episode of a house changes. Participants know it from the familiarisation (PAPER section 7).
 
     Attributes:
         catalogue: Rooms, categories, receptacles and object models.
-        navmesh: Navigability from the compiled model's own geoms.
+        navmesh: Where a person can walk, by the compiled model's own geoms.
         geodesics: Shortest paths on it, for planning and guidance: a little away from the walls.
         rooms: Which room a point lies in.
         receptacles: Receptacle key -> geometry.
@@ -43,7 +43,7 @@ class House:
 
     @classmethod
     def load(cls, name: str = "apartment") -> "House":
-        """Compile a house and work out where one can walk.
+        """Compile a house and compute where a person can walk.
 
         Args:
             name: Name under `models/houses`, or the path of a `catalogue.toml`.
@@ -52,23 +52,33 @@ class House:
             AssetError: The house cannot be read, or does not compile.
         """
         catalogue = Catalogue.load(name)
-        model = compiled_house(catalogue)
-        floor = model.floor
+        house = compiled_house(catalogue)
+        floor = house.floor
         navmesh = NavMesh.build(floor.obstacles, floor.bounds)
-        return cls(
-            catalogue=catalogue,
-            navmesh=navmesh,
-            geodesics=Geodesics(navmesh),
-            rooms=model.rooms,
-            receptacles=model.receptacles,
-            bounds=floor.bounds,
-        )
+        return cls(catalogue, navmesh, Geodesics(navmesh), house.rooms, house.receptacles, floor.bounds)
 
     @cached_property
     def body_geodesics(self) -> Geodesics:
-        """Shortest paths of somebody who brushes along the walls; no walk is shorter."""
+        """Shortest paths of a person whose trunk touches the walls; no actual walk is shorter."""
         floor = compiled_house(self.catalogue).floor
         return Geodesics(NavMesh.build(floor.obstacles, floor.bounds, agent_radius=TRUNK_RADIUS))
+
+    @cached_property
+    def approaches(self) -> Mapping[str, NDArray[np.float64]]:
+        """Receptacle key -> navigable point from which to use it, m, shape (2,)."""
+        return {key: self.navmesh.snap(r.approach) for key, r in self.receptacles.items()}
+
+    @cached_property
+    def viewpoints(self) -> Mapping[str, NDArray[np.float64]]:
+        """Room key -> places from which the whole room can be seen, m, shape (k, 2)."""
+        # A fixed seed: viewpoints are a property of the house, not of a trial.
+        floor = self.navmesh.sample(np.random.default_rng(0), VIEWPOINT_CANDIDATES)
+        rooms = np.array(self.rooms.keys)[self.rooms.distances(floor).argmin(axis=1)]
+        return {
+            key: _farthest_points(floor[rooms == key], VIEWPOINT_SPACING)
+            for key in self.catalogue.rooms
+            if np.any(rooms == key)
+        }
 
     def sample_episode(self, *, objects: int, seed: int) -> Episode:
         """Sample a disorganized house (PAPER section 4).
@@ -78,24 +88,13 @@ class House:
         """
         return sample_episode(self.catalogue, self.navmesh, objects=objects, seed=seed)
 
-    def known(self) -> KnownHouse:
-        """What somebody knows of this house who was shown around."""
-        return self._known
 
-    @cached_property
-    def _known(self) -> KnownHouse:
-        # A fixed seed: viewpoints are a property of the house, not of a trial.
-        rng = np.random.default_rng(0)
-        floor = self.navmesh.sample(rng, VIEWPOINT_CANDIDATES)
-        rooms = np.array(self.rooms.keys)[self.rooms.distances(floor).argmin(axis=1)]
-        return KnownHouse(
-            navmesh=self.navmesh,
-            geodesics=self.geodesics,
-            bins={key: r.center[:2] for key, r in self.receptacles.items()},
-            approaches={key: self.navmesh.snap(r.approach) for key, r in self.receptacles.items()},
-            viewpoints={
-                key: spread_viewpoints(floor[rooms == key], VIEWPOINT_SPACING)
-                for key in self.catalogue.rooms
-                if np.any(rooms == key)
-            },
-        )
+def _farthest_points(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """Farthest-point sampling of points (m, 2), m >= 1, until all lie within `spacing` m of a chosen one."""
+    chosen = [int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    gap = np.linalg.norm(points - points[chosen[0]], axis=1)
+    while gap.max() > spacing:
+        farthest = int(np.argmax(gap))
+        chosen.append(farthest)
+        gap = np.minimum(gap, np.linalg.norm(points - points[farthest], axis=1))
+    return points[chosen]

@@ -258,9 +258,9 @@ def prepare_session(
     session = Session(
         world,
         assistant,
-        participant(config.user_name)(house.known(), user_rng),
+        participant(config.user_name)(house, user_rng),
         Recording(world, log),
-        walls=house.known().outline,
+        walls=house.navmesh.outline,
         time_limit=config.limit,
         viewer=viewer,
         rollouts=rollouts,

@@ -177,6 +177,7 @@ class NavMesh:
         points = np.concatenate(drawn)
         return points[0] if count is None else points
 
+    @cached_property
     def outline(self) -> NDArray[np.float64]:
         """Edges of the navigable floor: x, y of one end and of the other, m, shape (e, 4).
 

@@ -89,7 +89,7 @@ def test_following_the_breadcrumbs_leads_around_the_walls_to_the_nearest_object(
         EnvironmentOptions(
             objects=2,
             actions=Continuous(repeat=3),
-            observations=(breadcrumb_sensor(house.known()),),
+            observations=(breadcrumb_sensor(house),),
             time_limit=30.0,
             navigable=lambda *_: house.navmesh,
         )

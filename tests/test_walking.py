@@ -36,7 +36,7 @@ NOTHING = Obstacles(np.zeros((0, 3)), np.zeros(0, bool), np.zeros((0, 4)))
 
 
 def floor_of(*obstacles):
-    return NavMesh.build(obstacles, (-10.0, -10.0, 10.0, 10.0)).outline()
+    return NavMesh.build(obstacles, (-10.0, -10.0, 10.0, 10.0)).outline
 
 
 ANYWHERE = floor_of()
@@ -220,7 +220,7 @@ def test_kernels_agree_with_numpy(path, position, heading, things):
         (project(path, *position), nearest_in_numpy(path, there)),
         (point_along(path, 1.234), along_in_numpy(path, 1.234)),
         (
-            follow(path, *position, heading, among(walls.outline(), *things)),
+            follow(path, *position, heading, among(walls.outline, *things)),
             follow_in_numpy(path, there, heading, np.array(things), walls.is_navigable),
         ),
     ):
@@ -248,7 +248,7 @@ def test_the_first_off_path_is_the_first_far_from_the_path(path, positions, gap)
 
 
 def test_the_outline_says_where_one_can_stand(navmesh):
-    walls = navmesh.outline()
+    walls = navmesh.outline
     x_min, y_min, x_max, y_max = navmesh.bounds
     sampled = np.random.default_rng(0).uniform((x_min, y_min), (x_max, y_max), (2000, 2))
     free = [is_free(x, y, walls) for x, y in sampled]

@@ -83,7 +83,7 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
     torch.set_num_threads(1)  # the network is too small for more
     rng = np.random.default_rng(settings.seed)
     house = House.load()
-    sensors = (breadcrumb_sensor(house.known()),) if settings.breadcrumbs else ()
+    sensors = (breadcrumb_sensor(house),) if settings.breadcrumbs else ()
     environment = make_environment(settings.episodes, 30.0, sensors)
     model = PPO(
         "MultiInputPolicy",

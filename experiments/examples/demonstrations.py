@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.known_house import KnownHouse
 from experiments.locomotion import LocomotionController
 from experiments.participants.base import Choice, Guidance, Percept, Point, WalkAlong
 from experiments.participants.nearest import Nearest
@@ -41,13 +40,13 @@ class Demonstrator:
     """A participant who knows the house and where everything is, in one episode of an environment.
 
     Args:
-        known: The house as the participant knows it.
+        house: The house, which the participant knows.
         targets: Object instance name -> receptacle key.
     """
 
-    def __init__(self, known: KnownHouse, targets: Mapping[str, str]) -> None:
-        self._participant = Nearest(known)
-        self._controller = LocomotionController(known.outline)
+    def __init__(self, house: House, targets: Mapping[str, str]) -> None:
+        self._participant = Nearest(house)
+        self._controller = LocomotionController(house.navmesh.outline)
         self._targets = targets
         self.answer: ActionResult | None = None
 
@@ -141,13 +140,12 @@ def demonstrate(
             the learner the states that its own mistakes lead to (DAgger, Ross et al. 2011).
         noise: Standard deviation of what is added to the velocities of the driver, share of the fastest.
     """
-    known = house.known()
     rows: list[ObservationDict] = []
     actions: list[NDArray[np.float32]] = []
     delivered = total = 0
     for seed in seeds:
         seen, _ = core.reset(seed)
-        expert = Demonstrator(known, core.world.scene.episode.targets)
+        expert = Demonstrator(house, core.world.scene.episode.targets)
         over = False
         while not over:
             advice = encode(expert.act(core.state), core.world.options)

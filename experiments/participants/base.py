@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.known_house import KnownHouse
+from experiments.house import House
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult, Pick, Place
 from planner.plan import VisitKind
@@ -217,6 +217,6 @@ class Participant(Protocol):
 class ParticipantFactory(Protocol):
     """Makes a participant for one session; the generator is its only source of chance."""
 
-    def __call__(self, house: KnownHouse, rng: np.random.Generator) -> Participant:
+    def __call__(self, house: House, rng: np.random.Generator) -> Participant:
         """Make a fresh participant that knows `house` from the familiarisation."""
         ...

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.errors import ConfigError
-from experiments.known_house import KnownHouse
+from experiments.house import House
 from experiments.participants.base import (
     WAIT,
     Choice,
@@ -65,7 +65,7 @@ class Boltzmann:
 
     needs: frozenset[str] = frozenset()
 
-    def __init__(self, house: KnownHouse, rng: np.random.Generator, temperature: float) -> None:
+    def __init__(self, house: House, rng: np.random.Generator, temperature: float) -> None:
         self._executor = VisitExecutor(house)
         self._rng = rng
         self._temperature = temperature
@@ -97,12 +97,12 @@ def with_parameter(text: str) -> ParticipantFactory:
     if not 0 <= temperature < math.inf:
         raise ConfigError(f"the temperature of boltzmann must be a number of metres from 0 on, got {text!r}")
 
-    def make(house: KnownHouse, rng: np.random.Generator) -> Participant:
+    def make(house: House, rng: np.random.Generator) -> Participant:
         return Boltzmann(house, rng, temperature)
 
     return make
 
 
-def build(house: KnownHouse, rng: np.random.Generator) -> Participant:
+def build(house: House, rng: np.random.Generator) -> Participant:
     """Make a participant of the usual temperature."""
     return Boltzmann(house, rng, TEMPERATURE)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.known_house import KnownHouse
+from experiments.house import House
 from experiments.participants.base import WAIT, Decision, Participant, Percept
 from experiments.participants.visit_executor import VisitExecutor
 
@@ -12,7 +12,7 @@ class Follower:
 
     needs = frozenset({"goal"})
 
-    def __init__(self, house: KnownHouse) -> None:
+    def __init__(self, house: House) -> None:
         self._executor = VisitExecutor(house)
 
     def act(self, percept: Percept) -> Decision:
@@ -22,6 +22,6 @@ class Follower:
         return self._executor.follow(percept, percept.guidance)
 
 
-def build(house: KnownHouse, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance
+def build(house: House, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance
     """Make a participant that follows the guidance."""
     return Follower(house)

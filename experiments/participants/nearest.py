@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.known_house import KnownHouse
+from experiments.house import House
 from experiments.participants.base import WAIT, Decision, Participant, Percept, Visit
 from experiments.participants.visit_executor import VisitExecutor, nearest_visit
 from planner.plan import VisitKind
@@ -13,7 +13,7 @@ class Nearest:
 
     needs = frozenset({"flagpole"})
 
-    def __init__(self, house: KnownHouse) -> None:
+    def __init__(self, house: House) -> None:
         self._house = house
         self._executor = VisitExecutor(house)
         self._choice: Visit | None = None
@@ -32,6 +32,6 @@ class Nearest:
         return self._executor.act(percept, self._choice, percept.flagpoles)
 
 
-def build(house: KnownHouse, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance
+def build(house: House, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance
     """Make a participant that goes for what is nearest."""
     return Nearest(house)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from experiments.known_house import KnownHouse, Point
+from experiments.house import House
 from experiments.locomotion import TIME_TOLERANCE
-from experiments.participants.base import WAIT, Decision, Participant, Percept, Visit
+from experiments.participants.base import WAIT, Decision, Participant, Percept, Point, Visit
 from experiments.participants.visit_executor import VisitExecutor, estimated_distances, nearest_visit
 from mjsim.actions import IDLE, Move
 from planner.plan import VisitKind
@@ -22,7 +22,7 @@ class Searcher:
 
     needs: frozenset[str] = frozenset()
 
-    def __init__(self, house: KnownHouse, rng: np.random.Generator) -> None:
+    def __init__(self, house: House, rng: np.random.Generator) -> None:
         self._house = house
         self._rng = rng
         self._executor = VisitExecutor(house)
@@ -116,6 +116,6 @@ class Searcher:
         ]
 
 
-def build(house: KnownHouse, rng: np.random.Generator) -> Participant:
+def build(house: House, rng: np.random.Generator) -> Participant:
     """Make a participant that knows the house but not where anything lies."""
     return Searcher(house, rng)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.known_house import KnownHouse
+from experiments.house import House
 from experiments.participants.base import WAIT, Decision, Guidance, Percept, Point, Visit, WalkAlong
 from mjsim.actions import Pick, Place
 from planner.errors import PlannerError
@@ -25,7 +25,7 @@ class VisitExecutor:
         house: What the participant knows of the house.
     """
 
-    def __init__(self, house: KnownHouse) -> None:
+    def __init__(self, house: House) -> None:
         self._house = house
         self._visit: Visit | None = None
         self._stop_distance = STOP_DISTANCE
@@ -80,7 +80,9 @@ class VisitExecutor:
         """The path as it was, or a new one if that leads elsewhere, is blocked, or the person has left it; (k, 2)."""
         path = self._path
         if path is None or percept.blocked or not _same(path[-1], goal) or _is_off(path, percept):
-            self._path = path = np.vstack([self._house.path(percept.position, goal), goal])
+            self._path = path = np.vstack(
+                [self._house.geodesics.shortest_path(percept.position, goal).points, goal]
+            )
         return path
 
     def _find_places(
@@ -97,19 +99,17 @@ class VisitExecutor:
         return goal, stand
 
 
-def places(
-    house: KnownHouse, percept: Percept, visit: Visit, objects: Mapping[str, Point]
-) -> tuple[Point, Point]:
+def places(house: House, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> tuple[Point, Point]:
     """Where a visit's object or receptacle is, and where the path to it ends, m, both of shape (2,)."""
     if visit.kind is VisitKind.PICK:
         goal = objects[visit.object]
-        return goal, house.stand_for_object(goal)
+        return goal, house.navmesh.snap(goal)
     receptacle = percept.targets[visit.object]
-    return house.bins[receptacle], house.approaches[receptacle]
+    return house.receptacles[receptacle].center[:2], house.approaches[receptacle]
 
 
 def nearest_visit(
-    house: KnownHouse, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]
+    house: House, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]
 ) -> Visit:
     """The visit of one or more with the shortest path to it; `objects` says where objects are, m, shape (2,)."""
     stands = [places(house, percept, visit, objects)[1] for visit in visits]
@@ -118,15 +118,15 @@ def nearest_visit(
     return min(ranked, key=lambda pair: (pair[0], pair[1].kind.value, pair[1].object))[1]
 
 
-def estimated_distance(house: KnownHouse, start: Point, goal: Point) -> float:
+def estimated_distance(house: House, start: Point, goal: Point) -> float:
     """Walking distance in m as a person estimates it; very far when there is no path."""
     try:
-        return house.distance(start, goal)
+        return house.geodesics.shortest_path(start, goal).geodesic_distance
     except PlannerError:
         return FAR
 
 
-def estimated_distances(house: KnownHouse, start: Point, goals: Sequence[Point]) -> list[float]:
+def estimated_distances(house: House, start: Point, goals: Sequence[Point]) -> list[float]:
     """Walking distances in m from one point to several, as `estimated_distance`."""
     try:
         return [float(gap) for gap in house.geodesics.distances_from(start, np.array(goals))]

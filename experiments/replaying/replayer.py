@@ -139,7 +139,7 @@ class Replayer:
             self._assistant,
             self._user,
             recording,
-            walls=self.house.known().outline,
+            walls=self.house.navmesh.outline,
             time_limit=float(record.start["time_limit"]),
             viewer=viewer,
         )
