@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from mjsim.episode import CAPACITY, Episode
 from mjsim.observation import ObjectStatus, Observation
 from planner.plan import Status, VisitKind
 from planner.polyline import first_off_path, project, rest_of
-from planner.replanner import Replanner, Stop
+from planner.replanner import Stop
 from planner.route import XY, Route, RouteVisit, TaskState
 
 OFF_THE_PATH = 0.6  # m from the shown path before a new one is shown
@@ -29,6 +30,33 @@ MOVED = 0.25  # m an object may be pushed before the way to it is shown anew
 FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock starts
 
 VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLACE}
+
+
+class RoutePlanner(Protocol):
+    """Keeps the route of a task; the replanners of `planner` do, and a replay with the logged plans.
+
+    Attributes:
+        replans: How often `update` made a new plan because the old one no longer fitted.
+    """
+
+    replans: int
+
+    @property
+    def pending(self) -> bool:
+        """Whether `poll` may have a better route."""
+        ...
+
+    def prepare(self, state: TaskState, *, seconds: float | None = None) -> Route:
+        """Plan before the clock starts, with at most `seconds` of wall time for proofs."""
+        ...
+
+    def update(self, state: TaskState) -> Route:
+        """The route for the task as it is now."""
+        ...
+
+    def poll(self, state: TaskState) -> Route | None:
+        """A better route for the same task, if one was found meanwhile."""
+        ...
 
 
 class Assistant:
@@ -57,7 +85,7 @@ class Assistant:
         episode: Episode,
         *,
         assistance: str,
-        replanner: Replanner,
+        replanner: RoutePlanner,
         order: Sequence[str],
         log: EventLog,
         regrets: Regrets | None = None,

@@ -18,7 +18,7 @@ from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import CameraOptions
 from mjsim.environments.sensors import SENSORS, Sensor, SensorInput, resolve_sensors, unit_spec
 from mjsim.environments.sensors.house import MAP_SIZE, RANGE, RAYS
-from mjsim.environments.sensors.sight import visible_pixels
+from mjsim.environments.sensors.vision import visible_pixels
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
 from planner.navmesh import NavMesh
@@ -286,7 +286,7 @@ def test_pixel_counts_are_those_of_the_segmentation(
 
 
 def test_depth_is_metric(core: Rearrangement, seen: dict[str, NDArray[Any]]) -> None:
-    """The ball's pixels are as far along the line of sight as the ball is."""
+    """The ball's pixels are as far along the line of vision as the ball is."""
     world = core.world
     camera = world.model.camera("avatar/eye").id
     ahead = -world.data.cam_xmat[camera].reshape(3, 3)[:, 2]

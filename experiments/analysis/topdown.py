@@ -1,4 +1,4 @@
-"""The floor plan of a trial from above: rooms, objects, bins, the planned and the walked path."""
+"""Floor plan of a trial: rooms, objects, receptacles, the planned and the walked path."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ from mjsim.model.scene import Scene
 from mjsim.render import render_floorplan
 from mjsim.world import World
 
-# Okabe-Ito colours, told apart in all common kinds of colour vision.
+# Okabe-Ito colours, distinct for all common kinds of colour vision.
 CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
 PLANNED, WALKED = "#D55E00", "#1B1B1B"
 PIXELS_PER_METRE = 80
@@ -32,9 +32,9 @@ def draw_topdown(
     Args:
         path: PNG file to write.
         house: The house.
-        scene: The disorganized house, for what lies where.
-        plan: The first `plan` event.
-        arrays: The trajectory.
+        scene: The composed episode.
+        plan: The first `plan` event of the log.
+        arrays: The trajectory, as `Trajectory.arrays` gives it.
     """
     x_min, y_min, x_max, y_max = house.bounds
     figure = Figure(
@@ -53,16 +53,16 @@ def draw_topdown(
     axes.plot(
         *walked[0], marker="*", markersize=17, color="white", markeredgecolor="black", ls="", label="start"
     )
-    _draw_things(axes, house, scene)
+    _draw_objects(axes, house, scene)
     axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal", xticks=[], yticks=[])
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=5, frameon=False, fontsize=10)
     with replacing(path) as temporary:
-        # Fixed metadata: the same trial gives the same bytes.
+        # Fixed metadata, so that equal trials give equal bytes.
         figure.savefig(temporary, metadata={"Software": "mjsim"})
 
 
 def planned_path(house: House, scene: Scene, plan: Event) -> NDArray[np.float64]:
-    """Floor points of the whole tour that a `plan` event describes, m, shape (k, 2)."""
+    """Floor points of the tour of a `plan` event, m, shape (k, 2)."""
     episode = scene.episode
     places = {o.name: np.array(o.position[:2]) for o in episode.objects}
     here = house.navmesh.snap(np.array([episode.start.x, episode.start.y]))
@@ -95,7 +95,7 @@ def _draw_line(axes: Axes, points: NDArray[np.float64], colour: str, style: str,
     axes.plot(points[:, 0], points[:, 1], color=colour, ls=style, lw=2.2, label=label, path_effects=halo)
 
 
-def _draw_things(axes: Axes, house: House, scene: Scene) -> None:
+def _draw_objects(axes: Axes, house: House, scene: Scene) -> None:
     episode = scene.episode
     for colour, category in zip(CATEGORY_COLOURS, house.catalogue.categories.values(), strict=False):
         places = np.array([o.position[:2] for o in episode.objects if o.category == category.key])

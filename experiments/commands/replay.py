@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from experiments.commands.options import add_command, add_frame, assistance_help, film_config
 from experiments.errors import ConfigError, ReplayError
-from experiments.replaying.overview import CAMERAS, FIRST_PERSON
+from experiments.replaying.external_view import CAMERAS, FIRST_PERSON
 from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
 
 DESCRIPTION = """\

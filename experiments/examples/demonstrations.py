@@ -1,4 +1,4 @@
-"""Demonstrations for imitation: what a built-in participant does, as pairs of observation and action."""
+"""Demonstrations for imitation learning: pairs of an observation and the action of a built-in participant."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -23,12 +23,12 @@ Policy = Callable[[ObservationDict], NDArray[np.float32]]
 
 @dataclass(frozen=True, eq=False)
 class Demonstrations:
-    """What was observed and what the demonstrator would have done, row by row.
+    """Observations, and the action that the expert would have taken in each.
 
     Attributes:
-        observations: Sensor name -> arrays, first axis the row.
-        actions: Actions for continuous control, float32, shape (rows, 4).
-        delivered: Share of all objects that were delivered in the episodes.
+        observations: Sensor name -> array; the first axis counts the samples.
+        actions: Actions for continuous control, float32, shape (samples, 4).
+        delivered: Share of the objects that were delivered.
     """
 
     observations: Mapping[str, NDArray[Any]]
@@ -36,12 +36,15 @@ class Demonstrations:
     delivered: float
 
 
-class Demonstrator:
-    """A participant who knows the house and where everything is, in one episode of an environment.
+class Expert:
+    """The participant that goes to the nearest flagpole, in one episode of an environment.
 
     Args:
         house: The house, which the participant knows.
-        targets: Object instance name -> receptacle key.
+        targets: Object name -> receptacle key.
+
+    Attributes:
+        answer: Result of the last pick or place of the episode; to be set by the caller.
     """
 
     def __init__(self, house: House, targets: Mapping[str, str]) -> None:
@@ -51,7 +54,7 @@ class Demonstrator:
         self.answer: ActionResult | None = None
 
     def act(self, observation: Observation) -> Action:
-        """What it would do now."""
+        """What the participant would do now."""
         decision = self._participant.act(
             Percept(
                 time=observation.time,
@@ -71,7 +74,7 @@ class Demonstrator:
 
 
 class _Flagpoles:
-    """Senses of somebody who sees a flagpole over every misplaced object, and nothing else."""
+    """The senses of a participant who sees a flagpole over every misplaced object, and nothing else."""
 
     def __init__(self, observation: Observation) -> None:
         self._observation = observation
@@ -101,17 +104,17 @@ class _Flagpoles:
 
     def hud(self) -> HudState:
         """Raises `NotImplementedError`."""
-        raise NotImplementedError("this participant sees the flagpoles alone")
+        raise NotImplementedError("this participant sees only the flagpoles")
 
 
 def _without_objects(observation: Observation) -> Observation:
-    """The learner cannot see what lies at its feet, so its teacher walks straight on, too."""
+    """The policy does not observe objects at its feet, so the expert must not walk around them."""
     nothing = np.zeros((0, 3))
     return dataclasses.replace(observation, object_names=(), object_status=(), object_positions=nothing)
 
 
 def encode(action: Action, options: WorldOptions) -> NDArray[np.float32]:
-    """An action of the world as one of continuous control: (forward, left, turn, trigger)."""
+    """An action of the world as an action of continuous control: (forward, left, turn, trigger)."""
     if isinstance(action, Move):
         speed, turn = options.max_speed, options.max_turn
         values = [action.forward / speed, action.left / speed, action.turn / turn, 0.0]
@@ -129,34 +132,34 @@ def demonstrate(
     driver: Policy | None = None,
     noise: float = 0.0,
 ) -> Demonstrations:
-    """Run episodes and write down what the demonstrator would do at every step.
+    """Run episodes and record what the expert would do at every step.
 
     Args:
         core: Environment with continuous control.
-        house: The house it is in.
+        house: The house of the environment.
         seeds: Seeds of the episodes.
-        rng: Chance of the noise.
-        driver: Who acts; None for the demonstrator. Letting the learner act and the demonstrator correct it shows
-            the learner the states that its own mistakes lead to (DAgger, Ross et al. 2011).
-        noise: Standard deviation of what is added to the velocities of the driver, share of the fastest.
+        rng: Draws the noise.
+        driver: The policy that acts; None for the expert. If the policy acts and the expert corrects it, the policy
+            learns from the states that its own mistakes lead to (DAgger, Ross et al. 2011).
+        noise: Standard deviation of what is added to the velocities, as a share of the limits.
     """
     rows: list[ObservationDict] = []
     actions: list[NDArray[np.float32]] = []
     delivered = total = 0
     for seed in seeds:
         seen, _ = core.reset(seed)
-        expert = Demonstrator(house, core.world.scene.episode.targets)
-        over = False
-        while not over:
+        expert = Expert(house, core.world.scene.episode.targets)
+        is_over = False
+        while not is_over:
             advice = encode(expert.act(core.state), core.world.options)
             action = advice if driver is None else driver(seen)
-            if not core.world.busy:  # what is asked of busy hands is ignored, and teaches nothing
+            if not core.world.busy:  # busy hands ignore the action
                 rows.append(seen)
                 actions.append(advice)
             taken = core.step(_noisy(action, noise, rng))
             answers = [s.result for s in taken.steps if s.result is not None]
             expert.answer = answers[-1] if answers else None
-            seen, over = taken.observation, taken.terminated or taken.truncated
+            seen, is_over = taken.observation, taken.terminated or taken.truncated
         delivered += taken.info["delivered"]
         total += taken.info["objects"]
     stacked = {name: np.stack([row[name] for row in rows]) for name in rows[0]}

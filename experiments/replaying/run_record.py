@@ -1,4 +1,4 @@
-"""A run directory read back for a replay, with everything in it checked that needs no physics."""
+"""Reads a run directory for a replay, and checks all that can be checked without physics."""
 
 import hashlib
 import json
@@ -43,25 +43,30 @@ PER_STEP = {
 
 
 @dataclass(frozen=True)
-class Fault:
-    """Something that is not as recorded, and the first control step concerned."""
+class Mismatch:
+    """Something that differs from the record.
+
+    Attributes:
+        step: The first control step that it concerns.
+        message: What differs.
+    """
 
     step: int
-    what: str
+    message: str
 
 
 @dataclass(frozen=True, eq=False)
 class RunRecord:
-    """What a run left behind.
+    """The record of a run.
 
     Attributes:
-        directory: Where it was read from.
-        start: The log's first event: configuration, versions, fingerprints.
-        events: The log up to the first line that cannot be read, each with the control step that wrote it.
+        directory: The run directory.
+        start: The first event of the log: configuration, versions, fingerprints.
+        events: The events up to the first line that cannot be read, each with the control step that logged it.
         episode: The disorganized house.
         arrays: The trajectory.
         recorded: Hashes and checkpoints.
-        fault: The first thing that is wrong without any physics, or None.
+        mismatch: The first mismatch that was found without physics, or None.
     """
 
     directory: Path
@@ -70,11 +75,11 @@ class RunRecord:
     episode: Episode
     arrays: Mapping[str, NDArray[Any]]
     recorded: Recorded
-    fault: Fault | None
+    mismatch: Mismatch | None
 
     @property
     def steps(self) -> int:
-        """Control steps recorded, the final state included."""
+        """Number of recorded control steps, including the final state."""
         return len(self.recorded.state_hash)
 
     @property
@@ -84,22 +89,22 @@ class RunRecord:
         return str(last.get("reason")) if last["event"] == "end" else None
 
     def action(self, step: int) -> Action:
-        """What was done at a control step; raises `RecordError` where that is no action."""
+        """The action of a control step; raises `RecordError` if the row is not an action."""
         names = [o.name for o in self.episode.objects]
         return decode_action(self.arrays["action"][step], [*names, *map(str, self.arrays["unknown_objects"])])
 
     def moves(self, first: int, end: int) -> NDArray[np.float64]:
-        """The moves from control step `first` up to `end` or to the first other action: shape (n, 4)."""
+        """The moves from control step `first` to `end`, or to the first other action; m/s and rad/s, shape (n, 4)."""
         rows = self.arrays["action"][first:end]
         others = np.flatnonzero((rows[:, 0] != 0.0) | ~np.isfinite(rows).all(axis=1))
         return rows[: others[0] if others.size else len(rows), 2:]
 
     def next_event(self, first: int) -> int | None:
-        """The control step from `first` on at which something happened next in the world; None if nothing did."""
+        """The first control step from `first` on that has an event of the world; None if there is none."""
         return next((s for s, e in self.events if s >= first and e["event"] in WORLD_EVENTS), None)
 
     def observation(self, step: int) -> Observation:
-        """What the assistant saw before a control step; eye height and velocity, which it ignores, are nominal."""
+        """The state before a control step; eye height and velocity are nominal, as the assistant ignores them."""
         arrays, names = self.arrays, tuple(o.name for o in self.episode.objects)
         hands = [None if i < 0 else names[i] for i in arrays["hands"][step]]
         return Observation(
@@ -118,18 +123,17 @@ class RunRecord:
         )
 
     def checkpoint_before(self, time: float) -> int | None:
-        """Number of the last checkpoint at or before a time, s, or None where there is none."""
-        steps = self.recorded.checkpoint_step
-        times = self.arrays["time"][steps]
-        return int(np.sum(times <= time + 1e-9)) - 1 if np.any(times <= time + 1e-9) else None
+        """Index of the last checkpoint at or before a time, s, or None."""
+        count = int(np.sum(self.arrays["time"][self.recorded.checkpoint_step] <= time + 1e-9))
+        return count - 1 if count else None
 
 
 def load_run(directory: Path) -> RunRecord:
     """Read a run directory and check lengths and hashes.
 
     Raises:
-        RecordError: It is no run directory.
-        ReplayError: A file of it cannot be read at all, or is of another format version.
+        RecordError: It is not a run directory.
+        ReplayError: A file cannot be read, or has the log format of another version.
     """
     if not (directory / records.EVENTS).is_file():
         raise RecordError(f"{directory} is not a run directory: it has no {records.EVENTS}")
@@ -141,19 +145,19 @@ def load_run(directory: Path) -> RunRecord:
         recorded = Recorded.load(directory / records.RECORDING)
         text = (directory / records.EPISODE).read_text(encoding="utf-8")
         episode = Episode.from_json(text)
-        bad = sorted(
-            n for n, d in {**PER_STEP, "unknown_objects": 1}.items() if n not in arrays or arrays[n].ndim != d
-        )
+        dimensions = {**PER_STEP, "unknown_objects": 1}
+        bad = sorted(n for n, d in dimensions.items() if n not in arrays or arrays[n].ndim != d)
         if bad:
             raise RecordError(f"{records.TRAJECTORY} lacks {', '.join(bad)}, or has them in another shape")
     except (RecordError, EpisodeError, OSError, UnicodeDecodeError) as error:
         raise ReplayError(f"{error}; the first bad step is 0", 0) from error
-    faults = list(_faults(log, arrays, recorded))
+    mismatches = [*_check_arrays(arrays, recorded), *_check_log(log, recorded), *_check_checkpoints(recorded)]
     if hashlib.sha256(text.encode()).hexdigest() != start.get("episode_sha256"):
-        faults.append(Fault(0, f"{records.EPISODE} is not the episode that was run"))
-    first = min(faults, key=lambda fault: fault.step) if faults else None
-    events = tuple(_events(log, recorded.log_size))
-    return RunRecord(directory, start, events, episode, arrays, recorded, first)
+        mismatches.append(Mismatch(0, f"{records.EPISODE} is not the episode that was run"))
+    first = min(mismatches, key=lambda mismatch: mismatch.step, default=None)
+    return RunRecord(
+        directory, start, tuple(_events(log, recorded.log_size)), episode, arrays, recorded, first
+    )
 
 
 def _first_event(log: bytes) -> Event:
@@ -167,22 +171,17 @@ def _first_event(log: bytes) -> Event:
 
 
 def _check_format(directory: Path, start: Event) -> None:
-    found, here = start.get("format"), records.LOG_FORMAT
-    if found == here:
-        return
-    if isinstance(found, int) and found < here:
+    found = start.get("format")
+    if found != records.LOG_FORMAT:
+        version = start.get("versions", {}).get("mjsim", "unknown")
         raise ReplayError(
-            f"{directory} has log format {found}, from before runs recorded state hashes and checkpoints (format "
-            f"{here}), so there is nothing to verify a replay against; run the trial again with this version"
+            f"{directory} has log format {found!r} of mjsim {version}; this version replays format "
+            f"{records.LOG_FORMAT} only: replay it with the version that wrote it, or run the trial again"
         )
-    raise ReplayError(
-        f"{directory} has log format {found!r}; this version replays format {here} only, "
-        f"so use the version that wrote it: {start.get('versions', {}).get('mjsim', 'unknown')}"
-    )
 
 
 def _events(log: bytes, log_size: NDArray[np.int64]) -> Iterator[tuple[int, Event]]:
-    """The events of a log, up to the first line that is none, each with its control step."""
+    """The events up to the first malformed line, each with the control step that logged it."""
     offset = 0
     for line in log.splitlines(keepends=True):
         try:
@@ -195,7 +194,7 @@ def _events(log: bytes, log_size: NDArray[np.int64]) -> Iterator[tuple[int, Even
         offset += len(line)
 
 
-def _faults(log: bytes, arrays: Mapping[str, NDArray[Any]], recorded: Recorded) -> Iterator[Fault]:
+def _check_arrays(arrays: Mapping[str, NDArray[Any]], recorded: Recorded) -> Iterator[Mismatch]:
     steps = len(recorded.state_hash)
     lengths = {f"{records.TRAJECTORY}: {name}": len(arrays[name]) for name in PER_STEP}
     lengths[f"{records.RECORDING}: action_hash"] = len(recorded.action_hash)
@@ -203,49 +202,44 @@ def _faults(log: bytes, arrays: Mapping[str, NDArray[Any]], recorded: Recorded) 
     lengths[f"{records.RECORDING}: log_hash"] = len(recorded.log_hash) - 1
     for name, length in lengths.items():
         if length != steps:
-            yield Fault(
-                max(0, min(length, steps)), f"{name} has {length} steps where the states have {steps}"
-            )
+            step = max(0, min(length, steps))
+            yield Mismatch(step, f"{name} has {length} steps where the states have {steps}")
     actions = arrays["action"][:steps]
     count = min(len(actions), len(recorded.action_hash))
     bad = np.flatnonzero(action_hashes(actions[:count]) != recorded.action_hash[:count])
     if bad.size:
-        yield Fault(int(bad[0]), f"{records.TRAJECTORY}: the action is not the one that was recorded")
-    yield from _log_faults(log, recorded)
-    yield from _checkpoint_faults(recorded, steps)
+        yield Mismatch(int(bad[0]), f"{records.TRAJECTORY}: the action is not the one that was recorded")
 
 
-def _log_faults(log: bytes, recorded: Recorded) -> Iterator[Fault]:
-    """The first step whose share of the log is not what was written."""
-    digest, done = LogDigest(), 0
+def _check_log(log: bytes, recorded: Recorded) -> Iterator[Mismatch]:
+    """The first step whose part of the log is not what was written."""
+    digest, end = LogDigest(), 0
     for step, (size, expected) in enumerate(zip(recorded.log_size.tolist(), recorded.log_hash, strict=False)):
-        before, line = done, log[:done].count(10) + 1
-        if size < done:
-            yield Fault(max(0, step - 1), f"{records.RECORDING}: log_size goes backwards")
+        begin, end, at = end, size, max(0, step - 1)
+        if size < begin:
+            yield Mismatch(at, f"{records.RECORDING}: log_size goes backwards")
             return
-        digest.update(log[done:size])
-        done = size
+        digest.update(log[begin:size])
         if size > len(log):
-            what = f"is cut short: {len(log)} bytes, and more were written here"
-        elif digest.hash != int(expected):
-            last = line + max(0, log[before:size].count(10) - 1)
-            what = f"is not as written, at line {line}" + (f" to {last}" if last > line else "")
-        else:
-            continue
-        yield Fault(max(0, step - 1), f"{records.EVENTS} {what}")
-        return
-    if done != len(log):
-        yield Fault(max(0, len(recorded.log_size) - 2), f"{records.EVENTS} goes on after its end")
+            yield Mismatch(at, f"{records.EVENTS} is cut short: {len(log)} bytes, and more were written here")
+            return
+        if digest.hash != int(expected):
+            first = log[:begin].count(b"\n") + 1
+            last = first + max(0, log[begin:size].count(b"\n") - 1)
+            lines = f"line {first}" + (f" to {last}" if last > first else "")
+            yield Mismatch(at, f"{records.EVENTS} is not as written, at {lines}")
+            return
+    if end != len(log):
+        yield Mismatch(max(0, len(recorded.log_size) - 2), f"{records.EVENTS} goes on after its end")
 
 
-def _checkpoint_faults(recorded: Recorded, steps: int) -> Iterator[Fault]:
+def _check_checkpoints(recorded: Recorded) -> Iterator[Mismatch]:
+    steps, numbers = len(recorded.state_hash), recorded.checkpoint_step.tolist()
     count = {len(getattr(recorded, f"checkpoint_{name}")) for name in ("step", "physics", "details", "hash")}
-    if len(count) > 1 and len(recorded.checkpoint_step):
-        yield Fault(
-            int(recorded.checkpoint_step[min(count)]), f"{records.RECORDING}: checkpoints are missing"
-        )
+    if len(count) > 1 and numbers:
+        yield Mismatch(numbers[min(count)], f"{records.RECORDING}: checkpoints are missing")
         return
-    for number, step in enumerate(recorded.checkpoint_step.tolist()):
+    for number, step in enumerate(numbers):
         if not 0 <= step < steps or not recorded.checkpoint_is_intact(number):
-            bad = max(0, min(step, steps))
-            yield Fault(bad, f"{records.RECORDING}: the checkpoint is not the one that was recorded")
+            what = f"{records.RECORDING}: the checkpoint is not the one that was recorded"
+            yield Mismatch(max(0, min(step, steps)), what)

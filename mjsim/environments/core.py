@@ -15,7 +15,7 @@ from mjsim.environments.errors import EnvironmentStateError
 from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.rewards import RewardFunction
 from mjsim.environments.sensors import Sensor, SensorInput
-from mjsim.environments.sensors.sight import visible_pixels
+from mjsim.environments.sensors.vision import visible_pixels
 from mjsim.errors import PhysicsError, SamplingError
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.world import StepResult, World

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.environments.sensors import house, person, sight, task
+from mjsim.environments.sensors import house, person, task, vision
 from mjsim.environments.sensors.base import IMAGES, Sensor, SensorInput, unit_spec
 
 __all__ = ["BUNDLES", "IMAGES", "SENSORS", "Sensor", "SensorInput", "resolve_sensors", "unit_spec"]
@@ -25,7 +25,7 @@ _VECTORS = (
     task.REMAINING,
     task.TIME_LEFT,
 )
-_OTHERS = (house.MAP, sight.IN_VIEW, sight.RGB, sight.DEPTH, sight.SEGMENTATION, sight.VISIBLE_PIXELS)
+_OTHERS = (house.MAP, vision.IN_VIEW, vision.RGB, vision.DEPTH, vision.SEGMENTATION, vision.VISIBLE_PIXELS)
 
 SENSORS = {sensor.name: sensor for sensor in (*_VECTORS, *_OTHERS)}
 BUNDLES = {"state": _VECTORS}

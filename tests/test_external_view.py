@@ -1,4 +1,4 @@
-"""Looking on from outside: the person is where the observation says, and the whole floor is in view."""
+"""Views from outside: the person is where the observation says, and the whole floor is in view."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.first_person import FilmConfig
-from experiments.replaying.overview import Overview, camera_path
+from experiments.replaying.external_view import ExternalViewer, camera_path
 from mjsim.model.footprint import Footprint
 from mjsim.world import World
 
@@ -61,13 +61,13 @@ class NoMarkers:
 
 
 def test_the_person_is_seen_where_they_are(scene, house_footprint: Footprint):
-    """The coat's colour shows around the projected head and most of what is of that colour is there."""
+    """The body's colour shows around the projected head and most of what is of that colour is there."""
     size, video = (480, 360), Frames()
     path = camera_path("top-down", house_footprint.bounds, size[0] / size[1])
     world = World(scene)
     observation = world.observation()
-    with Overview(scene, FilmConfig(*size, "draft"), path, video) as overview:
-        overview.show(world, observation, NoMarkers())
+    with ExternalViewer(scene, FilmConfig(*size, "draft"), path, video) as viewer:
+        viewer.show(world, observation, NoMarkers())
     frame = video.frames[0].astype(int)
     rows, columns = np.nonzero((frame[..., 0] > 2 * frame[..., 1]) & (frame[..., 2] > 1.5 * frame[..., 1]))
     assert 5 < len(rows) < 400

@@ -1,4 +1,4 @@
-"""Looking on from outside: a run seen from above or from around the house, with the person and the guidance drawn."""
+"""Films a run from outside: from above, or from around the house, with the person and the guidance drawn."""
 
 import math
 from collections.abc import Callable
@@ -24,58 +24,58 @@ CAMERAS = (FIRST_PERSON, TOP_DOWN, FREE)
 CameraPath = Callable[[float], CameraPose]
 Bounds = tuple[float, float, float, float]
 
-_TELE = math.radians(20.0)  # from far away, so that walls hide little of the floor
-_WIDE = math.radians(50.0)
-_MARGIN = 1.12  # the tops of the walls are nearer than the floor
-_LAP = 90.0  # s for once around the house
+_TOP_DOWN_FOV = math.radians(20.0)  # narrow, from far away, so that walls hide little of the floor
+_FREE_FOV = math.radians(50.0)
+_MARGIN = 1.12  # the tops of the walls are nearer to the camera than the floor
+_ORBIT_PERIOD = 90.0  # s
 _ELEVATION = math.radians(52.0)
-_COAT: Rgba = (0.85, 0.10, 0.55, 1.0)  # a colour that nothing in a house has
-_SKIN: Rgba = (0.93, 0.74, 0.22, 1.0)
+_BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # nothing in a house has this colour
+_HEAD_COLOUR: Rgba = (0.93, 0.74, 0.22, 1.0)
 
 
 def camera_path(
     camera: str, bounds: Bounds, aspect: float, eye: Vec3 | None = None, target: Vec3 | None = None
 ) -> CameraPath:
-    """Where a camera other than the person's eye is over time.
+    """Where an external camera is over time.
 
     Args:
         camera: `top-down`, or `free`.
-        bounds: The floor: x_min, y_min, x_max, y_max, m.
-        aspect: Width of the frames over their height.
-        eye: Where a free camera stands, m; None for one that circles the house.
-        target: What a free camera looks at, m; None for the middle of the floor.
+        bounds: Bounds of the floor: x_min, y_min, x_max, y_max, m.
+        aspect: Width of the frames divided by their height.
+        eye: Position of a free camera, m; None for one that circles the house.
+        target: Point that a free camera looks at, m; None for the middle of the floor.
     """
     x_min, y_min, x_max, y_max = bounds
     middle = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0])
     width, depth = x_max - x_min, y_max - y_min
     if camera == TOP_DOWN:
-        height = 0.5 * _MARGIN * max(depth, width / aspect) / math.tan(_TELE / 2)
-        pose = CameraPose.looking_at(middle + np.array([0.0, 0.0, height]), middle, _TELE)
+        height = 0.5 * _MARGIN * max(depth, width / aspect) / math.tan(_TOP_DOWN_FOV / 2)
+        pose = CameraPose.looking_at(middle + np.array([0.0, 0.0, height]), middle, _TOP_DOWN_FOV)
         return lambda _: pose
     aim = middle if target is None else np.array(target)
     if eye is not None:
-        fixed = CameraPose.looking_at(eye, aim, _WIDE)
+        fixed = CameraPose.looking_at(eye, aim, _FREE_FOV)
         return lambda _: fixed
-    # So that a ball around the floor fits.
-    half_angle = math.atan(math.tan(_WIDE / 2) * min(1.0, aspect))
+    # A sphere around the floor fits into the view.
+    half_angle = math.atan(math.tan(_FREE_FOV / 2) * min(1.0, aspect))
     distance = 0.5 * math.hypot(width, depth) / math.sin(half_angle)
 
     def circle(time: float) -> CameraPose:
-        angle = 2.0 * math.pi * time / _LAP - math.pi / 2
+        angle = 2.0 * math.pi * time / _ORBIT_PERIOD - math.pi / 2
         out = math.cos(_ELEVATION)
         offset = np.array([out * math.cos(angle), out * math.sin(angle), math.sin(_ELEVATION)])
-        return CameraPose.looking_at(aim + distance * offset, aim, _WIDE)
+        return CameraPose.looking_at(aim + distance * offset, aim, _FREE_FOV)
 
     return circle
 
 
-class Overview:
+class ExternalViewer:
     """A viewer of a session that films it from outside, without ceilings. Use as a context manager.
 
     Args:
         scene: The scene to render.
         film: Frame size and render profile.
-        camera: Where to look on from.
+        camera: Simulated time -> pose of the camera.
         video: Takes the frames.
 
     Raises:
@@ -89,12 +89,12 @@ class Overview:
         self._camera = camera
         self._video = video
 
-    def camera(self, world: World) -> CameraView | None:  # noqa: ARG002 - nobody sees the HUD itself from outside
-        """None: the HUD is not seen from outside."""
+    def camera(self, world: World) -> CameraView | None:  # noqa: ARG002 - part of the protocol
+        """None, as the HUD is not seen from outside."""
         return None
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Film one frame: house, person, and what the glasses lock to the world."""
+        """Film one frame: house, person, and the world-locked markers of the HUD."""
         markers = [*hud_state.markers, *figure(observation)]
         self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
 
@@ -102,7 +102,7 @@ class Overview:
         """Free the GL context."""
         self._renderer.close()
 
-    def __enter__(self) -> "Overview":
+    def __enter__(self) -> "ExternalViewer":
         return self
 
     def __exit__(
@@ -112,12 +112,14 @@ class Overview:
 
 
 def figure(observation: Observation) -> tuple[Marker, ...]:
-    """The person: body, head, and a nose that shows the heading."""
+    """Markers for the person: body, head, and a nose that shows the heading."""
     x, y = (float(v) for v in observation.position)
     c, s = math.cos(observation.heading), math.sin(observation.heading)
     body = EYE_HEIGHT - 0.25
     return (
-        Marker("cylinder", (x, y, body / 2), (TRUNK_RADIUS, body / 2, 0.0), _COAT, "person", x_ray=True),
-        Marker("sphere", (x, y, EYE_HEIGHT), (0.14, 0.0, 0.0), _SKIN, "person"),
-        Marker("sphere", (x + 0.15 * c, y + 0.15 * s, EYE_HEIGHT), (0.06, 0.0, 0.0), _COAT, "person"),
+        Marker(
+            "cylinder", (x, y, body / 2), (TRUNK_RADIUS, body / 2, 0.0), _BODY_COLOUR, "person", x_ray=True
+        ),
+        Marker("sphere", (x, y, EYE_HEIGHT), (0.14, 0.0, 0.0), _HEAD_COLOUR, "person"),
+        Marker("sphere", (x + 0.15 * c, y + 0.15 * s, EYE_HEIGHT), (0.06, 0.0, 0.0), _BODY_COLOUR, "person"),
     )
