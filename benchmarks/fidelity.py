@@ -1,15 +1,11 @@
-"""The same trials in every fidelity: whether the tiers agree, and how many simulated seconds a core-second gives.
-
-Agreement is against the tier `full`, trial by trial. Speed is that of whole trials: world, session, participant and
-log, in CPU time, without the planner and without setting up.
-"""
+"""The same trials in every fidelity: how far `windows` and `event` agree with `full`, trial by trial."""
 
 import os
 import statistics
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from experiments.agreement import Ran, in_every_fidelity
+from experiments.agreement import TierResult, run_all_in_tiers
 from experiments.trial import TrialConfig
 from mjsim.options import FIDELITIES
 
@@ -17,7 +13,7 @@ SEEDS = 50
 QUICK_SEEDS = 2
 OBJECTS = (6, 12, 18, 24)
 QUICK_OBJECTS = (6, 24)
-PEOPLE = (("optimal", "follower"), ("highlight", "nearest"))
+PARTICIPANTS = (("optimal", "follower"), ("highlight", "nearest"))
 COMPARED = ("completion_time_s", "task_distance_m", "inverse_path_length", "normalized_deviations")
 SAME_DELIVERIES, TIME_DIFFERENCE = 1.0, 0.01  # targets
 
@@ -35,13 +31,13 @@ def measure(
     """
     count = seeds or (QUICK_SEEDS if quick else SEEDS)
     difficulties = tuple(objects) or (QUICK_OBJECTS if quick else OBJECTS)
-    cells = [(person, n) for person in PEOPLE for n in difficulties]
+    cells = [(participant, n) for participant in PARTICIPANTS for n in difficulties]
     configs = [
         TrialConfig(objects=n, assistance=assistance, user=user, seed=seed, regret=False)
         for (assistance, user), n in cells
         for seed in range(count)
     ]
-    results = in_every_fidelity(configs, workers=workers or os.cpu_count() or 1)
+    results = list(run_all_in_tiers(configs, workers=workers or os.cpu_count() or 1))
     rows = []
     for i, ((assistance, user), n) in enumerate(cells):
         trials = results[i * count : (i + 1) * count]
@@ -51,8 +47,8 @@ def measure(
     return {"seeds": count, "rows": rows}
 
 
-def compare(full: Sequence[Ran], tier: Sequence[Ran]) -> dict[str, Any]:
-    """Agreement of the same trials in two fidelities, and the speed of the second.
+def compare(full: Sequence[TierResult], tier: Sequence[TierResult]) -> dict[str, Any]:
+    """Agreement of the same trials in two fidelities.
 
     Differences are relative to the mean of `full` where that is not 0: of the means, and the largest of any trial.
     """
@@ -63,7 +59,6 @@ def compare(full: Sequence[Ran], tier: Sequence[Ran]) -> dict[str, Any]:
         "differing_seeds": [
             b.config.seed for a, b in zip(full, tier, strict=True) if a.delivered != b.delivered
         ],
-        "simulated_per_core_s": sum(r.simulated_s for r in tier) / sum(r.cpu_s for r in tier),
     }
     for name in COMPARED:
         there = [float(r.metrics[name]) for r in full]
@@ -80,11 +75,11 @@ def compare(full: Sequence[Ran], tier: Sequence[Ran]) -> dict[str, Any]:
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result as text: a table in Markdown, then what was aimed at."""
+    """The result as text: a table in Markdown, then the verdicts."""
     yield f"{result['seeds']} houses of each difficulty; differences from `full`: of the mean (largest of any trial)"
     yield ""
-    yield "| participant | objects | fidelity | same deliveries | time | distance | IPL | deviations | s per core-s |"
-    yield "|---|---|---|---|---|---|---|---|---|"
+    yield "| participant | objects | fidelity | same deliveries | time | distance | IPL | deviations |"
+    yield "|---|---|---|---|---|---|---|---|"
     for row in result["rows"]:
         yield "| " + " | ".join(_cells(row)) + " |"
     yield ""
@@ -111,7 +106,6 @@ def _cells(row: dict[str, Any]) -> Iterator[str]:
         yield f"{row['same_deliveries']:.0%}"
         for name in COMPARED:
             yield f"{row[name]['difference']:+.2%} ({row[name]['largest']:+.1%})"
-    yield f"{row['simulated_per_core_s']:.0f}"
 
 
 def _verdict(what: str, value: str, holds: bool, target: str) -> str:
