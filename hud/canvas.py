@@ -79,9 +79,9 @@ class Canvas:
     def __init__(self, stencils: Stencils, width: int, height: int) -> None:
         self.width, self.height = width, height
         self.stencils = stencils
-        self.type = stencils.type
+        self.typeface = stencils.typeface
         self.unit = stencils.unit
-        self.px = stencils.type.px
+        self.px = stencils.typeface.px
         # Colour times opacity, and opacity: one plane each, because the processor goes through planes quickest.
         self._planes: Floats = np.zeros((4, height, width), dtype=np.float32)
 
@@ -147,7 +147,7 @@ class Canvas:
             return 0
         stencil = self.stencils.text(text, face)
         self.fill(stencil.mask, colour, 1.0, x + stencil.x, baseline + stencil.y)
-        return self.type.width(text, face)
+        return self.typeface.width(text, face)
 
     def tile(self, key: str | None, x: int, y: int, size: int, opacity: float = 1.0) -> None:
         """A picture on a light rounded square of `size` px; an unknown key leaves the square empty."""

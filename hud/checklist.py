@@ -34,12 +34,12 @@ def draw_checklist(
         hidden: How many items do not fit before and after them.
     """
     canvas = Canvas.panel(stencils, rect)
-    px, width = canvas.px, canvas.type.width
+    px, width = canvas.px, canvas.typeface.width
     title, count = header
     x = px(theme.PADDING + 2)
     right = canvas.width - x
     taken = width(count, theme.DETAIL) + px(theme.GAP)
-    line = canvas.type.fit(title, theme.TITLE, right - x - taken)
+    line = canvas.typeface.fit(title, theme.TITLE, right - x - taken)
     canvas.text(x, px(17), line, theme.TITLE, theme.TEXT)
     canvas.text(right - taken + px(theme.GAP), px(17), count, theme.DETAIL, theme.QUIET)
     top = round(theme.HEADER * canvas.unit)
@@ -47,7 +47,7 @@ def draw_checklist(
         _draw_row(canvas, item, row, top)
         top += row.height
     notes = (f"{hidden[0]} above" if hidden[0] else "", f"+{hidden[1]} more" if hidden[1] else "")
-    text = canvas.type.fit(" · ".join(note for note in notes if note), theme.DETAIL, right - x)
+    text = canvas.typeface.fit(" · ".join(note for note in notes if note), theme.DETAIL, right - x)
     canvas.text(x, canvas.height - px(theme.PADDING), text, theme.DETAIL, theme.QUIET)
     return canvas.patch()
 
@@ -63,7 +63,7 @@ def _draw_row(canvas: Canvas, item: ChecklistItem, row: Row, top: int) -> None:
     if item.number is not None:
         label, face = str(item.number), theme.LABEL if item.current else theme.DETAIL
         right = x + px(theme.NUMBER) - px(3)
-        canvas.text(right - canvas.type.width(label, face), top + px(19), label, face, theme.QUIET)
+        canvas.text(right - canvas.typeface.width(label, face), top + px(19), label, face, theme.QUIET)
         x += px(theme.NUMBER)
     canvas.tile(item.picture, x, top + px(3), side, 0.5 if item.done else 1.0)
     if item.target_picture is not None:
@@ -76,9 +76,9 @@ def _draw_row(canvas: Canvas, item: ChecklistItem, row: Row, top: int) -> None:
 def _draw_text(canvas: Canvas, item: ChecklistItem, row: Row, x: int, top: int) -> None:
     px = canvas.px
     face = theme.ITEM_CURRENT if item.current else theme.ITEM
-    if canvas.type.width(item.text, face) > row.text_width:
+    if canvas.typeface.width(item.text, face) > row.text_width:
         face = theme.Face(theme.DETAIL.size, face.weight)
-    line = canvas.type.fit(item.text, face, row.text_width)
+    line = canvas.typeface.fit(item.text, face, row.text_width)
     baseline = top + (px(13) if row.detail else px(19))
     drawn = canvas.text(x, baseline, line, face, theme.DONE if item.done else theme.TEXT)
     if item.done and drawn > 0:

@@ -89,7 +89,7 @@ class Compositor:
             self._patches.clear()
         key = (width, height, _without_what_moves(state))
         if self._layout is None or self._layout[0] != key:
-            self._layout = (key, arrange(key[2], width, height, self._stencils.type))
+            self._layout = (key, arrange(key[2], width, height, self._stencils.typeface))
         found = self._layout[1]
         if state.pointer is None:
             return found

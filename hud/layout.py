@@ -143,7 +143,7 @@ class _Grid:
 
     def __init__(self, width: int, height: int, typeface: Typeface) -> None:
         self._width, self._height = width, height
-        self._type, px = typeface, typeface.px
+        self._typeface, px = typeface, typeface.px
         self._px = px
         self.margin, self._gap = px(theme.MARGIN), px(theme.GAP)
         self.chip_width, self._chip_height = px(theme.CHIP_WIDTH), px(theme.CHIP_HEIGHT)
@@ -179,7 +179,7 @@ class _Grid:
         if item.target_picture is not None:
             taken += theme.TARGET + 3
         width = self._list_width - self._px(taken)
-        detail = self._type.paragraph(item.detail, theme.DETAIL, width, 1 if item.done else 3)
+        detail = self._typeface.paragraph(item.detail, theme.DETAIL, width, 1 if item.done else 3)
         return Row(self._px(theme.ROW + theme.LINE * max(0, len(detail) - 1)), width, detail)
 
     def minimap(self, minimap: MiniMap | None) -> Rect | None:
@@ -203,7 +203,8 @@ class _Grid:
         rows: tuple[Row, ...] = ()
         for lines in (3, 2, 1, 0):
             places = [
-                self._type.paragraph(b.place, theme.DETAIL, width, lines) if lines else () for b in entries
+                self._typeface.paragraph(b.place, theme.DETAIL, width, lines) if lines else ()
+                for b in entries
             ]
             heights = [px(max(theme.TILE, theme.LINE * (1 + len(p))) + theme.GAP) for p in places]
             rows = tuple(Row(height, width, place) for height, place in zip(heights, places, strict=True))
@@ -233,12 +234,12 @@ class _Grid:
         face, extra = theme.BAR, self._px(theme.MESSAGE_ICON + 2 * theme.PADDING)
         left = self.margin + self.chip_width + self._gap
         span = self._width - 2 * left
-        line = self._type.fit(message.text, face, span - extra)
+        line = self._typeface.fit(message.text, face, span - extra)
         lines: tuple[str, ...] = (line,)
         if line != " ".join(message.text.split()):
             left, span = self._left, self._between
-            lines = self._type.wrap(message.text, face, span - extra, theme.MESSAGE_LINES)
-        width = min(span, extra + max(self._type.width(text, face) for text in lines))
+            lines = self._typeface.wrap(message.text, face, span - extra, theme.MESSAGE_LINES)
+        width = min(span, extra + max(self._typeface.width(text, face) for text in lines))
         height = self._chip_height + (len(lines) - 1) * self._px(theme.LINE + 3)
         return Rect(self._centred(width, left, span), self.margin, width, height), lines
 

@@ -27,9 +27,11 @@ def draw_bins(
         width = rect.width - text_x - px(theme.PADDING)
         lift = 0 if row.detail else px(5)
         face = theme.LABEL
-        if canvas.type.width(entry.label, face) > width:
+        if canvas.typeface.width(entry.label, face) > width:
             face = theme.Face(face.size - 1, face.weight)
-        canvas.text(text_x, top + px(11) + lift, canvas.type.fit(entry.label, face, width), face, theme.TEXT)
+        canvas.text(
+            text_x, top + px(11) + lift, canvas.typeface.fit(entry.label, face, width), face, theme.TEXT
+        )
         for i, line in enumerate(row.detail):
             canvas.text(text_x, top + px(11 + theme.LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
         top += row.height
@@ -55,7 +57,7 @@ def _draw_hand(canvas: Canvas, slot: InventorySlot, hand: str, at_the_left: bool
     for size in (theme.SLOT_WIDTH, theme.SLOT_WIDTH_LONG) if held else (theme.SLOT_WIDTH_EMPTY,):
         width = min(px(size), (canvas.width - px(theme.GAP)) // 2)
         room = width - px(theme.PADDING) - inset
-        lines = (hand, "empty") if slot.label is None else canvas.type.wrap(slot.label, face, room, 2)
+        lines = (hand, "empty") if slot.label is None else canvas.typeface.wrap(slot.label, face, room, 2)
         if not any(line.endswith(ELLIPSIS) for line in lines):
             break
     left = 0 if at_the_left else canvas.width - width
@@ -70,7 +72,7 @@ def _draw_hand(canvas: Canvas, slot: InventorySlot, hand: str, at_the_left: bool
     first = canvas.height // 2 + px(4.5) - px(theme.LINE) * (len(lines) - 1) // 2
     for number, line in enumerate(lines):
         canvas.text(
-            left + inset, first + number * px(theme.LINE), canvas.type.fit(line, face, room), face, colour
+            left + inset, first + number * px(theme.LINE), canvas.typeface.fit(line, face, room), face, colour
         )
 
 
@@ -101,8 +103,10 @@ def draw_progress(stencils: Stencils, rect: Rect, delivered: int, total: int) ->
     """How many objects are where they belong, as a number and as a bar."""
     canvas = Canvas.panel(stencils, rect)
     px = canvas.px
-    text = canvas.type.fit(f"{delivered} / {total}", theme.CHIP, rect.width - px(8))
-    canvas.text((rect.width - canvas.type.width(text, theme.CHIP)) // 2, px(17), text, theme.CHIP, theme.TEXT)
+    text = canvas.typeface.fit(f"{delivered} / {total}", theme.CHIP, rect.width - px(8))
+    canvas.text(
+        (rect.width - canvas.typeface.width(text, theme.CHIP)) // 2, px(17), text, theme.CHIP, theme.TEXT
+    )
     track = Rect(px(10), rect.height - px(7), rect.width - 2 * px(10), max(2, px(3)))
     canvas.rounded(track, track.height / 2, theme.EDGE, 0.25)
     done = round(track.width * min(delivered, total) / max(total, 1))
@@ -123,7 +127,7 @@ def draw_clock(stencils: Stencils, rect: Rect, text: str) -> Patch:
     """Elapsed time beside a small dial."""
     canvas = Canvas.panel(stencils, rect)
     px, u = canvas.px, canvas.unit
-    width = canvas.type.width(text, theme.CHIP)
+    width = canvas.typeface.width(text, theme.CHIP)
     x = (rect.width - width - px(18)) // 2
     cx, cy = x + 6.5 * u, rect.height / 2.0
     canvas.circle(cx, cy, 6.5 * u, theme.QUIET)

@@ -46,13 +46,13 @@ class Stencils:
     def __init__(self, pictures: Pictures, unit: float) -> None:
         self.pictures = pictures
         self.unit = unit
-        self.type = Typeface(unit)
+        self.typeface = Typeface(unit)
         self.text = functools.lru_cache(512)(self._text)
         self.scaled = functools.lru_cache(128)(self._scaled)
 
     def _text(self, text: str, face: Face) -> Stencil:
         """A line of text; the origin is where its baseline begins."""
-        mask, baseline = self.type.rasterise(text, face)
+        mask, baseline = self.typeface.rasterise(text, face)
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         if not len(rows):
             return Stencil(np.zeros((0, 0), np.float32), 0, 0)
