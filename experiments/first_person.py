@@ -48,7 +48,7 @@ class FirstPersonRenderer:
 
     def camera_view(self, data: Any) -> CameraView:
         """The eye camera as the next frame of `data` shows it; a condition needs it to point to a goal."""
-        pose = self._renderer.camera_view(data)
+        pose = self._renderer.camera_pose(data)
         width, height = self._size
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
 

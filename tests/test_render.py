@@ -167,14 +167,14 @@ def test_frames_follow_the_data(room, renderer):
 
 def test_a_pose_draws_what_the_named_camera_draws(room, renderer):
     for name in ("ahead", "tilted"):
-        pose = renderer.camera_view(room[1], name)
+        pose = renderer.camera_pose(room[1], name)
         np.testing.assert_array_equal(renderer.rgb(room[1], pose), renderer.rgb(room[1], name))
-    assert renderer.camera_view(room[1], "ahead").fovy == pytest.approx(np.pi / 3)
+    assert renderer.camera_pose(room[1], "ahead").fovy == pytest.approx(np.pi / 3)
 
 
 def test_looking_at_matches_the_camera_of_the_model(room, renderer):
     pose = CameraPose.looking_at((0, 0, 1), (4, 0, 1), np.pi / 3)
-    view = renderer.camera_view(room[1], "ahead")
+    view = renderer.camera_pose(room[1], "ahead")
     np.testing.assert_allclose(pose.rotation, view.rotation, atol=1e-12)
     down = CameraPose.looking_at((0, 0, 5), (0, 0, 0), 1.0)
     np.testing.assert_allclose(down.rotation, np.eye(3), atol=1e-12)

@@ -4,12 +4,13 @@ A condition is a function from a task view to a HUD state. To add one, add a fil
 to use one from elsewhere, name it `package.module:attribute`. Options follow a condition's name after hyphens.
 """
 
+import functools
 import importlib
 import pkgutil
 from collections.abc import Callable
 
 from hud.errors import ConditionError
-from hud.options import Option, option, option_names
+from hud.options import option, option_names
 from hud.state import HudState
 from hud.task import TaskView
 
@@ -30,17 +31,11 @@ def condition(name: str) -> Condition:
     """
     base, *asked = name.split("-")
     show, options = _plain_condition(base), [option(o) for o in asked]
-    return _with_options(show, options) if options else show
 
-
-def _with_options(show: Condition, options: list[Option]) -> Condition:
     def hud_state(view: TaskView) -> HudState:
-        state = show(view)
-        for apply in options:
-            state = apply(view, state)
-        return state
+        return functools.reduce(lambda state, apply: apply(view, state), options, show(view))
 
-    return hud_state
+    return hud_state if options else show
 
 
 def _plain_condition(name: str) -> Condition:

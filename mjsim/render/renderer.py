@@ -168,7 +168,7 @@ class Renderer:
         metres = view.metres(raw) if depth and raw is not None else None
         return Frame(pose, colour, metres, ids if segmentation else None)
 
-    def camera_view(self, data: Any, camera: str | CameraPose = EYE) -> CameraPose:
+    def camera_pose(self, data: Any, camera: str | CameraPose = EYE) -> CameraPose:
         """Where a camera of the model is and how wide it sees.
 
         Raises:
