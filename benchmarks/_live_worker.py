@@ -14,8 +14,7 @@ import numpy as np
 
 from experiments.house import House
 from planner.live import LiveReplanner
-from planner.plan import Status, VisitKind
-from planner.replanner import Stop
+from planner.plan import Status, Visit, VisitKind
 from planner.route import XY, TaskState
 from planner.solver import solver
 
@@ -70,10 +69,10 @@ def replan(guide: LiveReplanner, state: TaskState) -> dict[str, Any]:
     return record | {"gap": gap, "proven": plan.status is Status.OPTIMAL, "left": len(state.loose)}
 
 
-def possible(loose: dict[str, XY], carried: list[str]) -> list[Stop]:
+def possible(loose: dict[str, XY], carried: list[str]) -> list[Visit]:
     """Visits that can be made next."""
-    picks = [(VisitKind.PICK, name) for name in loose] if len(carried) < 2 else []
-    return [(VisitKind.PLACE, name) for name in carried] + picks
+    picks = [Visit(VisitKind.PICK, name) for name in loose] if len(carried) < 2 else []
+    return [Visit(VisitKind.PLACE, name) for name in carried] + picks
 
 
 def figures(replans: list[dict[str, Any]]) -> dict[str, Any]:

@@ -25,9 +25,8 @@ from rich.progress import Progress
 from experiments.commands.bench import load
 from experiments.house import House
 from planner.problem import RoutingProblem
-from planner.replanner import Replanner
 from planner.route import TaskState
-from planner.solver import solver
+from planner.task_problems import TaskProblems
 
 WORKER = Path(__file__).with_name("_planner_worker.py")
 LIVE_WORKER = Path(__file__).with_name("_live_worker.py")
@@ -124,7 +123,7 @@ def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
 def make_cases(progress: Progress, sizes: Sequence[int], houses: int) -> Iterator[Case]:
     """Problems of disorganized apartments, each from the start and from a random feasible state of the same task."""
     house = House.load("apartment")
-    replanner = Replanner(house.geodesics, solver("exact"))
+    problems = TaskProblems(house.geodesics)
     counts = {n: max(1, houses // LARGEST_SHARE) if n == SIZES[-1] else houses for n in sizes}
     bar = progress.add_task("disorganize houses", total=sum(counts.values()))
     for n in sizes:
@@ -138,7 +137,7 @@ def make_cases(progress: Progress, sizes: Sequence[int], houses: int) -> Iterato
             begin = TaskState((episode.start.x, episode.start.y), loose, (), deliveries)
             later = mid_task(house, begin, np.random.default_rng([n, seed]))
             for state, task in zip(STATES, (begin, later), strict=True):
-                yield Case(n, seed, state, replanner.problem(task))
+                yield Case(n, seed, state, problems.problem(task))
             progress.advance(bar)
 
 

@@ -19,10 +19,9 @@ from hud.state import HudState
 from mjsim.actions import EventKind, WorldEvent
 from mjsim.episode import CAPACITY, Episode
 from mjsim.observation import ObjectStatus, Observation
-from planner.plan import Status, VisitKind
+from planner.plan import Status, Visit, VisitKind
 from planner.polyline import first_off_path, project, rest_of
-from planner.replanner import Stop
-from planner.route import XY, Route, RouteVisit, TaskState
+from planner.route import XY, Route, TaskState
 
 OFF_THE_PATH = 0.6  # m from the shown path before a new one is shown
 GOAL = "goal"  # role of the markers of conditions that show the plan
@@ -189,7 +188,7 @@ class Assistant:
                 self._goal(observation, kind, name),
                 found.regret,
                 found.capped,
-                functools.partial(self._regrets.exact, (kind, name)),
+                functools.partial(self._regrets.exact, Visit(kind, name)),
             )
             for (kind, name), found in self._regrets.known().items()
         )
@@ -201,18 +200,18 @@ class Assistant:
             self._log.append(time, "regret", visit=number, regret_m=_rounded(regret))
 
     def _visited(self, observation: Observation, event: WorldEvent) -> None:
-        kind = VISIT_KIND[event.kind]
+        made = Visit(VISIT_KIND[event.kind], event.object)
         suggested = self._route.next if self._route else None
         here = observation.position.copy()
         self._log.append(
             event.time,
             "visit",
-            kind=kind.value,
-            object=event.object,
+            kind=made.kind.value,
+            object=made.object,
             suggested=_as_json(suggested) if suggested else None,
-            deviated=self._route is not None and not self._route.follows(kind, event.object),
+            deviated=self._route is not None and self._route.next != made,
             alternatives=self._alternatives(observation, event),
-            **self._judged((kind, event.object)),
+            **self._judged(made),
             position=[round(float(v), 6) for v in here],
             geodesic_m=round(
                 self._house.body_geodesics.shortest_path(self._stood, here).geodesic_distance, 6
@@ -220,15 +219,15 @@ class Assistant:
         )
         self._visits += 1
         self._stood = here
-        self._board.did(STEP[kind], event.object)
+        self._board.did(STEP[made.kind], made.object)
 
-    def _judged(self, stop: Stop) -> dict[str, float | None]:
+    def _judged(self, visit: Visit) -> dict[str, float | None]:
         """Extra cost of a visit, if that is wanted. The next one of a plan that is proven has none."""
         if not self._judging:
             return {}
         proven = self._route is not None and self._route.plan.status is Status.OPTIMAL
-        follows = self._route is not None and self._route.follows(*stop)
-        return {"regret_m": 0.0 if proven and follows else _rounded(self._regrets.judge(self._visits, stop))}
+        follows = self._route is not None and self._route.next == visit
+        return {"regret_m": 0.0 if proven and follows else _rounded(self._regrets.judge(self._visits, visit))}
 
     def _alternatives(self, observation: Observation, event: WorldEvent) -> int:
         """How many other visits were feasible when this one was made."""
@@ -326,5 +325,5 @@ def _rounded(metres: float | None) -> float | None:
     return None if metres is None else round(metres, 6)
 
 
-def _as_json(visit: RouteVisit) -> list[str]:
+def _as_json(visit: Visit) -> list[str]:
     return [visit.kind.value, visit.object]

@@ -14,9 +14,8 @@ from hud.state import Message
 from hud.task import Alternative, StepKind, TaskObject, TaskReceptacle, TaskStep, TaskView
 from mjsim.episode import Episode
 from mjsim.observation import Observation
-from planner.plan import VisitKind
+from planner.plan import Visit, VisitKind
 from planner.regret import Regret
-from planner.replanner import Stop
 
 READING_TIME = 2.0  # s that a message is shown before the announcement of a new plan takes its place
 REPLANNED = "replanned"
@@ -24,7 +23,7 @@ REPLANNED = "replanned"
 STEP: Mapping[VisitKind, StepKind] = {VisitKind.PICK: "pick", VisitKind.PLACE: "place"}
 
 
-def alternatives(regrets: Mapping[Stop, Regret]) -> tuple[Alternative, ...]:
+def alternatives(regrets: Mapping[Visit, Regret]) -> tuple[Alternative, ...]:
     """Regrets of possible next visits in the terms of the conditions."""
     return tuple(
         Alternative(STEP[kind], name, found.regret, found.capped) for (kind, name), found in regrets.items()

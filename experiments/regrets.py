@@ -8,10 +8,9 @@ from typing import Protocol
 
 from planner.errors import PlannerError
 from planner.geodesics import Geodesics
-from planner.plan import Plan
+from planner.plan import Plan, Visit
 from planner.regret import Regret
 from planner.regret_evaluator import RegretEvaluator, same_state
-from planner.replanner import Stop
 from planner.route import TaskState
 from planner.solver import SolveLimit
 
@@ -31,13 +30,13 @@ class Regrets(Protocol):
     def begin(self, state: TaskState, plan: Plan) -> None:
         """The task is in this state from now on; `plan` is what was planned for it or before."""
 
-    def known(self) -> Mapping[Stop, Regret]:
+    def known(self) -> Mapping[Visit, Regret]:
         """Of all possible next visits, the best first; empty as long as nothing is known."""
 
-    def exact(self, stop: Stop) -> float | None:
+    def exact(self, visit: Visit) -> float | None:
         """Regret of one visit, m, also where `known` only has a bound; None where nothing is proven. May take long."""
 
-    def judge(self, number: int, stop: Stop) -> float | None:
+    def judge(self, number: int, visit: Visit) -> float | None:
         """As `exact`, of a visit that is made now, or None if that comes from `later`; `number` counts the visits."""
 
     def later(self) -> Iterator[tuple[int, float | None]]:
@@ -62,17 +61,17 @@ class RegretsAtOnce:
         """See :class:`Regrets`."""
         self._state, self._plan = state, plan
 
-    def known(self) -> Mapping[Stop, Regret]:
+    def known(self) -> Mapping[Visit, Regret]:
         """See :class:`Regrets`."""
         return {} if self._state is None else self._evaluator.all(self._state, self._plan)
 
-    def exact(self, stop: Stop) -> float | None:
+    def exact(self, visit: Visit) -> float | None:
         """See :class:`Regrets`."""
-        return None if self._state is None else self._evaluator.of(self._state, stop, self._plan)
+        return None if self._state is None else self._evaluator.of(self._state, visit, self._plan)
 
-    def judge(self, number: int, stop: Stop) -> float | None:  # noqa: ARG002 - nothing is left for later
+    def judge(self, number: int, visit: Visit) -> float | None:  # noqa: ARG002 - nothing is left for later
         """See :class:`Regrets`."""
-        return self.exact(stop)
+        return self.exact(visit)
 
     def later(self) -> Iterator[tuple[int, float | None]]:
         """Nothing: every visit was judged when it was made."""
@@ -89,7 +88,7 @@ class _Job:
     state: TaskState
     plan: Plan
     stop: threading.Event = field(default_factory=threading.Event)
-    found: Mapping[Stop, Regret] | None = None
+    found: Mapping[Visit, Regret] | None = None
 
     def run(self, geodesics: Geodesics) -> None:
         """Find them, unless somebody says stop; the planner itself tells of a task that cannot be done."""
@@ -112,7 +111,7 @@ class RegretsBeside:
         self._thread: threading.Thread | None = None
         self._state: TaskState | None = None
         self._plan: Plan | None = None
-        self._made: list[tuple[int, TaskState, Stop, Plan]] = []
+        self._made: list[tuple[int, TaskState, Visit, Plan]] = []
 
     def prepare(self, state: TaskState, plan: Plan) -> None:
         """Work out the first regrets: that loads the kernels."""
@@ -128,7 +127,7 @@ class RegretsBeside:
         self.close()
         self._state, self._plan = state, plan
 
-    def known(self) -> Mapping[Stop, Regret]:
+    def known(self) -> Mapping[Visit, Regret]:
         """See :class:`Regrets`."""
         if self._state is None or self._plan is None:
             return {}
@@ -145,20 +144,20 @@ class RegretsBeside:
         if self._thread is not None:
             self._thread.join()
 
-    def exact(self, stop: Stop) -> float | None:
+    def exact(self, visit: Visit) -> float | None:
         """See :class:`Regrets`."""
-        return None if self._state is None else self._evaluator.of(self._state, stop, self._plan)
+        return None if self._state is None else self._evaluator.of(self._state, visit, self._plan)
 
-    def judge(self, number: int, stop: Stop) -> float | None:
+    def judge(self, number: int, visit: Visit) -> float | None:
         """None: it is left for `later`."""
         if self._state is not None and self._plan is not None:
-            self._made.append((number, self._state, stop, self._plan))
+            self._made.append((number, self._state, visit, self._plan))
         return None
 
     def later(self) -> Iterator[tuple[int, float | None]]:
         """See :class:`Regrets`."""
-        for number, state, stop, plan in self._made:
-            yield number, self._evaluator.of(state, stop, plan)
+        for number, state, visit, plan in self._made:
+            yield number, self._evaluator.of(state, visit, plan)
         self._made = []
 
     def close(self) -> None:

@@ -17,7 +17,7 @@ from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES, WorldOptions
 from mjsim.world import World
 from planner.exact.solver import ExactSolver
-from planner.exact.warm import Warm
+from planner.exact.warm_start import NOTHING_KNOWN
 from planner.problem import RoutingProblem, Shipment
 from planner.regret import regrets
 
@@ -41,9 +41,8 @@ def plan() -> None:
         ExactSolver(table_bytes=table_bytes).solve(tour)
         regrets(tour, ExactSolver(table_bytes=table_bytes))
     searching = ExactSolver(table_bytes=0)
-    first = next(searching.improve(tour))
-    if first.certificate is not None:
-        next(searching.improve(tour, warm=Warm(first.certificate, tuple(range(12)))))
+    warm = NOTHING_KNOWN.updated(tour, searching.solve(tour))
+    next(searching.improve(tour, warm=warm))
 
 
 def act(house: House) -> None:

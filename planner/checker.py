@@ -25,39 +25,32 @@ def check(problem: RoutingProblem, plan: Plan, tolerance: float = 1e-6) -> float
         ProblemError: A visit that is impossible or repeated, an object left over, a wrong cost, a lower bound
             above the cost, OPTIMAL with a gap, or a certificate that claims more than it proves.
     """
-    loose = set(range(len(problem.shipments)))
-    shipped: set[int] = set()
-    onboard = set(range(len(problem.onboard)))
+    n = len(problem.shipments)
+    number = {name: k for k, name in enumerate(problem.names)}
+    loose, held = set(range(n)), set(range(n, len(problem.names)))
     here, cost = problem.start, 0.0
-    for k, visit in enumerate(plan.visits):
-        where = f"visit {k} ({visit})"
-        if visit.shipment is not None and visit.onboard is None:
-            index, held = visit.shipment, shipped
-        elif visit.onboard is not None and visit.shipment is None and visit.kind is VisitKind.PLACE:
-            index, held = visit.onboard, onboard
-        else:
-            raise ProblemError(f"{where} must name either a shipment, or an onboard object to place")
-        if visit.kind is VisitKind.PICK:
+    for k, (kind, name) in enumerate(plan.visits):
+        where = f"visit {k} ({kind.value} {name})"
+        if name not in number:
+            raise ProblemError(f"{where} is of no object of the problem; it has {list(number)}")
+        index = number[name]
+        if kind is VisitKind.PICK:
             if index not in loose:
                 raise ProblemError(f"{where} picks what does not lie about")
             loose.remove(index)
-            shipped.add(index)
-            expected = problem.shipments[index].pickup
+            held.add(index)
+            there = problem.shipments[index].pickup
         else:
             if index not in held:
                 raise ProblemError(f"{where} places what is not carried")
             held.remove(index)
-            expected = problem.onboard[index] if held is onboard else problem.shipments[index].delivery
-        if visit.location != expected:
-            raise ProblemError(f"{where} happens at {visit.location} instead of {expected}")
-        if len(shipped) + len(onboard) > problem.capacity:
+            there = problem.onboard[index - n] if index >= n else problem.shipments[index].delivery
+        if len(held) > problem.capacity:
             raise ProblemError(f"{where} exceeds the capacity of {problem.capacity}")
-        cost += float(problem.distances[here, visit.location])
-        here = visit.location
-    if loose or shipped or onboard:
-        raise ProblemError(
-            f"never done: {len(loose)} picks, {len(shipped) + len(onboard)} places of carried ones"
-        )
+        cost += float(problem.distances[here, there])
+        here = there
+    if loose or held:
+        raise ProblemError(f"never done: {len(loose)} picks, {len(held)} places of carried ones")
     _check_numbers(plan, cost, tolerance)
     return proven_bound(problem, plan)
 

@@ -43,6 +43,6 @@ def nearest_first(problem: RoutingProblem) -> list[Visit]:
     visits: list[Visit] = []
     here = problem.start
     while options := list(possible_next(problem, visits)):
-        visits.append(min(options, key=lambda visit: problem.distances[here, visit.location]))
-        here = visits[-1].location
+        visits.append(min(options, key=lambda visit: problem.distances[here, problem.location(visit)]))
+        here = problem.location(visits[-1])
     return visits

@@ -17,9 +17,6 @@ from planner.solver import SolveLimit
 from planner.tour import (
     integer_metric,
     make_plan,
-    pick,
-    place,
-    place_onboard,
     possible_next,
     spanning_bound,
 )
@@ -101,7 +98,8 @@ def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> tuple[lis
         if not options:
             best, best_length = visits, length
         for option in options:
-            extend([*visits, option], option.location, length + int(metric[here, option.location]))
+            there = problem.location(option)
+            extend([*visits, option], there, length + int(metric[here, there]))
 
     extend([], problem.start, 0)
     return best, int(best_length)
@@ -112,7 +110,7 @@ def _search(problem: RoutingProblem, metric: NDArray[np.int64], limit: SolveLimi
     count = len(visit_of) + 1  # node 0 is both start and end: leading back costs nothing, so the tour is open
     manager = pywrapcp.RoutingIndexManager(count, 1, 0)
     routing = pywrapcp.RoutingModel(manager)
-    location = [problem.start, *(v.location for v in visit_of)]
+    location = problem.stops(visit_of)
     # 1 on every leg changes no comparison, and lets guided local search penalise legs of length 0.
     costs = metric[np.ix_(location, location)] + 1
     costs[:, 0] = 0
@@ -137,8 +135,9 @@ def _search(problem: RoutingProblem, metric: NDArray[np.int64], limit: SolveLimi
 
 def _nodes(problem: RoutingProblem) -> list[Visit]:
     """Visits of nodes 1, 2, ...: pickup and drop-off of each shipment in turn, then onboard objects."""
-    nodes = [v for k in range(len(problem.shipments)) for v in (pick(problem, k), place(problem, k))]
-    return nodes + [place_onboard(problem, k) for k in range(len(problem.onboard))]
+    n = len(problem.shipments)
+    nodes = [visit for k in range(n) for visit in (problem.pick(k), problem.place(k))]
+    return nodes + [problem.place(k) for k in range(n, len(problem.names))]
 
 
 def _constrain(

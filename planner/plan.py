@@ -2,6 +2,7 @@
 
 import enum
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from planner.certificate import Certificate
 
@@ -14,28 +15,23 @@ class Status(enum.Enum):
     INFEASIBLE = "infeasible"
 
 
-class VisitKind(enum.Enum):
+class VisitKind(enum.StrEnum):
     """What is done at a visit."""
 
     PICK = "pick"
     PLACE = "place"
 
 
-@dataclass(frozen=True)
-class Visit:
-    """One stop of the tour.
+class Visit(NamedTuple):
+    """One step of a task.
 
     Attributes:
-        location: Index into the problem's distances.
-        kind: Whether an object is picked or placed here.
-        shipment: Index into the problem's shipments, or None for an onboard object.
-        onboard: Index into the problem's onboard, or None for a shipment.
+        kind: Whether the object is picked, or placed where it belongs.
+        object: Name of the object.
     """
 
-    location: int
     kind: VisitKind
-    shipment: int | None = None
-    onboard: int | None = None
+    object: str
 
 
 @dataclass(frozen=True)

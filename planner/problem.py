@@ -1,11 +1,14 @@
 """The routing problem of equation 1: capacitated pickup and delivery with an open tour."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planner.errors import ProblemError
+from planner.plan import Visit, VisitKind
 
 
 @dataclass(frozen=True)
@@ -20,16 +23,19 @@ class Shipment:
 class RoutingProblem:
     """What is left to do from any state of the task (PAPER section 2, with the history folded in).
 
+    Objects are numbered: first the shipments, then what is onboard.
+
     Attributes:
         distances: Geodesic distances between locations, m, shape (k, k), symmetric, zero diagonal.
         start: Location index where the person is now.
         shipments: Objects that still lie about; several may share a pickup or a delivery.
         onboard: Delivery index of each object that is carried now.
         capacity: How many objects may be carried at once.
+        names: Of the objects, in the order of their numbers; by default the numbers themselves.
 
     Raises:
-        ProblemError: Not square, negative, not finite, asymmetric, an index out of range, or more onboard
-            than the capacity.
+        ProblemError: Not square, negative, not finite, asymmetric, an index out of range, more onboard than the
+            capacity, or names that are too few, too many or not unique.
     """
 
     distances: NDArray[np.float64]
@@ -37,8 +43,44 @@ class RoutingProblem:
     shipments: tuple[Shipment, ...]
     onboard: tuple[int, ...] = ()
     capacity: int = 2
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        self._check_distances()
+        self._check_indices()
+        count = len(self.shipments) + len(self.onboard)
+        if not self.names:
+            object.__setattr__(self, "names", tuple(map(str, range(count))))
+        if len(self.names) != count or len(set(self.names)) != count:
+            raise ProblemError(f"{count} objects need as many different names, got {list(self.names)}")
+        self.distances.setflags(write=False)
+
+    @cached_property
+    def number(self) -> dict[str, int]:
+        """Name -> number of each object."""
+        return {name: k for k, name in enumerate(self.names)}
+
+    def pick(self, shipment: int) -> Visit:
+        """The visit that picks a shipment, by its number."""
+        return Visit(VisitKind.PICK, self.names[shipment])
+
+    def place(self, number: int) -> Visit:
+        """The visit that places a shipment or an object onboard, by its number."""
+        return Visit(VisitKind.PLACE, self.names[number])
+
+    def location(self, visit: Visit) -> int:
+        """Index into the distances of where a visit happens."""
+        number, n = self.number[visit.object], len(self.shipments)
+        if number >= n:
+            return self.onboard[number - n]
+        shipment = self.shipments[number]
+        return shipment.pickup if visit.kind is VisitKind.PICK else shipment.delivery
+
+    def stops(self, visits: Iterable[Visit]) -> list[int]:
+        """The start and the location of each visit: indices into the distances."""
+        return [self.start, *map(self.location, visits)]
+
+    def _check_distances(self) -> None:
         d = self.distances
         if d.ndim != 2 or d.shape[0] != d.shape[1] or d.shape[0] == 0:
             raise ProblemError(f"distances must be a square matrix, got shape {d.shape}")
@@ -59,6 +101,8 @@ class RoutingProblem:
             raise ProblemError(
                 f"distances[{loops[0]}][{loops[0]}] is {d[loops[0], loops[0]]}; the diagonal must be 0"
             )
+
+    def _check_indices(self) -> None:
         if self.capacity < 1:
             raise ProblemError(f"capacity must be at least 1, got {self.capacity}")
         if len(self.onboard) > self.capacity:
@@ -67,6 +111,5 @@ class RoutingProblem:
         for s in self.shipments:
             indices += [("pickup", s.pickup), ("delivery", s.delivery)]
         for what, index in indices:
-            if not 0 <= index < len(d):
-                raise ProblemError(f"{what} {index} is out of range for {len(d)} locations")
-        d.setflags(write=False)
+            if not 0 <= index < len(self.distances):
+                raise ProblemError(f"{what} {index} is out of range for {len(self.distances)} locations")

@@ -1,17 +1,57 @@
-"""Routing problems as JSON: what `mjsim plan` reads and answers."""
+"""Routing problems, plans and what proves them as JSON: what `mjsim plan` reads and writes."""
 
 import json
-import math
-from typing import Any
+from typing import Annotated, Any, Literal, TypeVar
 
+import msgspec
 import numpy as np
-from numpy.typing import NDArray
+from msgspec import Meta, Struct
 
+from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
-from planner.plan import Plan
+from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 
-FIELDS = {"capacity", "start", "distances", "shipments", "onboard"}
+FORMAT = 1
+EXACT = 1 << 53  # whole numbers up to here are exact as floats
+PROBLEM = (
+    'a problem is {"distances": [[0, 3], [3, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}, '
+    'and if need be "start": 0, "onboard": [1], "capacity": 2'
+)
+CLAIM = "a claim is what `mjsim plan --certificate` writes"
+
+Whole = Annotated[int, Meta(ge=-EXACT, le=EXACT)]
+Action = Literal["pick", "place", "place onboard"]
+T = TypeVar("T")
+
+
+class _Shipment(Struct, forbid_unknown_fields=True):
+    pickup: int
+    delivery: int
+
+
+class _Problem(Struct, forbid_unknown_fields=True):
+    distances: list[list[float]]
+    shipments: list[_Shipment]
+    start: int = 0
+    onboard: tuple[int, ...] = ()
+    capacity: int = 2
+
+
+class _Certificate(Struct, forbid_unknown_fields=True):
+    proof: Proof
+    root: Whole
+    groups: tuple[tuple[Whole, ...], ...]
+    multipliers: tuple[Whole, ...]
+
+
+class _Claim(Struct, forbid_unknown_fields=True):
+    format: Literal[1]
+    visits: list[tuple[Action, int]]
+    cost: float
+    lower_bound: float
+    status: Status
+    certificate: _Certificate | None
 
 
 def problem_from_json(text: str) -> RoutingProblem:
@@ -24,33 +64,21 @@ def problem_from_json(text: str) -> RoutingProblem:
         ProblemError: Not JSON, a field is missing, unknown or ill-typed, or the problem is malformed; one line that
             names the fault.
     """
-    try:
-        raw = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise ProblemError(f"not JSON: {error}") from error
-    if not isinstance(raw, dict):
-        raise ProblemError(f"a problem is a JSON object with {sorted(FIELDS)}, got {_kind(raw)}")
-    if unknown := sorted(set(raw) - FIELDS):
-        raise ProblemError(f"unknown field {unknown[0]!r}; a problem has {sorted(FIELDS)}")
-    for name in ("distances", "shipments"):
-        if name not in raw:
-            raise ProblemError(f"field {name!r} is missing")
-    return RoutingProblem(
-        distances=_matrix(raw["distances"]),
-        start=_index("start", raw.get("start", 0)),
-        shipments=tuple(_shipment(k, s) for k, s in enumerate(_list("shipments", raw["shipments"]))),
-        onboard=tuple(
-            _index(f"onboard[{k}]", j) for k, j in enumerate(_list("onboard", raw.get("onboard", [])))
-        ),
-        capacity=_index("capacity", raw.get("capacity", 2)),
-    )
+    raw = _decode(text, _Problem, PROBLEM)
+    rows = raw.distances
+    for i, row in enumerate(rows):
+        if len(row) != len(rows):
+            raise ProblemError(f"distances must be square, but row {i} has {len(row)} of {len(rows)} entries")
+    distances = np.array(rows, dtype=np.float64).reshape(len(rows), len(rows))
+    shipments = tuple(Shipment(s.pickup, s.delivery) for s in raw.shipments)
+    return RoutingProblem(distances, raw.start, shipments, raw.onboard, raw.capacity)
 
 
-def plan_to_json(plan: Plan) -> str:
+def plan_to_json(problem: RoutingProblem, plan: Plan) -> str:
     """Write the visits (location indices), cost, lower bound (m), status and seconds of a plan."""
     return json.dumps(
         {
-            "visits": [visit.location for visit in plan.visits],
+            "visits": [problem.location(visit) for visit in plan.visits],
             "cost": plan.cost,
             "lower_bound": plan.lower_bound,
             "status": plan.status.value,
@@ -59,38 +87,51 @@ def plan_to_json(plan: Plan) -> str:
     )
 
 
-def _matrix(rows: Any) -> NDArray[np.float64]:
-    rows = _list("distances", rows)
-    for i, row in enumerate(rows):
-        if len(_list(f"distances[{i}]", row)) != len(rows):
-            raise ProblemError(f"distances must be square, but row {i} has {len(row)} of {len(rows)} entries")
-        for j, value in enumerate(row):
-            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                raise ProblemError(f"distances[{i}][{j}] must be a finite number, got {json.dumps(value)}")
-    return np.array(rows, dtype=np.float64).reshape(len(rows), len(rows))
+def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
+    """Write a plan of a problem with its certificate.
+
+    A visit is `["pick", k]` or `["place", k]` of shipment k, or `["place onboard", k]` of what was carried at the
+    start, k counting from 0 as in the problem.
+    """
+    fields = {name: getattr(plan, name) for name in ("cost", "lower_bound", "status", "certificate")}
+    visits = [_action(problem, visit) for visit in plan.visits]
+    written: Any = msgspec.to_builtins({"format": FORMAT, "visits": visits, **fields})
+    return json.dumps(written)
 
 
-def _shipment(k: int, raw: Any) -> Shipment:
-    if not isinstance(raw, dict) or set(raw) != {"pickup", "delivery"}:
-        raise ProblemError(f'shipments[{k}] must be {{"pickup": i, "delivery": j}}, got {json.dumps(raw)}')
-    return Shipment(
-        _index(f"shipments[{k}].pickup", raw["pickup"]), _index(f"shipments[{k}].delivery", raw["delivery"])
-    )
+def claim_from_json(text: str, problem: RoutingProblem) -> Plan:
+    """Read what `claim_to_json` wrote about a plan of this problem; nothing of it is believed yet.
+
+    Raises:
+        ProblemError: Not JSON, a field is missing, unknown or ill-typed, or a visit is of no object of the problem; one
+            line that names the fault.
+    """
+    raw = _decode(text, _Claim, CLAIM)
+    proof = raw.certificate
+    certificate = None if proof is None else Certificate(**msgspec.structs.asdict(proof))
+    visits = tuple(_visit(problem, k, *visit) for k, visit in enumerate(raw.visits))
+    return Plan(visits, raw.cost, raw.lower_bound, raw.status, seconds=0.0, certificate=certificate)
 
 
-def _index(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ProblemError(f"{name} must be a whole number, got {json.dumps(value)}")
-    return value
+def _decode(text: str, kind: type[T], remedy: str) -> T:
+    try:
+        return msgspec.json.decode(text, type=kind)
+    except msgspec.DecodeError as error:  # names the path of the value, what was expected and what came
+        raise ProblemError(f"{error}; {remedy}") from error
 
 
-def _list(name: str, value: Any) -> list[Any]:
-    if not isinstance(value, list):
-        raise ProblemError(f"{name} must be a list, got {_kind(value)}")
-    return value
+def _action(problem: RoutingProblem, visit: Visit) -> tuple[Action, int]:
+    number, n = problem.number[visit.object], len(problem.shipments)
+    if number >= n:
+        return "place onboard", number - n
+    return ("pick" if visit.kind is VisitKind.PICK else "place"), number
 
 
-def _kind(value: Any) -> str:
-    return {dict: "an object", list: "a list", str: "a string", type(None): "null"}.get(
-        type(value), "a number"
+def _visit(problem: RoutingProblem, k: int, action: Action, number: int) -> Visit:
+    n = len(problem.shipments)
+    count = len(problem.onboard) if action == "place onboard" else n
+    if not 0 <= number < count:
+        raise ProblemError(f"visits[{k}] is of number {number}, but the problem has {count} to {action}")
+    return (
+        problem.pick(number) if action == "pick" else problem.place(number + n * (action == "place onboard"))
     )

@@ -3,26 +3,23 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from planner.certificate import Proof
 from planner.errors import ProblemError
 from planner.exact.deadline import Deadline
 from planner.exact.instance import Instance, make_instance
-from planner.exact.multipliers import Bound, first_bound, grown
+from planner.exact.multipliers import Bound, first_bound, grown, warm_bound
 from planner.exact.solver import ExactSolver
-from planner.exact.table_regret import Costs, costs_by_pass, costs_by_table, costs_in
-from planner.exact.warm import warm_bound
+from planner.exact.table_regret import Costs, costs_by_pass, costs_in
+from planner.exact.task_table import TaskTable
+from planner.exact.warm_start import NOTHING_KNOWN
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit, Solver
-from planner.tour import UNIT, integer_metric, possible_next
+from planner.tour import UNIT, integer_metric, possible_next, tour_length
 
 RADIUS = 1.0  # m
-MOST_ROWS = 1 << 14  # of the table of the bound of the pass
-MOST_STATES = 3_000_000  # of the pass: some 200 MB
-SMALLEST_RADIUS = 0.1  # m; below this a pass is not tried again
+MAX_ROWS = 1 << 14  # of the table of the bound of the pass
+MAX_STATES = 3_000_000  # of the pass: some 200 MB
+MIN_RADIUS = 0.1  # m; below this a pass is not tried again
 
 
 @dataclass(frozen=True)
@@ -50,15 +47,19 @@ def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
     Raises:
         ProblemError: Capacity or precedence do not allow the visit now.
     """
-    if visit not in possible_next(problem, ()):
+    if visit not in possible_next(problem):
         raise ProblemError(f"{visit} is not possible now; choose one of possible_next")
     shipments, onboard = list(problem.shipments), list(problem.onboard)
-    if visit.kind is VisitKind.PICK and visit.shipment is not None:
-        onboard.append(shipments.pop(visit.shipment).delivery)
-    elif visit.onboard is not None:
-        onboard.pop(visit.onboard)
+    names, n = list(problem.names), len(shipments)
+    name, number = names.pop(problem.number[visit.object]), problem.number[visit.object]
+    if visit.kind is VisitKind.PICK:
+        onboard.append(shipments.pop(number).delivery)
+        names.append(name)
+    else:
+        onboard.pop(number - n)
+    start = problem.location(visit)
     return RoutingProblem(
-        problem.distances, visit.location, tuple(shipments), tuple(onboard), problem.capacity
+        problem.distances, start, tuple(shipments), tuple(onboard), problem.capacity, tuple(names)
     )
 
 
@@ -66,7 +67,6 @@ def regrets(
     problem: RoutingProblem,
     solver: Solver,
     *,
-    seed: int = 0,
     limit: SolveLimit | None = None,
     radius: float = RADIUS,
     plan: Plan | None = None,
@@ -82,7 +82,6 @@ def regrets(
     Args:
         problem: What is left to do.
         solver: Plans the rest; with the exact one, regrets are exact where `proven` and not `capped`.
-        seed: Handed to the solver.
         limit: Handed to the solver, for each problem that it solves.
         radius: Regrets up to here are wanted exactly, m.
         plan: A plan of this problem, if there is one: if it is proven it need not be found again.
@@ -92,91 +91,83 @@ def regrets(
     """
     if not radius >= 0:
         raise ProblemError(f"the radius of regrets must be at least 0 m, got {radius}")
-    found = _exactly(problem, solver, seed, limit, radius, plan) if isinstance(solver, ExactSolver) else None
-    return found if found is not None else one_by_one(problem, solver, seed=seed, limit=limit)
+    found = None
+    if isinstance(solver, ExactSolver):
+        costs = TaskTable(solver).costs(problem)
+        if costs is not None:
+            return ranked(problem, costs)
+        found = _around_best(problem, solver, limit, radius, plan)
+    return found if found is not None else one_by_one(problem, solver, limit=limit)
 
 
 def one_by_one(
-    problem: RoutingProblem, solver: Solver, *, seed: int = 0, limit: SolveLimit | None = None
+    problem: RoutingProblem, solver: Solver, *, limit: SolveLimit | None = None
 ) -> tuple[Regret, ...]:
     """Solve the rest of the task after each possible next visit; with any solver, for any problem."""
     found = []
-    for visit in possible_next(problem, ()):
-        plan = solver.solve(after(problem, visit), seed=seed, limit=limit)
-        cost = float(problem.distances[problem.start, visit.location]) + plan.cost
+    for visit in possible_next(problem):
+        plan = solver.solve(after(problem, visit), limit=limit)
+        cost = float(problem.distances[problem.start, problem.location(visit)]) + plan.cost
         found.append((cost, visit, plan.status is Status.OPTIMAL))
     least = min((cost for cost, _, _ in found), default=0.0)
     proven = all(proven for _, _, proven in found)  # a regret is only as good as the least cost
-    ranked = sorted(found, key=lambda entry: entry[0])
-    return tuple(Regret(visit, cost, cost - least, proven) for cost, visit, _ in ranked)
+    found.sort(key=lambda entry: entry[0])
+    return tuple(Regret(visit, cost, cost - least, proven) for cost, visit, _ in found)
 
 
-def _exactly(
-    problem: RoutingProblem,
-    solver: ExactSolver,
-    seed: int,
-    limit: SolveLimit | None,
-    radius: float,
-    plan: Plan | None,
+def ranked(
+    problem: RoutingProblem, costs: Costs, longest: int | None = None, least: Costs | None = None
+) -> tuple[Regret, ...]:
+    """Regrets from integer costs, the best visit first.
+
+    Args:
+        problem: What is left to do.
+        costs: Length of the rest of the task by next visit, units.
+        longest: Costs above this are not known but for being above it; None where all are known.
+        least: Lower bounds of the costs, for those.
+    """
+    found = []
+    for visit in possible_next(problem):
+        cost, capped = costs[visit], longest is not None and costs[visit] > longest
+        if longest is not None and least is not None and capped:
+            cost = max(longest, least[visit])
+        found.append((cost, capped, visit))
+    found.sort(key=lambda entry: entry[:2])
+    lowest = found[0][0] if found else 0
+    return tuple(
+        Regret(visit, cost * UNIT, (cost - lowest) * UNIT, True, capped) for cost, capped, visit in found
+    )
+
+
+def _around_best(
+    problem: RoutingProblem, solver: ExactSolver, limit: SolveLimit | None, radius: float, plan: Plan | None
 ) -> tuple[Regret, ...] | None:
+    """Regrets within the radius of a proven plan, from one pass; None if that is too much or there is no such plan."""
     metric = integer_metric(problem.distances)
     if not solver.applies(problem, metric):
         return None
-    instance = make_instance(problem, metric)
-    if solver.table_fits(instance):
-        costs = costs_by_table(instance)
-        return ranked(problem, costs, max(costs.values(), default=0), costs)
     if plan is None or plan.status is not Status.OPTIMAL:
-        plan = solver.solve(problem, seed=seed, limit=limit)
+        plan = solver.solve(problem, limit=limit)
     if plan.status is not Status.OPTIMAL:
         return None
-    return _around(problem, instance, metric, plan, radius, limit)
-
-
-def _around(
-    problem: RoutingProblem,
-    instance: Instance,
-    metric: NDArray[np.int64],
-    plan: Plan,
-    radius: float,
-    limit: SolveLimit | None,
-) -> tuple[Regret, ...] | None:
-    """Regrets within the radius of a proven plan, from one pass; None if that is too much."""
-    order = [problem.start, *(v.location for v in plan.visits)]
-    best = int(metric[order[:-1], order[1:]].sum())
+    best = int(tour_length(problem, plan.visits, metric))
     deadline = Deadline(None, limit.stop if limit else None)
-    bound = _bound(instance, plan, best, deadline)
-    relaxed = costs_in(bound.instance, bound.table)
-    least = {k: cost - bound.prices for k, cost in relaxed.items()}
+    bound = _bound(make_instance(problem, metric), problem, plan, best, deadline)
+    table, n = bound.table, len(problem.shipments)
+    relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
+    least = {visit: cost - bound.prices for visit, cost in relaxed.items()}
     while True:
         longest = best + math.floor(radius / UNIT)
-        costs = costs_by_pass(bound, longest, MOST_STATES, deadline)
+        costs = costs_by_pass(bound, list(possible_next(problem)), longest, MAX_STATES, deadline)
         if costs is not None:
             return ranked(problem, costs, longest, least)
         radius /= 2
-        if radius < SMALLEST_RADIUS or deadline.over():
+        if radius < MIN_RADIUS or deadline.over():
             return None
 
 
-def _bound(instance: Instance, plan: Plan, best: int, deadline: Deadline) -> Bound:
-    """A tight bound, from the plan's prices."""
-    certificate = plan.certificate
-    if certificate is not None and certificate.proof is Proof.RELAXATION:
-        bound = warm_bound(instance, certificate, MOST_ROWS)
-    else:
-        bound = first_bound(instance, best)
-    return grown(bound, best, MOST_ROWS, deadline)
-
-
-def ranked(problem: RoutingProblem, costs: Costs, longest: int, least: Costs) -> tuple[Regret, ...]:
-    """Regrets from integer costs, the best visit first; those above `longest` are unknown but for that and `least`."""
-    found = []
-    for visit in possible_next(problem, ()):
-        action = visit.shipment if visit.shipment is not None else -1 - (visit.onboard or 0)
-        capped = costs[action] > longest
-        found.append((max(longest, least[action]) if capped else costs[action], capped, visit))
-    lowest = min((cost for cost, _, _ in found), default=0)
-    ranked = sorted(found, key=lambda entry: entry[:2])
-    return tuple(
-        Regret(visit, cost * UNIT, (cost - lowest) * UNIT, True, capped) for cost, capped, visit in ranked
-    )
+def _bound(instance: Instance, problem: RoutingProblem, plan: Plan, best: int, deadline: Deadline) -> Bound:
+    """A tight bound, from the plan's multipliers."""
+    start = NOTHING_KNOWN.updated(problem, plan).numbered(problem.names[: len(problem.shipments)])
+    bound = first_bound(instance, best) if start is None else warm_bound(instance, start, MAX_ROWS)
+    return grown(bound, best, MAX_ROWS, deadline)

@@ -1,10 +1,10 @@
-"""A plan in terms of names and positions, and the state of a task that it is made from."""
+"""The state of a task, and the route through what is left of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from planner.errors import ProblemError
-from planner.plan import Plan, VisitKind
+from planner.plan import Plan, Visit, VisitKind
 
 XY = tuple[float, float]
 
@@ -41,34 +41,39 @@ class TaskState:
 
 
 @dataclass(frozen=True)
-class RouteVisit:
-    """One stop: pick or place an object, at a navigable position in m."""
-
-    kind: VisitKind
-    object: str
-    location: XY
-
-
-@dataclass(frozen=True)
 class Route:
     """What is left to do, in order.
 
     Attributes:
-        visits: Remaining stops.
+        visits: Remaining visits.
         cost: Length of the open tour from the position the route was made or last updated for, m.
         plan: The plan it follows, with its bound and status. While a route is followed this stays the plan as
             it was made, done visits included.
     """
 
-    visits: tuple[RouteVisit, ...]
+    visits: tuple[Visit, ...]
     cost: float
     plan: Plan
 
     @property
-    def next(self) -> RouteVisit | None:
-        """The next stop, or None when everything is done."""
+    def next(self) -> Visit | None:
+        """The next visit, or None when everything is done."""
         return self.visits[0] if self.visits else None
 
-    def follows(self, kind: VisitKind, name: str) -> bool:
-        """Whether a visit is the next one of this route."""
-        return self.next is not None and (self.next.kind, self.next.object) == (kind, name)
+
+def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | None:
+    """The visits that are still to be done if what was done is a beginning of them, else None."""
+    loose = {visit.object for visit in visits if visit.kind is VisitKind.PICK}
+    carried = {visit.object for visit in visits} - loose
+    done = 0
+    while (loose, carried) != (set(state.loose), set(state.carried)):
+        if done == len(visits):
+            return None
+        kind, name = visits[done]
+        done += 1
+        if kind is VisitKind.PICK:
+            loose.remove(name)
+            carried.add(name)
+        else:
+            carried.remove(name)
+    return tuple(visits[done:])

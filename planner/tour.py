@@ -1,7 +1,7 @@
 """What solvers share: integer metrics, visits that are possible next, plans made of an order of visits."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,42 +36,35 @@ def is_metric(distances: NDArray[np.float64], metric: NDArray[np.int64]) -> bool
     return bool((integer_distances(distances) - metric).max(initial=0) <= 2 * len(metric))
 
 
-def pick(problem: RoutingProblem, shipment: int) -> Visit:
-    """The visit that picks a shipment."""
-    return Visit(problem.shipments[shipment].pickup, VisitKind.PICK, shipment=shipment)
-
-
-def place(problem: RoutingProblem, shipment: int) -> Visit:
-    """The visit that places a shipment."""
-    return Visit(problem.shipments[shipment].delivery, VisitKind.PLACE, shipment=shipment)
-
-
-def place_onboard(problem: RoutingProblem, onboard: int) -> Visit:
-    """The visit that places an object carried from the beginning."""
-    return Visit(problem.onboard[onboard], VisitKind.PLACE, onboard=onboard)
-
-
-def possible_next(problem: RoutingProblem, visits: Sequence[Visit]) -> Iterator[Visit]:
+def possible_next(problem: RoutingProblem, visits: Sequence[Visit] = ()) -> Iterator[Visit]:
     """Visits that capacity and precedence allow after the given ones."""
-    done = set(visits)
+    done, n = set(visits), len(problem.shipments)
     load = len(problem.onboard)
     for visit in visits:
         load += 1 if visit.kind is VisitKind.PICK else -1
-    for k in range(len(problem.onboard)):
-        if place_onboard(problem, k) not in done:
-            yield place_onboard(problem, k)
-    for k in range(len(problem.shipments)):
-        if pick(problem, k) not in done:
+    for k in range(n, len(problem.names)):
+        if problem.place(k) not in done:
+            yield problem.place(k)
+    for k in range(n):
+        if problem.pick(k) not in done:
             if load < problem.capacity:
-                yield pick(problem, k)
-        elif place(problem, k) not in done:
-            yield place(problem, k)
+                yield problem.pick(k)
+        elif problem.place(k) not in done:
+            yield problem.place(k)
 
 
-def tour_length(distances: NDArray[Any], start: int, visits: Sequence[Visit]) -> float:
-    """Length of an open tour, in the unit of the distances; exact for integers below 2^53."""
-    order = [start, *(v.location for v in visits)]
-    return float(distances[order[:-1], order[1:]].sum())
+def tour_length(
+    problem: RoutingProblem, visits: Iterable[Visit], distances: NDArray[Any] | None = None
+) -> float:
+    """Length of an open tour.
+
+    Args:
+        problem: The problem.
+        visits: The tour.
+        distances: In place of the problem's own, (k, k); the length is in their unit, exact for integers below 2^53.
+    """
+    stops = problem.stops(visits)
+    return float((problem.distances if distances is None else distances)[stops[:-1], stops[1:]].sum())
 
 
 def spanning_bound(problem: RoutingProblem, metric: NDArray[np.int64]) -> int:
@@ -112,9 +105,9 @@ def make_plan(
         OPTIMAL if the tour meets the bound in the integer metric and is as long in the given distances (to
         rounding). The latter fails only for distances that were no metric.
     """
-    cost = tour_length(problem.distances, problem.start, visits)
+    cost = tour_length(problem, visits)
     rounding = 2 * UNIT * len(visits)
-    optimal = tour_length(metric, problem.start, visits) <= bound and cost <= bound * UNIT + rounding
+    optimal = tour_length(problem, visits, metric) <= bound and cost <= bound * UNIT + rounding
     lower = cost if optimal else max(0.0, min(cost, bound * UNIT - rounding))
     status = Status.OPTIMAL if optimal else Status.FEASIBLE
     return Plan(tuple(visits), cost, lower, status, time.perf_counter() - started, certificate)

@@ -78,6 +78,10 @@ class Task:
     def state(self):
         return TaskState(self.position, dict(self.loose), tuple(self.carried), self.deliveries)
 
+    def place(self, visit):
+        """Where a visit happens."""
+        return self.loose[visit.object] if visit.kind is VisitKind.PICK else self.deliveries[visit.object]
+
     def do(self, kind, name):
         if kind is VisitKind.PICK:
             self.position = self.loose.pop(name)

@@ -73,7 +73,7 @@ def plain_optimum(problem):
 
 
 def integer_length(problem, plan):
-    return int(tour_length(integer_metric(problem.distances), problem.start, plan.visits))
+    return int(tour_length(problem, plan.visits, integer_metric(problem.distances)))
 
 
 @settings(max_examples=60, deadline=None)
@@ -128,7 +128,7 @@ def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, wi
     assert found.lower <= optimum <= found.upper
     if found.actions is not None:
         visits = to_visits(problem, instance, found.actions)
-        assert tour_length(integer_metric(problem.distances), problem.start, visits) == found.upper
+        assert tour_length(problem, visits, integer_metric(problem.distances)) == found.upper
 
 
 @settings(max_examples=30, deadline=None)
@@ -207,9 +207,9 @@ def test_drops_of_a_pick_order_are_decoded_optimally(seed, n, onboard, bins):
     costs = np.empty((n + 1, len(instance.bins) + 1), np.int32)
     length = decode(instance, order, 0, costs)
     assert length == dropped_every_way(instance, order)
-    visits = to_visits(problem, instance, tour_actions(instance, order).tolist())
-    assert tour_length(integer_metric(problem.distances), problem.start, visits) == length
-    assert [v.shipment for v in visits if v.kind.value == "pick"] == order.tolist()
+    visits = to_visits(instance, tour_actions(instance, order).tolist(), problem.names[:n], problem.names[n:])
+    assert tour_length(problem, visits, integer_metric(problem.distances)) == length
+    assert [problem.number[v.object] for v in visits if v.kind.value == "pick"] == order.tolist()
 
 
 @settings(max_examples=50, deadline=None)

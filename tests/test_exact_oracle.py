@@ -82,7 +82,7 @@ def grid_problem(rng, most, capacity):
 def assert_optimal(problem, planner, length):
     plan = planner.solve(problem)
     assert plan.status is Status.OPTIMAL
-    assert int(tour_length(integer_metric(problem.distances), problem.start, plan.visits)) == length
+    assert int(tour_length(problem, plan.visits, integer_metric(problem.distances))) == length
     return plan
 
 
@@ -127,5 +127,5 @@ def test_search_and_full_table_agree_up_to_eighteen_objects(n):
         shipments = tuple(Shipment(1 + bins + k, 1 + int(rng.integers(bins))) for k in range(n))
         problem = RoutingProblem(d, 0, shipments, (1,) * seed, 2)
         by_table = ExactSolver(table_bytes=1 << 30).solve(problem)
-        length = int(tour_length(integer_metric(d), 0, by_table.visits))
+        length = int(tour_length(problem, by_table.visits, integer_metric(d)))
         assert_optimal(problem, SEARCH, length)

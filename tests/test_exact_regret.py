@@ -11,7 +11,7 @@ from planning_cases import random_problem
 from planner.errors import ProblemError
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
-from planner.plan import Status, Visit, VisitKind
+from planner.plan import Status, VisitKind
 from planner.regret import after, regrets
 from planner.replanner import Replanner
 from planner.route import TaskState
@@ -53,7 +53,7 @@ def test_regrets_are_those_of_all_orders(seed, shipments, onboard):
     assert len(found) == len(expected)
     for regret in found:
         name = "pick" if regret.visit.kind is VisitKind.PICK else "onboard"
-        index = regret.visit.shipment if name == "pick" else regret.visit.onboard
+        index = problem.number[regret.visit.object] - (0 if name == "pick" else len(problem.shipments))
         assert regret.proven
         assert regret.cost == pytest.approx(expected[name, index], abs=5e-3)
         assert regret.regret == pytest.approx(expected[name, index] - min(expected.values()), abs=5e-3)
@@ -69,9 +69,8 @@ def test_the_best_next_visit_costs_what_the_plan_costs():
 
 def test_a_visit_that_is_not_possible_is_refused():
     problem = random_problem(1, 2, 2)
-    pick = Visit(problem.shipments[0].pickup, VisitKind.PICK, shipment=0)
     with pytest.raises(ProblemError, match="not possible now"):
-        after(problem, pick)
+        after(problem, problem.pick(0))
 
 
 def test_an_optimal_plan_stays_optimal_while_it_is_followed():
@@ -89,16 +88,16 @@ def test_an_optimal_plan_stays_optimal_while_it_is_followed():
     while loose or carried:
         state = TaskState(position, dict(loose), tuple(carried), deliveries)
         route = guide.update(state)
-        anew = solver("exact").solve(guide.problem(state))
+        anew = solver("exact").solve(guide.problems.problem(state))
         assert anew.status is Status.OPTIMAL
         assert route.cost == pytest.approx(anew.cost, abs=5e-3)
-        stop = route.next
-        position = stop.location
-        if stop.kind is VisitKind.PICK:
-            del loose[stop.object]
-            carried.append(stop.object)
+        kind, name = route.next
+        if kind is VisitKind.PICK:
+            position = loose.pop(name)
+            carried.append(name)
         else:
-            carried.remove(stop.object)
+            position = deliveries[name]
+            carried.remove(name)
     assert guide.replans == 0
 
 

@@ -13,11 +13,11 @@ from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
-from planner.plan import VisitKind
+from planner.plan import Visit, VisitKind
 from planner.regret import after, one_by_one, regrets
-from planner.replanner import Replanner
 from planner.route import TaskState
 from planner.solver import SolveLimit, solver
+from planner.task_problems import TaskProblems
 from planner.tour import possible_next
 
 seeds = st.integers(0, 2**32 - 1)
@@ -27,8 +27,8 @@ TABLE, PASS = ExactSolver(), ExactSolver(table_bytes=0)
 def expected(problem):
     """Cost of the task by next visit."""
     return {
-        visit: problem.distances[problem.start, visit.location] + optimum(after(problem, visit))
-        for visit in possible_next(problem, ())
+        visit: problem.distances[problem.start, problem.location(visit)] + optimum(after(problem, visit))
+        for visit in possible_next(problem)
     }
 
 
@@ -81,7 +81,7 @@ def test_beyond_the_table_the_nearest_alternatives_are_exact():
     assert any(r.capped for r in found)
     for r in found[:3]:
         rest = TABLE.solve(after(problem, r.visit))
-        truth = problem.distances[0, r.visit.location] + rest.cost
+        truth = problem.distances[0, problem.location(r.visit)] + rest.cost
         if r.capped:
             assert truth >= r.cost - 5e-3
         else:
@@ -116,8 +116,8 @@ def test_a_regret_is_not_proven_where_the_best_visit_is_not():
 
 def test_equal_visits_have_equal_regrets():
     one = random_problem(2, 5)
-    twin = dataclasses.replace(one, shipments=(*one.shipments, one.shipments[2]))
-    by_shipment = {r.visit.shipment: r.regret for r in regrets(twin, TABLE)}
+    twin = dataclasses.replace(one, shipments=(*one.shipments, one.shipments[2]), names=())
+    by_shipment = {twin.number[r.visit.object]: r.regret for r in regrets(twin, TABLE)}
     assert by_shipment[2] == by_shipment[5]
 
 
@@ -126,21 +126,21 @@ def test_a_negative_radius_and_an_impossible_visit_are_refused():
     with pytest.raises(ProblemError, match="radius"):
         regrets(problem, TABLE, radius=-1.0)
     with pytest.raises(ProblemError, match="not possible now"):
-        after(problem, next(v for v in possible_next(random_problem(1, 2), ()) if v.shipment == 0))
+        after(problem, problem.pick(0))
 
 
 def test_regrets_of_a_live_task_go_by_name():
     geodesics = Geodesics(NavMesh.build([np.array([(3, 3), (4, 3), (4, 4), (3, 4)])], (0, 0, 8, 8)))
     loose = {"near": (1.0, 2.0), "far": (7.0, 7.0)}
     state = TaskState((1.0, 1.0), loose, ("held",), dict.fromkeys((*loose, "held"), (1.0, 3.0)))
-    found = Replanner(geodesics, TABLE).regrets(state, radius=5.0)
+    found = {r.visit: r for r in regrets(TaskProblems(geodesics).problem(state), TABLE)}
     assert set(found) == {(VisitKind.PICK, "near"), (VisitKind.PICK, "far"), (VisitKind.PLACE, "held")}
     assert next(iter(found)) == (VisitKind.PICK, "near")  # it lies on the way of what is held
-    assert found[VisitKind.PICK, "near"].regret == 0
+    assert found[Visit(VisitKind.PICK, "near")].regret == 0
     # Place first: back for the near one, then from there to the far one instead of from the bin.
     detour = 1 + geodesics.shortest_path(loose["near"], loose["far"]).geodesic_distance
     direct = geodesics.shortest_path((1.0, 3.0), loose["far"]).geodesic_distance
-    assert found[VisitKind.PLACE, "held"].regret == pytest.approx(detour - direct, abs=5e-3)
+    assert found[Visit(VisitKind.PLACE, "held")].regret == pytest.approx(detour - direct, abs=5e-3)
 
 
 def test_regrets_can_be_given_up():

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from planning_cases import Task, optimum, two_rooms
 
 from planner.exact.solver import ExactSolver
-from planner.plan import VisitKind
+from planner.plan import Visit, VisitKind
 from planner.regret import regrets
 from planner.regret_evaluator import RegretEvaluator
-from planner.replanner import Replanner, name_of
 from planner.solver import SolveLimit, solver
+from planner.task_problems import TaskProblems
 
 SEARCH = ExactSolver(table_bytes=0)
 
@@ -22,21 +22,19 @@ def geodesics():
 
 
 def possible(task):
-    picks = [(VisitKind.PICK, name) for name in task.loose] if len(task.carried) < 2 else []
-    return picks + [(VisitKind.PLACE, name) for name in task.carried]
+    picks = [Visit(VisitKind.PICK, name) for name in task.loose] if len(task.carried) < 2 else []
+    return picks + [Visit(VisitKind.PLACE, name) for name in task.carried]
 
 
 @settings(max_examples=12, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_table_that_was_kept_says_what_a_fresh_one_would(geodesics, seed):
     task, rng = Task(geodesics, 7, seed), np.random.default_rng(seed)
-    judge, fresh = RegretEvaluator(geodesics), Replanner(geodesics, solver("exact"))
+    judge, fresh = RegretEvaluator(geodesics), TaskProblems(geodesics)
     while possible(task):
         state = task.state
-        found, names = judge.all(state), list(state.loose)
-        expected = {
-            name_of(r.visit, names, state): r.regret for r in regrets(fresh.problem(state), solver("exact"))
-        }
+        found = judge.all(state)
+        expected = {r.visit: r.regret for r in regrets(fresh.problem(state), solver("exact"))}
         assert {stop: r.regret for stop, r in found.items()} == pytest.approx(expected, abs=3e-3)
         assert all(judge.of(state, stop) == found[stop].regret for stop in found)
         if rng.random() < 0.15:
@@ -51,7 +49,7 @@ def test_regrets_add_up_to_the_detour_of_the_whole_task(geodesics, seed, planner
     """Whatever order things are done in: its length is the optimum's and all regrets together."""
     task, rng = Task(geodesics, 6, seed), np.random.default_rng(seed)
     judge = RegretEvaluator(geodesics, solver=planner)
-    shortest = optimum(Replanner(geodesics, solver("greedy")).problem(task.state))
+    shortest = optimum(TaskProblems(geodesics).problem(task.state))
     walked = regretted = 0.0
     while possible(task):
         state, here = task.state, task.position
@@ -83,7 +81,7 @@ def test_a_plan_that_is_known_to_be_best_need_not_be_found_again(geodesics):
             return super().solve(*args, **options)
 
     task = Task(geodesics, 12, 3)
-    plan = SEARCH.solve(Replanner(geodesics, SEARCH).problem(task.state))
+    plan = SEARCH.solve(TaskProblems(geodesics).problem(task.state))
     judge, stop = RegretEvaluator(geodesics, solver=Counting(table_bytes=0)), possible(task)[4]
     known = judge.of(task.state, stop, plan)
     assert Counting.solved == 0
@@ -95,7 +93,7 @@ def test_a_plan_that_is_known_to_be_best_need_not_be_found_again(geodesics):
 def test_what_is_impossible_or_not_proven_has_no_regret(geodesics):
     task = Task(geodesics, 14, 1)
     judge = RegretEvaluator(geodesics, solver=SEARCH, limit=SolveLimit(work=1))
-    assert judge.of(task.state, (VisitKind.PLACE, "object_00")) is None
+    assert judge.of(task.state, Visit(VisitKind.PLACE, "object_00")) is None
     hard = [judge.of(task.state, stop) for stop in possible(task)]
     assert None in hard
 

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from experiments.errors import ConfigError
-from planner.claim_json import claim_from_json, claim_to_json
 from planner.errors import ProblemError
-from planner.problem_json import plan_to_json, problem_from_json
+from planner.problem_json import claim_from_json, claim_to_json, plan_to_json, problem_from_json
 from planner.solver import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, solver
 
 T = TypeVar("T")
@@ -74,8 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.certificate is not None:
         from mjsim.files import write_text_atomically  # loaded only where it is needed
 
-        write_text_atomically(arguments.certificate, claim_to_json(plan) + "\n")
-    print(plan_to_json(plan))
+        write_text_atomically(arguments.certificate, claim_to_json(problem, plan) + "\n")
+    print(plan_to_json(problem, plan))
     return 0
 
 

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 from experiments.errors import ReplayError
 from experiments.records import Event
-from planner.plan import Plan, Status, VisitKind
-from planner.route import Route, RouteVisit, TaskState
+from planner.plan import Plan, Status, Visit, VisitKind
+from planner.route import Route, TaskState
 
 
 class LoggedReplanner:
@@ -67,7 +67,7 @@ class LoggedReplanner:
         return bool(self._plans[0].get("improved", False))
 
 
-def _is_open(visit: RouteVisit, state: TaskState) -> bool:
+def _is_open(visit: Visit, state: TaskState) -> bool:
     if visit.kind is VisitKind.PICK:
         return visit.object in state.loose
     return visit.object in state.loose or visit.object in state.carried
@@ -79,8 +79,9 @@ def _route(event: Event, state: TaskState) -> Route:
         plan = Plan((), cost, float(event["lower_bound_m"]), Status(event["status"]), seconds=0.0)
         visits = []
         for kind, name in event["visits"]:
-            positions = state.loose if kind == "pick" else state.deliveries
-            visits.append(RouteVisit(VisitKind(kind), name, positions[name]))
+            if name not in (state.loose if kind == "pick" else state.deliveries):
+                raise ValueError(f"nothing to {kind} is called {name!r}")
+            visits.append(Visit(VisitKind(kind), name))
         return Route(tuple(visits), cost, plan)
     except (KeyError, TypeError, ValueError) as error:
         raise ReplayError(f"the plan logged at t = {event['t']} s is malformed: {error!r}") from error

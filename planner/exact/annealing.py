@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from mjsim.kernels import kernel
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE
+from planner.exact.warm_start import Start
 
 HOT, COLD = 0.5, 0.01  # temperature at both ends, in mean legs
 
@@ -231,3 +232,15 @@ def anneal_from(
                 for k in range(n):
                     best_order[k] = order[k]
     return best, best_order
+
+
+def warm_order(instance: Instance, start: Start) -> NDArray[np.int64]:
+    """The order of a start, each missing object put where it lengthens the tour least, (n,) int64."""
+    n = len(instance.home)
+    order = [*start.order, *start.missing]
+    costs = np.empty((n + 1, len(instance.bins) + 1), np.int32)
+    for k in start.missing:
+        rest = [j for j in order if j != k]
+        orders = [[*rest[:t], k, *rest[t:]] for t in range(n)]
+        order = min(orders, key=lambda each: decode(instance, np.array(each, dtype=np.int64), 0, costs))
+    return np.array(order, dtype=np.int64)

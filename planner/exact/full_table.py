@@ -40,21 +40,37 @@ def full_table_bytes(instance: Instance) -> int:
 
 def by_table(instance: Instance) -> Found:
     """Fill the full table and follow a shortest tour."""
-    table = new_table(instance, alone(len(instance.home)))
-    if COMPILER in sys.modules or full_table_bytes(instance) > SMALL_TABLE:
-        length, actions = _by_kernels(instance, table)
-    else:
-        fill_layers(instance, table)
-        length, actions = follow(instance, table)
+    table = filled_table(instance)
+    length, actions = follow_table(instance, table, len(table.bin) - 1)
     return Found(actions, length, Certificate(Proof.FULL_TABLE, length))
 
 
-def _by_kernels(instance: Instance, table: Table) -> tuple[int, list[int]]:
-    from planner.exact.relaxation import fill, walk  # loaded only where they are needed
+def filled_table(instance: Instance) -> Table:
+    """The full table, filled by kernels, or in plain numpy where it is small and their compiler is not loaded."""
+    table = new_table(instance, alone(len(instance.home)))
+    if COMPILER in sys.modules or full_table_bytes(instance) > SMALL_TABLE:
+        from planner.exact.relaxation import fill  # loaded only where it is needed
 
-    fill(instance, table)
+        fill(instance, table)
+    else:
+        fill_layers(instance, table)
+    return table
+
+
+def follow_table(instance: Instance, table: Table, row: int) -> tuple[int, list[int]]:
+    """A shortest tour by a full table: its length, and its actions as in `Found`.
+
+    Args:
+        instance: The instance, with its root.
+        table: The filled table.
+        row: Row of the objects left at the root.
+    """
+    if COMPILER not in sys.modules:
+        return follow(instance, table, row)
+    from planner.exact.relaxation import walk  # loaded only where it is needed
+
     actions: NDArray[np.int64] = np.empty(2 * len(instance.home) + 2, np.int64)
-    length, count = walk(instance, table, actions)
+    length, count = walk(instance, table, row, actions)
     return int(length), actions[:count].tolist()
 
 
@@ -80,13 +96,13 @@ def fill_layers(inst: Instance, table: Table) -> None:
         table.bin[rows], table.object[rows] = carrying, np.minimum(alone, drop + empty[:, inst.home])
 
 
-def follow(inst: Instance, table: Table) -> tuple[int, list[int]]:
-    """A best tour from the root by a full table.
+def follow(inst: Instance, table: Table, row: int) -> tuple[int, list[int]]:
+    """A best tour from the root by a full table, in plain Python; the arguments are those of `follow_table`.
 
     Returns:
         Its length, and its actions: k >= 0 picks object k, -1 - b goes to bin b.
     """
-    left, held = len(table.bin) - 1, [int(b) for b in inst.carried]
+    left, held = row, [int(b) for b in inst.carried]
     to_object, to_bin = inst.root, inst.root_bin
     length = 0
     actions: list[int] = []

@@ -10,7 +10,6 @@ from planner.errors import InfeasibleError
 from planner.exact.deadline import NEVER, Deadline
 from planner.plan import Visit
 from planner.problem import RoutingProblem
-from planner.tour import pick, place, place_onboard
 
 # Where one is, which shipments are not yet picked (bits), and where each carried object goes (sorted).
 State = tuple[int, int, tuple[int, ...]]
@@ -85,7 +84,7 @@ class _Search:
         return here, left, tuple(sorted(j for j in carried if not (self._at_once and j == here)))
 
     def moves(self, state: State) -> list[tuple[int, State]]:
-        """LocomotionState to every feasible next state."""
+        """Length of the leg to every feasible next state, and that state."""
         here, left, carried = state
         row = self._legs[here]
         found = []
@@ -117,13 +116,14 @@ class _Search:
             chain.append(before[chain[-1]])
         chain.reverse()
         problem = self._problem
-        holding = [(j, place_onboard(problem, k)) for k, j in enumerate(problem.onboard)]
-        left, visits = (1 << len(problem.shipments)) - 1, list[Visit]()
+        n = len(problem.shipments)
+        holding = [(j, problem.place(n + k)) for k, j in enumerate(problem.onboard)]
+        left, visits = (1 << n) - 1, list[Visit]()
         for _, now_left, carried in chain:
             for k, shipment in enumerate(problem.shipments):
                 if (left ^ now_left) >> k & 1:
-                    visits.append(pick(problem, k))
-                    holding.append((shipment.delivery, place(problem, k)))
+                    visits.append(problem.pick(k))
+                    holding.append((shipment.delivery, problem.place(k)))
             left = now_left
             for dropped in _difference([j for j, _ in holding], carried):
                 at = next(i for i, (j, _) in enumerate(holding) if j == dropped)

@@ -6,9 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.plan import Visit
+from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem
-from planner.tour import pick, place, place_onboard
 
 FAR = 1 << 28
 
@@ -75,15 +74,24 @@ def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instanc
     )
 
 
-def to_visits(problem: RoutingProblem, instance: Instance, actions: Sequence[int]) -> list[Visit]:
-    """Turn actions into visits: k >= 0 picks object k, -1 - b goes to bin b and leaves all that belongs there."""
-    held = [(int(b), place_onboard(problem, k)) for k, b in enumerate(instance.carried)]
+def to_visits(
+    instance: Instance, actions: Sequence[int], names: Sequence[str], carried: Sequence[str]
+) -> list[Visit]:
+    """Turn actions into visits.
+
+    Args:
+        instance: What the actions are of.
+        actions: k >= 0 picks object k, -1 - b goes to bin b and leaves all that belongs there.
+        names: Of the objects of the instance.
+        carried: Names of what is carried at the root.
+    """
+    held = list(zip(instance.carried.tolist(), carried, strict=True))
     visits: list[Visit] = []
     for action in actions:
         if action >= 0:
-            visits.append(pick(problem, action))
-            held.append((int(instance.home[action]), place(problem, action)))
+            visits.append(Visit(VisitKind.PICK, names[action]))
+            held.append((int(instance.home[action]), names[action]))
         else:
-            visits += [visit for b, visit in held if b == -1 - action]
-            held = [(b, visit) for b, visit in held if b != -1 - action]
+            visits += [Visit(VisitKind.PLACE, name) for b, name in held if b == -1 - action]
+            held = [(b, name) for b, name in held if b != -1 - action]
     return visits

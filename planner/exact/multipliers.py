@@ -12,6 +12,7 @@ from planner.exact.groups import numbered, together, with_one_alone
 from planner.exact.instance import Instance
 from planner.exact.relaxation import fill, walk
 from planner.exact.table import Table, new_table, rows_of
+from planner.exact.warm_start import Start
 
 MEMORY = 0.97  # of a step in the record of what is picked too often or too rarely
 MOMENTUM = 0.8
@@ -53,6 +54,24 @@ def first_bound(instance: Instance, upper: int) -> Bound:
     table = new_table(instance, together(n))
     bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STRIDES, NEVER)
     return cast(Bound, bound)  # it never runs out of time
+
+
+def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
+    """The bound that groups and multipliers give, by one filling of a table.
+
+    Args:
+        instance: What is left to do.
+        start: Groups and multipliers; the last groups are merged with the first if they are too many.
+        max_rows: Of the table.
+    """
+    n, group = len(instance.home), start.group.copy()
+    while rows_of(group) > max_rows and group.max(initial=0) > 0:
+        group[group == group.max()] = 0
+    table = new_table(instance, group)
+    table.multipliers[:] = start.multipliers
+    fill(instance, table)
+    total, _ = walk(instance, table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
+    return Bound(instance, table, int(total) - int(table.multipliers.sum()), np.zeros(n))
 
 
 def grown(bound: Bound, upper: int, most_rows: int, deadline: Deadline) -> Bound:
@@ -143,7 +162,7 @@ def fit(
         table.multipliers[:] = np.rint(current)
         if not fill(instance, table, deadline):
             return None
-        total, count = walk(instance, table, actions)
+        total, count = walk(instance, table, len(table.bin) - 1, actions)
         value = int(total) - int(table.multipliers.sum())
         if value > best:
             best = value

@@ -162,18 +162,18 @@ def choose(
 
 
 @kernel
-def walk(inst: Instance, table: Table, actions: NDArray[np.int64]) -> tuple[int, int]:
+def walk(inst: Instance, table: Table, row: int, actions: NDArray[np.int64]) -> tuple[int, int]:
     """Follow a best relaxed tour from the root.
 
     Args:
         inst: The instance.
         table: A filled table.
+        row: Row of the objects left at the root.
         actions: Receives the actions, at least (2 n + 2,): k >= 0 picks object k, -1 - b goes to bin b.
 
     Returns:
         Length of the tour with multipliers, and the number of actions.
     """
-    row = table.bin.shape[0] - 1
     to_object, to_bin, at = inst.root, inst.root_bin, -1
     first = inst.carried[0] if inst.carried.size > 0 else -1
     second = inst.carried[1] if inst.carried.size > 1 else -1

@@ -4,26 +4,22 @@ import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planner.certificate import Certificate, Proof
-from planner.errors import ProblemError
 from planner.exact.deadline import Deadline
 from planner.exact.full_table import SMALL_TABLE, Found, by_table, full_table_bytes
 from planner.exact.general import best_first
 from planner.exact.groups import BIN_ROWS
 from planner.exact.instance import Instance, make_instance, to_visits
+from planner.exact.warm_start import Start, WarmStart
 from planner.greedy_solver import GreedySolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
 from planner.tour import integer_distances, integer_metric, is_metric, make_plan
-
-if TYPE_CHECKING:
-    from planner.exact.warm import Warm  # brings the compiled kernels
 
 TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
 DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables, for what is planned again and again
@@ -78,7 +74,7 @@ class ExactSolver:
         *,
         seed: int = 0,
         limit: SolveLimit | None = None,
-        warm: "Warm | None" = None,
+        warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
         """Yield the annealed tour with a first bound, then each shorter tour or better bound.
 
@@ -86,16 +82,9 @@ class ExactSolver:
             problem: What is left to do.
             seed: Of the annealing.
             limit: As in `solve`.
-            warm: What is known from a similar problem. The first plan is then that of a narrow search with it,
+            warm: What is known from similar problems. The first plan is then that of a narrow search with it,
                 which is better; the last may differ from that of `solve` where it is not proven, or ties.
-
-        Raises:
-            ProblemError: What is known is about another number of shipments.
         """
-        if warm is not None and len(warm.order) != len(problem.shipments):
-            raise ProblemError(
-                f"known are {len(warm.order)} shipments, the problem has {len(problem.shipments)}"
-            )
         best = None
         for plan in self._plans(problem, seed, limit or SolveLimit(), table_at_once=False, warm=warm):
             if best is None or plan.improves_on(best):
@@ -119,7 +108,7 @@ class ExactSolver:
         limit: SolveLimit,
         *,
         table_at_once: bool,
-        warm: "Warm | None" = None,
+        warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
         """Ever better plans; only one where a table is filled at once."""
         started = time.perf_counter()
@@ -136,9 +125,11 @@ class ExactSolver:
         if tabled and (table_at_once or size <= SMALL_TABLE):
             found: Iterable[Found] = [by_table(instance)]
         else:
-            found = self._search(instance, seed, limit, started, tabled=tabled, warm=warm)
+            start = None if warm is None else warm.numbered(problem.names[: len(problem.shipments)])
+            found = self._search(instance, seed, limit, started, tabled=tabled, start=start)
+        n = len(problem.shipments)
         for known in found:
-            visits = to_visits(problem, instance, known.actions)
+            visits = to_visits(instance, known.actions, problem.names[:n], problem.names[n:])
             yield make_plan(problem, metric, visits, known.bound, started, known.certificate)
 
     def _general(
@@ -173,13 +164,13 @@ class ExactSolver:
         started: float,
         *,
         tabled: bool,
-        warm: "Warm | None",
+        start: Start | None,
     ) -> Iterator[Found]:
         """Ever better tours and bounds: annealed, then by the full table or by passes of the search."""
         from planner.exact.widening import widening  # brings the compiled kernels, which take 0.5 s to load
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
         passes = () if tabled else self.passes
-        yield from widening(instance, seed, limit.work or DEFAULT_WORK, deadline, passes, warm)
+        yield from widening(instance, seed, limit.work or DEFAULT_WORK, deadline, passes, start)
         if tabled and not deadline.over():
             yield by_table(instance)

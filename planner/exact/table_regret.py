@@ -1,60 +1,67 @@
 """Cost of the rest of a task after each possible next visit: all from one full table, or one exhaustive pass."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
 from planner.exact.deadline import Deadline
-from planner.exact.groups import alone
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
 from planner.exact.nodes import Nodes, new_nodes, slot_of
-from planner.exact.relaxation import after_pick, fill, row_without
+from planner.exact.relaxation import after_pick, row_without
 from planner.exact.search import PLACE_BITS, expand, offer_roots
-from planner.exact.table import INFINITE, Table, new_table
+from planner.exact.table import INFINITE, Table
+from planner.plan import Visit, VisitKind
 
 FIRST_ROOM = 1 << 12
 UNLIMITED = 1 << 40  # states of a layer
 
-# Length of the rest of the task, units, by next action: k >= 0 picks object k, -1 - k places onboard object k.
-Costs = dict[int, int]
+Costs = dict[Visit, int]  # length of the rest of the task, units, by next visit
 
 
-def costs_by_table(instance: Instance) -> Costs:
-    """Exact costs of all next actions, by filling the full table."""
-    table = new_table(instance, alone(len(instance.home)))
-    fill(instance, table)
-    return costs_in(instance, table)
+def costs_in(
+    instance: Instance, table: Table, row: int, names: Sequence[str], carried: Sequence[str]
+) -> Costs:
+    """Costs of all next visits as a table has them; with a relaxed one these are lower bounds, prices included.
 
-
-def costs_in(instance: Instance, table: Table) -> Costs:
-    """Costs of all next actions as a table has them; with a relaxed one these are lower bounds, prices included."""
-    carried = [int(b) for b in instance.carried]
-    row = table.bin.shape[0] - 1
+    Args:
+        instance: The instance, with its root.
+        table: The filled table.
+        row: Row of the objects left at the root.
+        names: Of the objects of the instance.
+        carried: Names of what is carried at the root.
+    """
+    held = instance.carried.tolist()
     costs = {}
-    for k, b in enumerate(carried):
-        other = carried[1 - k] if len(carried) == 2 else b
-        costs[-1 - k] = int(instance.root_bin[b]) + int(table.bin[row, b, other])
-    if len(carried) < 2:
-        for j in range(len(instance.home)):
-            left = row_without(table, row, j)
-            if carried:
-                rest = after_pick(instance, table, left, j, carried[0])
-            else:
-                rest = int(table.object[left, j]) + int(table.multipliers[j])
-            costs[j] = int(instance.root[j]) + rest
+    for k, (b, name) in enumerate(zip(held, carried, strict=True)):
+        other = held[1 - k] if len(held) == 2 else b
+        costs[Visit(VisitKind.PLACE, name)] = int(instance.root_bin[b]) + int(table.bin[row, b, other])
+    for j, name in enumerate(names if len(held) < 2 else ()):
+        left = row_without(table, row, j)
+        if left < 0:
+            continue
+        if held:
+            rest = after_pick(instance, table, left, j, held[0])
+        else:
+            rest = int(table.object[left, j]) + int(table.multipliers[j])
+        costs[Visit(VisitKind.PICK, name)] = int(instance.root[j]) + rest
     return costs
 
 
-def costs_by_pass(bound: Bound, longest: int, most_states: int, deadline: Deadline) -> Costs | None:
-    """Costs of all next actions, exact where at most `longest`, else some number greater than it.
+def costs_by_pass(
+    bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
+) -> Costs | None:
+    """Costs of all next visits, exact where at most `longest`, else some number greater than it.
 
     Every state on a tour of at most that length is visited, layer by layer; a sweep back finds the way on from each.
 
     Args:
         bound: Bound of the cost-to-go.
+        visits: Those possible next: places of what is carried, then picks if a hand is free.
         longest: Greatest length of interest, units.
-        most_states: Give up beyond so many states.
+        max_states: Give up beyond so many states.
         deadline: Give up when it is over.
 
     Returns:
@@ -74,7 +81,7 @@ def costs_by_pass(bound: Bound, longest: int, most_states: int, deadline: Deadli
         here, after = expanded.here, expanded.after
         layers.append(here)
         states += int(here.size[0])
-        if states > most_states:
+        if states > max_states:
             return None
         here, after = after, new_nodes(FIRST_ROOM)
     rest = [np.zeros(0, np.int32)] * (n + 1)
@@ -82,11 +89,9 @@ def costs_by_pass(bound: Bound, longest: int, most_states: int, deadline: Deadli
     for k in range(n, -1, -1):
         after, after_rest = (layers[k + 1], rest[k + 1]) if k < n else (beyond, nothing)
         rest[k] = sweep(instance, layers[k], after, after_rest)
-    carried = [int(b) for b in instance.carried]
     first = (layers[1], rest[1]) if n else (beyond, nothing)
     found = root_costs(instance, layers[0], rest[0], *first)
-    names = [-1 - k for k in range(len(carried))] + list(range(n) if len(carried) < 2 else ())
-    return {name: int(cost) for name, cost in zip(names, found, strict=True)}
+    return {visit: int(cost) for visit, cost in zip(visits, found, strict=True)}
 
 
 @kernel

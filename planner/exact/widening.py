@@ -5,14 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from planner.certificate import Certificate, Proof
-from planner.exact.annealing import anneal, anneal_from, tour_actions
+from planner.exact.annealing import anneal, anneal_from, tour_actions, warm_order
 from planner.exact.beam import beam_pass
 from planner.exact.deadline import NEVER, Deadline
 from planner.exact.full_table import Found
 from planner.exact.groups import BIN_ROWS
 from planner.exact.instance import Instance
-from planner.exact.multipliers import Bound, first_bound, grown, told_apart
-from planner.exact.warm import Warm, warm_bound, warm_order
+from planner.exact.multipliers import Bound, first_bound, grown, told_apart, warm_bound
+from planner.exact.warm_start import Start
 
 ANNEALING_MOVES = 20_000
 # A first plan with something known: some 20 ms.
@@ -26,7 +26,7 @@ def widening(
     work: int,
     deadline: Deadline,
     passes: tuple[tuple[int, int], ...],
-    warm: Warm | None,
+    start: Start | None,
 ) -> Iterator[Found]:
     """Yield a first tour and bound, then what each pass of the search makes of them.
 
@@ -36,19 +36,19 @@ def widening(
         work: States that may be expanded.
         deadline: No pass begins when it is over; there is a first tour nevertheless.
         passes: Rows of the bound's table and states kept of each layer, at most, from pass to pass.
-        warm: What is known from a similar problem.
+        start: What is known from similar problems.
     """
-    if warm is None:
+    if start is None:
         length, order = anneal(instance, seed, ANNEALING_MOVES)
         bound = first_bound(instance, int(length))
     else:
         length, order = anneal_from(
-            instance, seed, WARM_MOVES, warm_order(instance, warm), *WARM_TEMPERATURES
+            instance, seed, WARM_MOVES, warm_order(instance, start), *WARM_TEMPERATURES
         )
-        bound = warm_bound(instance, warm.certificate, WARM_ROWS)
+        bound = warm_bound(instance, start, WARM_ROWS)
     upper, lower = int(length), bound.root
     actions: list[int] = tour_actions(instance, order).tolist()
-    if warm is not None:
+    if start is not None:
         narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
         lower = max(lower, narrow.lower)
         if narrow.actions is not None:

@@ -1,0 +1,133 @@
+"""A full table of costs-to-go that serves one state of a task after the other.
+
+It holds for every later state in which nothing was moved, wherever the person is and whatever is carried. So it is
+filled once for a task (from 18 objects left on), and all later questions are looked up.
+"""
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.certificate import Certificate, Proof
+from planner.exact.full_table import filled_table, follow_table
+from planner.exact.instance import FAR, Instance, make_instance, to_visits
+from planner.exact.table import Table
+from planner.plan import Plan, Visit
+from planner.problem import RoutingProblem
+from planner.tour import integer_distances, integer_metric, make_plan
+
+if TYPE_CHECKING:
+    from planner.exact.solver import ExactSolver
+
+
+class TableState(NamedTuple):
+    """A state of a task as a row of a full table.
+
+    Attributes:
+        instance: The instance of the table, with the present root.
+        table: The filled table.
+        row: Row of the objects left.
+        names: Of the objects of the instance.
+        metric: Integer distances between the locations of the present problem, consistent with the table, (k, k).
+    """
+
+    instance: Instance
+    table: Table
+    row: int
+    names: tuple[str, ...]
+    metric: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Filled:
+    problem: RoutingProblem
+    metric: NDArray[np.int64]
+    instance: Instance
+    table: Table
+
+
+class TaskTable:
+    """Fills a full table where one is small enough, and keeps it as long as it serves.
+
+    Args:
+        solver: Says how large a table may be.
+    """
+
+    def __init__(self, solver: "ExactSolver") -> None:
+        self._solver = solver
+        self._filled: _Filled | None = None
+
+    def plan(self, problem: RoutingProblem) -> Plan | None:
+        """A proven plan; None if the table would be too large, or does not apply."""
+        started = time.perf_counter()
+        state = self._at(problem)
+        if state is None:
+            return None
+        length, actions = follow_table(state.instance, state.table, state.row)
+        visits = to_visits(state.instance, actions, state.names, problem.names[len(problem.shipments) :])
+        return make_plan(
+            problem, state.metric, visits, length, started, Certificate(Proof.FULL_TABLE, length)
+        )
+
+    def costs(self, problem: RoutingProblem) -> dict[Visit, int] | None:
+        """Length of the rest of the task, units, by possible next visit; None as for `plan`."""
+        from planner.exact.table_regret import costs_in  # brings the compiled kernels
+
+        state = self._at(problem)
+        if state is None:
+            return None
+        carried = problem.names[len(problem.shipments) :]
+        return costs_in(state.instance, state.table, state.row, state.names, carried)
+
+    def _at(self, problem: RoutingProblem) -> TableState | None:
+        """The state of a problem in the table that is there, or in a new one."""
+        state = _state(self._filled, problem) if self._filled is not None else None
+        if state is not None:
+            return state
+        metric = integer_metric(problem.distances)
+        if not self._solver.applies(problem, metric):
+            return None
+        instance = make_instance(problem, metric)
+        if not self._solver.table_fits(instance):
+            return None
+        self._filled = _Filled(problem, metric, instance, filled_table(instance))
+        return _state(self._filled, problem)
+
+
+def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
+    """A problem's state in a table that was filled for another one; None if it is not among its states."""
+    before, n = filled.problem, len(problem.shipments)
+    if problem.capacity != before.capacity or not set(problem.names) <= set(before.names):
+        return None
+    left = [before.number[name] for name in problem.names[:n]]
+    if any(k >= len(before.shipments) for k in left):
+        return None  # carried when the table was filled, and lying about now
+    places = [problem.place(k) for k in range(len(problem.names))]
+    visits = [*map(problem.pick, range(n)), *places]
+    here, there = problem.stops(visits)[1:], before.stops(visits)[1:]
+    if not np.array_equal(problem.distances[np.ix_(here, here)], before.distances[np.ix_(there, there)]):
+        return None  # something was moved
+    metric = _metric(filled, problem, here, there)
+    bins = sorted({s.delivery for s in before.shipments} | set(before.onboard))
+    bin_of = [bins.index(before.location(visit)) for visit in places]
+    root, root_bin = np.full_like(filled.instance.root, FAR), np.full_like(filled.instance.root_bin, FAR)
+    root[left] = metric[problem.start, here[:n]]
+    root_bin[bin_of] = metric[problem.start, here[n:]]
+    instance = filled.instance._replace(
+        root=root, root_bin=root_bin, carried=np.array(bin_of[n:], dtype=np.int64)
+    )
+    names = before.names[: len(before.shipments)]
+    return TableState(instance, filled.table, sum(1 << k for k in left), names, metric)
+
+
+def _metric(filled: _Filled, problem: RoutingProblem, here: list[int], there: list[int]) -> NDArray[np.int64]:
+    """The metric of the table between locations of the present problem, with the present start."""
+    metric = np.zeros(problem.distances.shape, np.int64)
+    metric[np.ix_(here, here)] = filled.metric[np.ix_(there, there)]
+    if here and problem.start not in here:
+        direct = integer_distances(problem.distances)[problem.start, here]
+        metric[problem.start, here] = (direct[:, None] + metric[np.ix_(here, here)]).min(axis=0)
+    return metric

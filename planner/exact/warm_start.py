@@ -1,0 +1,83 @@
+"""Starting from what plans of similar problems have found.
+
+Any multipliers give a lower bound, for any objects left, wherever they lie. So those of one state of a task serve all
+later ones; only the table has to be filled anew, with the objects that are left.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.certificate import Proof
+from planner.exact.groups import numbered
+from planner.plan import Plan, VisitKind
+from planner.problem import RoutingProblem
+
+
+class Start(NamedTuple):
+    """A warm start in the numbering of one instance.
+
+    Attributes:
+        group: Group of each object, numbered from 0, (n,) int64.
+        multipliers: Price of picking each object, units, (n,) int32.
+        order: Numbers of objects in the order of a good tour.
+        missing: Numbers of the objects that are not in the order.
+    """
+
+    group: NDArray[np.int64]
+    multipliers: NDArray[np.int32]
+    order: list[int]
+    missing: list[int]
+
+
+@dataclass(frozen=True)
+class WarmStart:
+    """What earlier plans tell of objects, by name.
+
+    Attributes:
+        multipliers: Price of picking an object in the relaxation, units.
+        groups: Objects that the relaxation counts together.
+        order: Objects in the order in which a good tour may pick them.
+    """
+
+    multipliers: Mapping[str, int]
+    groups: tuple[tuple[str, ...], ...] = ()
+    order: tuple[str, ...] = ()
+
+    def updated(self, problem: RoutingProblem, plan: Plan) -> "WarmStart":
+        """The same with what a plan of a problem tells; multipliers of other objects stay."""
+        order = tuple(name for kind, name in plan.visits if kind is VisitKind.PICK)
+        certificate = plan.certificate
+        if certificate is None or certificate.proof is not Proof.RELAXATION:
+            return WarmStart(self.multipliers, self.groups, order)
+        names = problem.names
+        new = {names[k]: price for k, price in enumerate(certificate.multipliers)}
+        groups = tuple(tuple(names[k] for k in members) for members in certificate.groups)
+        return WarmStart({**self.multipliers, **new}, groups, order)
+
+    def numbered(self, names: Sequence[str]) -> Start | None:
+        """For an instance of the objects of these names; None where no multiplier of them is known.
+
+        An object that is new costs the average and joins the first group.
+        """
+        found = [self.multipliers[name] for name in names if name in self.multipliers]
+        if not found:
+            return None
+        average = sum(found) // len(found)
+        number = {name: k for k, name in enumerate(names)}
+        group = np.zeros(len(names), np.int64)
+        for g, members in enumerate(self.groups):
+            group[[number[name] for name in members if name in number]] = g
+        order = [number[name] for name in self.order if name in number]
+        return Start(
+            numbered(group),
+            np.array([self.multipliers.get(name, average) for name in names], np.int32),
+            order,
+            sorted(set(range(len(names))) - set(order)),
+        )
+
+
+NOTHING_KNOWN = WarmStart({})

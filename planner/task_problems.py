@@ -1,0 +1,109 @@
+"""From the state of a task to a routing problem; every position stands for the nearest navigable point."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.errors import NotNavigableError, UnreachableError
+from planner.geodesics import Geodesics
+from planner.plan import Visit, VisitKind
+from planner.problem import RoutingProblem, Shipment
+from planner.route import XY, TaskState
+
+
+class TaskProblems:
+    """Makes the routing problems of one state of a task after the other; distances are remembered between them.
+
+    Args:
+        geodesics: Distances on the navmesh; positions are snapped to its largest island.
+        capacity: How many objects can be carried.
+    """
+
+    def __init__(self, geodesics: Geodesics, capacity: int = 2) -> None:
+        self._geodesics = geodesics
+        self._capacity = capacity
+        self._row: dict[XY, int] = {}  # of each place in the distances of the last problem
+        self._distances: NDArray[np.float64] = np.zeros((0, 0))
+
+    def problem(self, state: TaskState) -> RoutingProblem:
+        """The routing problem of a state: shipments in the order of `loose`, onboard as in `carried`, by name.
+
+        Raises:
+            UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
+            ProblemError: More is carried than the capacity allows.
+        """
+        at = self._places(state)
+        places = list(dict.fromkeys(at.values()))
+        index = {place: k + 1 for k, place in enumerate(places)}
+        distances = np.zeros((len(places) + 1, len(places) + 1))
+        distances[1:, 1:] = self._between(places)
+        if places:
+            here = self._snap(state.position)
+            distances[0, 1:] = distances[1:, 0] = self._geodesics.distances_from(here, places)
+        return RoutingProblem(
+            distances,
+            0,
+            tuple(
+                Shipment(index[at[Visit(VisitKind.PICK, name)]], index[at[Visit(VisitKind.PLACE, name)]])
+                for name in state.loose
+            ),
+            tuple(index[at[Visit(VisitKind.PLACE, name)]] for name in state.carried),
+            self._capacity,
+            (*state.loose, *state.carried),
+        )
+
+    def length(self, state: TaskState, visits: Sequence[Visit]) -> float:
+        """Length of an open tour from the state's position, m.
+
+        Raises:
+            UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
+        """
+        at = self._places(state)
+        stops = [at[visit] for visit in visits]
+        if not stops:
+            return 0.0
+        places = list(dict.fromkeys(stops))
+        order = [places.index(stop) for stop in stops]
+        first = self._geodesics.distances_from(self._snap(state.position), places[:1])[0]
+        return float(first + self._between(places)[order[:-1], order[1:]].sum())
+
+    def _snap(self, position: XY, max_distance: float = math.inf) -> XY:
+        x, y = self._geodesics.navmesh.snap(position, max_distance)
+        return float(x), float(y)
+
+    def _places(self, state: TaskState) -> dict[Visit, XY]:
+        """Navigable position of each visit that may be left."""
+        wanted = {Visit(VisitKind.PICK, name): at for name, at in state.loose.items()}
+        for name in (*state.loose, *state.carried):
+            wanted[Visit(VisitKind.PLACE, name)] = state.deliveries[name]
+        places, faults = {}, {}
+        for visit, at in wanted.items():
+            try:
+                places[visit] = self._snap(at, self._geodesics.max_snap)
+            except NotNavigableError as error:
+                faults[visit.object] = f"{visit.object} ({visit.kind.value}: {error})"
+        if faults:
+            raise UnreachableError(
+                f"out of reach from where people walk: {'; '.join(faults.values())}; move them", tuple(faults)
+            )
+        return places
+
+    def _between(self, places: list[XY]) -> NDArray[np.float64]:
+        """Distances between places; only rows of places that are new since the last call are computed."""
+        old = [p for p in places if p in self._row]
+        new = [p for p in places if p not in self._row]
+        order = {p: k for k, p in enumerate([*old, *new])}
+        rows = [self._row[p] for p in old]
+        result = np.zeros((len(order), len(order)))
+        result[: len(old), : len(old)] = self._distances[np.ix_(rows, rows)]
+        if new:
+            fresh = self._geodesics.distances_between(new, [*old, *new])
+            square = fresh[:, len(old) :]
+            result[len(old) :, : len(old)] = fresh[:, : len(old)]
+            result[: len(old), len(old) :] = fresh[:, : len(old)].T
+            result[len(old) :, len(old) :] = np.minimum(square, square.T) * (1 - np.eye(len(new)))
+        self._row, self._distances = order, result
+        wanted = [order[p] for p in places]
+        return result[np.ix_(wanted, wanted)]
