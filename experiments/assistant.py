@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from experiments.conditions import STEP, TaskBoard, alternatives
 from experiments.house import House
-from experiments.participants.base import Choice, Guidance, Visit
+from experiments.participants.base import Choice, Guidance
 from experiments.records import EventLog
 from experiments.regrets import Regrets, RegretsAtOnce
 from hud.conditions import condition
@@ -178,19 +178,19 @@ class Assistant:
         if self._path is None or visit is None:
             return None
         goal = self._goal(observation, visit.kind, visit.object)
-        return Guidance(Visit(visit.kind, visit.object), self._path, goal, OFF_THE_PATH)
+        return Guidance(visit, self._path, goal, OFF_THE_PATH)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
         """What can be done next and what it costs compared with the best, the best first; empty until it is known."""
         return tuple(
             Choice(
-                Visit(kind, name),
-                self._goal(observation, kind, name),
+                visit,
+                self._goal(observation, *visit),
                 found.regret,
                 found.capped,
-                functools.partial(self._regrets.exact, Visit(kind, name)),
+                functools.partial(self._regrets.exact, visit),
             )
-            for (kind, name), found in self._regrets.known().items()
+            for visit, found in self._regrets.known().items()
         )
 
     def finish(self, time: float) -> None:

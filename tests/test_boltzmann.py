@@ -9,10 +9,10 @@ from planning_cases import Task, two_rooms
 from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.participants import participant
-from experiments.participants.base import Choice, Visit
+from experiments.participants.base import Choice
 from experiments.participants.boltzmann import draw
 from experiments.trial import TrialConfig, run_trial
-from planner.plan import VisitKind
+from planner.plan import Visit, VisitKind
 from planner.regret_evaluator import RegretEvaluator
 
 TRUE = (0.0, 0.3, 0.8, 2.0, 3.0)
@@ -68,9 +68,7 @@ def walked_by_drawing(geodesics, temperature, seed):
         0.0,
     )
     while found := judge.all(task.state):
-        options = [
-            Choice(Visit(k, n), np.zeros(2), r.regret, False, lambda: None) for (k, n), r in found.items()
-        ]
+        options = [Choice(visit, np.zeros(2), r.regret, False, lambda: None) for visit, r in found.items()]
         drawn, here = draw(options, temperature, rng), task.position
         task.do(*drawn.visit)
         length += geodesics.shortest_path(here, task.position).geodesic_distance

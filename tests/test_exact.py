@@ -127,7 +127,7 @@ def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, wi
     found = beam_pass(bound, poor, width, 10**9, NEVER)
     assert found.lower <= optimum <= found.upper
     if found.actions is not None:
-        visits = to_visits(problem, instance, found.actions)
+        visits = to_visits(instance, found.actions, problem.names[:n], problem.names[n:])
         assert tour_length(problem, visits, integer_metric(problem.distances)) == found.upper
 
 

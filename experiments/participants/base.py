@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +11,9 @@ from numpy.typing import NDArray
 from experiments.house import House
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult, Pick, Place
-from planner.plan import VisitKind
+from planner.plan import Visit
 
 Point = NDArray[np.float64]
-
-
-class Visit(NamedTuple):
-    """Pick this object up, or place it into its receptacle."""
-
-    kind: VisitKind
-    object: str
 
 
 @dataclass(frozen=True, eq=False)

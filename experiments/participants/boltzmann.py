@@ -20,9 +20,9 @@ from experiments.participants.base import (
     Participant,
     ParticipantFactory,
     Percept,
-    Visit,
 )
 from experiments.participants.visit_executor import VisitExecutor
+from planner.plan import Visit
 
 TEMPERATURE = 0.5  # m
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import WAIT, Decision, Participant, Percept, Visit
+from experiments.participants.base import WAIT, Decision, Participant, Percept
 from experiments.participants.visit_executor import VisitExecutor, nearest_visit
-from planner.plan import VisitKind
+from planner.plan import Visit, VisitKind
 
 
 class Nearest:

@@ -4,10 +4,10 @@ import numpy as np
 
 from experiments.house import House
 from experiments.locomotion import TIME_TOLERANCE
-from experiments.participants.base import WAIT, Decision, Participant, Percept, Point, Visit
+from experiments.participants.base import WAIT, Decision, Participant, Percept, Point
 from experiments.participants.visit_executor import VisitExecutor, estimated_distances, nearest_visit
 from mjsim.actions import IDLE, Move
-from planner.plan import VisitKind
+from planner.plan import Visit, VisitKind
 
 LOOK_INTERVAL = 0.2  # s between two looks while walking
 SEARCHED = 0.5  # m from a viewpoint before the look around begins

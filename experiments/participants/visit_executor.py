@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.participants.base import WAIT, Decision, Guidance, Percept, Point, Visit, WalkAlong
+from experiments.participants.base import WAIT, Decision, Guidance, Percept, Point, WalkAlong
 from mjsim.actions import Pick, Place
 from planner.errors import PlannerError
-from planner.plan import VisitKind
+from planner.plan import Visit, VisitKind
 from planner.polyline import project
 
 STOP_DISTANCE = 0.72  # m from the goal: near enough to reach, far enough not to kick it
