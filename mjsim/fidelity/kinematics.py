@@ -145,17 +145,17 @@ def command(
 ) -> None:
     """Slew the commands towards those of `Move(forward, left, turn, look)`; `advance` carries them out."""
     motion = body[FORWARD:SERVO]
-    rate_limits.slew_walk(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
-    rate_limits.slew_turn(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
-    rate_limits.slew_look(motion, look, gait.max_look, gait.lowest, gait.highest, gait.dt)
+    rate_limits.change_velocity(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
+    rate_limits.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
+    rate_limits.change_pitch(motion, look, gait.max_look, gait.lowest, gait.highest, gait.dt)
 
 
 @kernel
 def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
     """Slew the walk to a stand and the yaw rate towards `turn`, rad/s."""
     motion = body[FORWARD:SERVO]
-    rate_limits.slew_walk(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
-    rate_limits.slew_turn(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
+    rate_limits.change_velocity(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
+    rate_limits.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
 
 
 @kernel

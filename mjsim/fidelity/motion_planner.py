@@ -23,7 +23,7 @@ from mjsim.fidelity.motion_primitives import HandMovement, MotionTrajectory
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.person.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.person.placing import hover_height, square_heading
-from mjsim.person.slots import Footprint, Slot, best_slot, object_corners
+from mjsim.person.slots import LoadExtent, Slot, best_slot, object_corners
 
 Vector = NDArray[np.float64]
 
@@ -133,24 +133,24 @@ class MotionPlanner:
         person = self._full.person
         heading = square_heading(person, receptacle)
         motion.face(receptacle.center, heading, person.motion.receptacle_tolerance)
-        footprint = self._footprint(motion.hand, receptacle)
-        low = float(footprint.low[2])
-        slot = best_slot(person, item, receptacle, footprint)
+        extent = self._load_extent(motion.hand, receptacle)
+        low = float(extent.low[2])
+        slot = best_slot(person, item, receptacle, extent)
         motion.travel(receptacle, _over(slot, hover_height(person, receptacle, slot) - low))
         return slot, low
 
-    def _footprint(self, hand: int, receptacle: ReceptacleGeometry) -> Footprint:
+    def _load_extent(self, hand: int, receptacle: ReceptacleGeometry) -> LoadExtent:
         """Extent of a load about the hand that holds it, in the receptacle's axes."""
         grasp = self._kinematic.grasps[hand]
         if grasp is None:  # a place begins only with something in the hand
-            return Footprint(np.zeros(3), np.zeros(3))
+            return LoadExtent(np.zeros(3), np.zeros(3))
         if grasp not in self._corners:
             self._corners[grasp] = self._corners_about_hand(*grasp)
         heading = float(self._kinematic.body[HEADING])
         c, s = math.cos(heading), math.sin(heading)
         turned = self._corners[grasp] @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         local = turned @ receptacle.rotation
-        return Footprint(low=local.min(axis=0), high=local.max(axis=0))
+        return LoadExtent(low=local.min(axis=0), high=local.max(axis=0))
 
     def _corners_about_hand(self, item: int, grip: int) -> Vector:
         index, model = self._full.scene.index, self._full.scene.model

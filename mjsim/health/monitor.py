@@ -59,8 +59,9 @@ class HealthMonitor:
         self._rig, self._grips = rig, grips
         self._anomalies = AnomalyDetector(scene)
         self._settling = SettlingTracker(scene)
+        self._flags, self._sample = np.zeros(len(index.names), np.uint8), np.zeros(6)
         limits = np.array([CHECK_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
-        self._arrays = ScanArrays(
+        arrays = ScanArrays(
             qpos=data.qpos,
             qvel=data.qvel,
             xipos=data.xipos,
@@ -73,13 +74,14 @@ class HealthMonitor:
             trunk=rig.trunk,
             foot=rig.foot,
             limits=limits,
-            clearance=carry_clearance(scene),
+            clearance=tuple(carry_clearance(scene)),
             rooms=scene.rooms.rectangles,
             grip_sites=grips.sites,
             anchors=self._anomalies.anchors,
-            flags=np.zeros(len(index.names), np.uint8),
-            sample=np.zeros(6),
+            flags=self._flags,
+            sample=self._sample,
         )
+        self._arrays = tuple(arrays)
         self.reset()
 
     def reset(self) -> None:
@@ -102,21 +104,21 @@ class HealthMonitor:
         Raises:
             PhysicsError: MuJoCo warned, or a position or velocity is not finite.
         """
-        data, arrays = self._rig.data, self._arrays
+        data = self._rig.data
         suspect = self._scan(data, held)
-        deepest, trunk, left, right, left_angle, right_angle = arrays.sample.tolist()
+        deepest, trunk, left, right, left_angle, right_angle = self._sample.tolist()
         self._deepest, self._deepest_trunk = max(self._deepest, deepest), max(self._deepest_trunk, trunk)
         # NaN loses every comparison, and so the second place in a maximum.
         self._stretched = max(self._stretched, left, right)
         self._twisted = max(self._twisted, left_angle, right_angle)
         gripped, settling = self._grips.gripped, self._settling
-        settled = settling.update(data, gripped, arrays.flags)
+        settled = settling.update(data, gripped, self._flags)
         self._settle_times += settled
         settle = max(settled, default=math.nan)
         self.sample = HealthSample(deepest, trunk, (left, right), (left_angle, right_angle), settle)
         if not suspect and not settling.objects:
             return ()
-        return self._anomalies.find(data, arrays.flags, settling.objects, gripped)
+        return self._anomalies.find(data, self._flags, settling.objects, gripped)
 
     def resume(self) -> None:
         """Go on after the person and what the hands hold were moved without physics."""
@@ -150,7 +152,7 @@ class HealthMonitor:
             settle_times=tuple(self._settle_times),
             ejections=self._anomalies.ejections,
             tunnellings=self._anomalies.tunnellings,
-            warnings=int(self._arrays.warnings.sum()),
+            warnings=int(self._rig.data.warning.number.sum()),
         )
 
     def _scan(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:

@@ -1,7 +1,7 @@
 """One pass over the state, the objects, the hands and the contacts after a control step, as a numba kernel."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ class ScanArrays(NamedTuple):
         trunk, foot: The person's trunk and foot, geoms.
         limits: Squares of the distance from its anchor, m, beyond which an object is `DISPLACED`, of the speed, m/s,
             beyond which it is `FAST`, and of the speed below which it is `SLOW`, shape (3,).
-        clearance: Clearance at the heights of what is carried.
+        clearance: Fields of the `ClearanceField` at the heights of what is carried.
         rooms: `RoomMap.rectangles`.
         grip_sites: `Grips.sites`.
         anchors: Where each object was when its path was last checked, m, shape (n, 3); moved along where `clearance`
@@ -62,7 +62,7 @@ class ScanArrays(NamedTuple):
     trunk: int
     foot: int
     limits: Floats
-    clearance: ClearanceField
+    clearance: tuple[Any, ...]
     rooms: tuple[Floats, Floats, Floats]
     grip_sites: NDArray[np.intp]
     anchors: Floats
@@ -71,11 +71,11 @@ class ScanArrays(NamedTuple):
 
 
 @kernel
-def scan(arrays: ScanArrays, geoms: Ints, distances: Floats, left: bool, right: bool) -> int:
+def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -> int:
     """Look at the state, all objects, both hands and all contacts once.
 
     Args:
-        arrays: What is read and written.
+        fields: Those of `ScanArrays` as a plain tuple, which numba takes from Python in half the time.
         geoms: Geoms of each contact, shape (ncon, 2).
         distances: Distance of each contact, m, negative where geoms overlap, shape (ncon,).
         left: Whether the left hand carries something.
@@ -84,6 +84,7 @@ def scan(arrays: ScanArrays, geoms: Ints, distances: Floats, left: bool, right: 
     Returns:
         `NORMAL`, `SUSPECT` if any object has to be looked at or is fast, `WARNED` or `NOT_FINITE`.
     """
+    arrays = ScanArrays(*fields)
     for count in arrays.warnings:
         if count:
             return WARNED
@@ -108,6 +109,7 @@ def scan(arrays: ScanArrays, geoms: Ints, distances: Floats, left: bool, right: 
 @kernel
 def _flag_objects(arrays: ScanArrays) -> int:
     state, anchors, limits, rooms = NORMAL, arrays.anchors, arrays.limits, arrays.rooms
+    clearance = ClearanceField(*arrays.clearance)
     for item in range(len(arrays.bodies)):
         center, dof, flags = arrays.xipos[arrays.bodies[item]], arrays.dofs[item], 0
         gap = speed = 0.0
@@ -115,7 +117,7 @@ def _flag_objects(arrays: ScanArrays) -> int:
             gap += (center[k] - anchors[item, k]) ** 2
             speed += arrays.qvel[dof + k] ** 2
         if gap > limits[0]:
-            clear = is_path_clear(anchors[item], center, arrays.clearance)
+            clear = is_path_clear(anchors[item], center, clearance)
             if clear and nearest_rectangle(center[0], center[1], rooms[0], rooms[1], rooms[2]) <= OUTSIDE:
                 anchors[item, 0], anchors[item, 1], anchors[item, 2] = center[0], center[1], center[2]
             else:

@@ -1,16 +1,15 @@
 """The health of the physics as values; `docs/health.md` defines every term."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 Pair = tuple[float, float]
 
 NOTHING: Pair = (math.nan, math.nan)
 
 
-@dataclass(frozen=True)
-class HealthSample:
+class HealthSample(NamedTuple):
     """The physics at the end of one control step.
 
     Attributes:
@@ -34,12 +33,6 @@ class HealthSample:
         """Seven numbers in the order of the attributes, left hand before right."""
         overlaps = (self.penetration_m, self.trunk_penetration_m)
         return (*overlaps, *self.weld_error_m, *self.weld_error_rad, self.settle_s)
-
-    @classmethod
-    def of_row(cls, row: Sequence[float]) -> "HealthSample":
-        """The sample of a `row`."""
-        deepest, trunk, left, right, left_angle, right_angle, settle = row
-        return cls(deepest, trunk, (left, right), (left_angle, right_angle), settle)
 
 
 @dataclass(frozen=True)

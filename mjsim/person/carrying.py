@@ -4,13 +4,15 @@ A load that gets caught all the same slips out of the hand.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.inventory import LEFT, RIGHT
+from mjsim.kernels import kernel
 from mjsim.model import avatar
-from mjsim.model.clearance import carry_clearance
+from mjsim.model.clearance import ClearanceField, carry_clearance
 from mjsim.model.scene import Scene
 from mjsim.person.person import Person
 from mjsim.person.postures import (
@@ -56,31 +58,28 @@ class Carrying:
         self.clearance = carry_clearance(scene)
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._owners = _geom_owners(scene)
-        self._no_contacts = Contacts(_NO_GEOMS, _NO_FRAMES, self._owners)
+        self._no_contacts = (_NO_GEOMS, _NO_FRAMES, self._owners)
         self._postures = {p: np.array(p) for p in (avatar.CARRY, avatar.TUCKED, avatar.ASIDE)}
-        self._body = BodyMotion(rig.pose, rig.motion, self.clearance)
-        self._hands = Hands(
-            rig.hand_targets,
-            person.hand_velocities,
-            compliance=np.zeros((2, 2)),
-            goals=np.zeros((2, 3)),
-            rest=np.array(avatar.REST),
-            loads=self.loads,
-        )
+        self._compliance = np.zeros((2, 2))
+        targets, rest = rig.hand_targets, np.array(avatar.REST)
+        self._body = (rig.pose, rig.motion, tuple(self.clearance))
+        self._hands = (
+            targets, person.hand_velocities, self._compliance, np.zeros((2, 3)), rest, self.loads,
+        )  # fmt: skip
         self._strained = np.zeros(2, np.int64)
 
     def reset(self) -> None:
         """Forget all contacts."""
-        self._hands.compliance[:] = 0.0
+        self._compliance[:] = 0.0
         self._strained[:] = 0
 
     def get_state(self) -> CarryingState:
         """Compliance offsets and strain of the hands as a value."""
-        return CarryingState(self._hands.compliance.copy(), self._strained.copy())
+        return CarryingState(self._compliance.copy(), self._strained.copy())
 
     def set_state(self, state: CarryingState) -> None:
         """Go on from what `get_state` gave."""
-        self._hands.compliance[:] = state.compliance
+        self._compliance[:] = state.compliance
         self._strained[:] = state.strained
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
@@ -92,9 +91,9 @@ class Carrying:
         person = self._person
         left, right = (-1 if item is None else item for item in person.held)
         moving = -1 if person.moving_hand is None else person.moving_hand
-        holding = Holding(left, right, moving, self._postures[held_posture])
+        holding = (left, right, moving, self._postures[held_posture])
         contacts = self._contacts() if left >= 0 or right >= 0 else self._no_contacts
-        update_hands(self._body, self._hands, holding, contacts, person.dt)
+        _update_hands(self._body, self._hands, holding, contacts, person.dt)
 
     def place_for(
         self, hand: int, item: int, held_posture: tuple[float, float, float] = avatar.CARRY
@@ -102,17 +101,22 @@ class Carrying:
         """Where a hand best holds object `item` now, clear of the house: body frame, m, (3,)."""
         radius, height = self.loads[item].tolist()
         forward, side, up = avatar.posture(hand, held_posture)
-        return np.array([*drawn_in(forward, side, radius, self._body), max(up, MIN_HEIGHT + height)])
+        rig = self._person.rig
+        return np.array(
+            [
+                *drawn_in(forward, side, radius, BodyMotion(rig.pose, rig.motion, self.clearance)),
+                max(up, MIN_HEIGHT + height),
+            ]
+        )
 
-    def _contacts(self) -> Contacts:
-        """All contacts of the physics."""
+    def _contacts(self) -> tuple[Any, ...]:
+        """All contacts of the physics, as `Contacts`."""
         data = self._person.data
         if not data.ncon:
             return self._no_contacts
         contact = data.contact
         # Strides differ with the number of contacts, and kernels with the strides.
-        geoms, frames = np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame)
-        return Contacts(geoms, frames, self._owners)
+        return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame), self._owners
 
     def slipped(self) -> tuple[int, ...]:
         """Hands whose loads have been strained for too long: stretched off the grip, or held back; counts this step."""
@@ -132,6 +136,14 @@ class Carrying:
             self._strained,
         )
         return tuple(hand for hand in (LEFT, RIGHT) if found & (1 << hand))
+
+
+@kernel
+def _update_hands(body: Any, hands: Any, holding: Any, contacts: Any, dt: float) -> None:
+    """`update_hands` with plain tuples: numba takes them from Python in half the time of named ones."""
+    pose, command, clearance = body
+    motion = BodyMotion(pose, command, ClearanceField(*clearance))
+    update_hands(motion, Hands(*hands), Holding(*holding), Contacts(*contacts), dt)
 
 
 def _load(person: Person, item: int) -> tuple[float, float]:

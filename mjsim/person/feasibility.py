@@ -14,14 +14,14 @@ from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.observation import ObjectStatus
 from mjsim.person.person import Person
 
-_CHEST_HEIGHT = 1.2
+_CHEST_HEIGHT = 1.2  # m
 _RIM = 0.06  # m, from a receptacle's volume to the outside of its walls
 
 
 def resolve_pick(
     person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus], *, busy: bool
 ) -> ActionResult:
-    """Decide on a pick; reads the state only."""
+    """Answer to a pick; the state is not changed."""
     names = person.scene.index.names
     if busy:
         return ActionResult(action, Refusal.BUSY, action.object)
@@ -58,7 +58,7 @@ def _pick_nearest(
 
 
 def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: bool) -> ActionResult:
-    """Decide on a place; reads the state only."""
+    """Answer to a place; the state is not changed."""
     scene = person.scene
     if busy:
         return ActionResult(action, Refusal.BUSY, action.object)
@@ -101,21 +101,18 @@ def _object_distance(person: Person, item: int) -> float:
     return float(np.linalg.norm(person.center(item)[:2] - person.rig.position))
 
 
-def _lookouts(person: Person) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return person.rig.eye, np.array([*person.rig.position, _CHEST_HEIGHT])
-
-
 def _object_in_sight(person: Person, item: int) -> bool:
-    """Whether the centre or a grip shows to the eye or the chest; nothing is taken through a wall."""
+    """Whether the centre or a grip is visible from the eye or the chest; nothing is picked through a wall."""
+    viewpoints = person.rig.eye, np.array([*person.rig.position, _CHEST_HEIGHT])
     points = [person.center(item), *(person.grips.point(item, grip) for grip in avatar.GRIPS)]
     model, data = person.scene.model, person.data
-    return any(sees(model, data, eye, point) for eye in _lookouts(person) for point in points)
+    return any(sees(model, data, eye, point) for eye in viewpoints for point in points)
 
 
 def _receptacle_in_sight(person: Person, key: str) -> bool:
-    """Whether the volume's top shows, at its middle or the point nearest to the person.
+    """Whether the top of the volume is visible, at its middle or at the point nearest to the person.
 
-    Its own rim does not hide it: what the line of sight meets within the container's outline belongs to it.
+    The receptacle's own rim does not hide it: a geom within its outline is taken to be part of it.
     """
     receptacle = person.scene.receptacles[key]
     eye = np.array([*person.rig.position, avatar.EYE_HEIGHT])

@@ -25,9 +25,13 @@ def progress(phase: float, order: int, lead: float) -> tuple[float, float]:
     return (early, late) if order == ACROSS_FIRST else (late, early)
 
 
+@kernel
 def point_between(
     start: NDArray[np.float64], goal: NDArray[np.float64], phase: float, order: int, lead: float
 ) -> NDArray[np.float64]:
-    """Where a hand is at a phase of its movement from `start` to `goal`, m, all (3,)."""
+    """Where a hand is at a phase 0..1 of its movement from `start` to `goal`, m, all of shape (3,)."""
     across, up = progress(phase, order, lead)
-    return start + np.array([across, across, up]) * (goal - start)
+    point = np.empty(3)
+    for axis in range(3):
+        point[axis] = start[axis] + (across if axis < 2 else up) * (goal[axis] - start[axis])
+    return point

@@ -17,7 +17,7 @@ from mjsim.person.grips import Grips
 from mjsim.person.hand_path import point_between
 from mjsim.person.motion_parameters import MOTION, MotionParameters
 from mjsim.person.postures import move_hand
-from mjsim.person.rate_limits import slew_look, slew_turn, slew_walk
+from mjsim.person.rate_limits import change_pitch, change_turn_rate, change_velocity
 from mjsim.person.receptacle_heights import ReceptacleHeights
 from mjsim.person.rig import Rig
 
@@ -79,14 +79,10 @@ class Person:
         """Body ids of the objects in the hands."""
         return frozenset(int(self.scene.index.bodies[item]) for item in self.held if item is not None)
 
-    def move_hand(self, hand: int, goal: NDArray[np.float64]) -> None:
-        """Move a hand's target towards a position (3,) in the body frame, slower as it comes near."""
-        x, y, z = goal.tolist()
-        move_hand(self.rig.hand_targets, self.hand_velocities, hand, x, y, z, self.dt)
-
-    def retire(self, hand: int) -> None:
-        """Move an empty hand towards its rest."""
-        self.move_hand(hand, np.array(avatar.posture(hand, avatar.REST)))
+    def move_hand_to_rest(self, hand: int) -> None:
+        """Move an empty hand's target towards its rest, by one control step."""
+        rest = avatar.posture(hand, avatar.REST)
+        move_hand(self.rig.hand_targets, self.hand_velocities, hand, *rest, self.dt)
 
     def center(self, item: int) -> NDArray[np.float64]:
         """Centre of mass of object `item`, m, shape (3,)."""
@@ -102,31 +98,27 @@ class Person:
         return not self.data.tree_awake[self.scene.index.trees[item]]
 
     def walk(self, move: Move) -> None:
-        """Slew the body's velocity and the head towards what is asked, within the limits."""
+        """Change the commanded velocities and pitch towards a move, within the limits of the options."""
         forward, left, turn, look = float(move.forward), float(move.left), float(move.turn), float(move.look)
-        slew(self.rig.motion, forward, left, turn, look, self._limits)
-
-    def turn_at(self, rate: float) -> None:
-        """Slew the yaw rate towards `rate`, rad/s."""
-        o, rig = self.options, self.rig
-        change = _clip(rate, o.max_turn) - rig.turn
-        rig.turn += _clip(change, o.turn_acceleration * self.dt)
+        change_command(self.rig.motion, forward, left, turn, look, self._limits)
 
     def brake(self) -> None:
-        """Slew the walk to a stand; turning and looking are left to the motion."""
+        """Bring the walk nearer to a stand, by one control step; turning and looking stay as they are."""
         o, rig = self.options, self.rig
         size = math.hypot(rig.motion[0], rig.motion[1])
         rig.motion[:2] *= max(0.0, size - o.acceleration * self.dt) / size if size else 0.0
 
     def turn_towards(self, error: float) -> None:
-        """Slew the yaw rate so that a heading error, rad, decays without overshoot."""
-        self.turn_at(self.motion.turn_gain * error)
+        """Change the yaw rate so that a heading error, rad, decays without overshoot."""
+        o, rig = self.options, self.rig
+        change = _clip(self.motion.turn_gain * error, o.max_turn) - rig.turn
+        rig.motion[2] += _clip(change, o.turn_acceleration * self.dt)
 
     def glance(self, point: NDArray[np.float64]) -> None:
-        """Move the head's pitch towards a point of the house frame."""
-        x, y, z = (point - self.rig.eye).tolist()
-        wanted = math.atan2(z, math.hypot(x, y))
-        self.look_towards(wanted)
+        """Move the head's pitch towards a point of the house frame, (3,) m."""
+        x, y, z = point.tolist()
+        eye_x, eye_y, eye_z = avatar.eye_position(*self.rig.pose[:4].tolist())
+        self.look_towards(math.atan2(z - eye_z, math.hypot(x - eye_x, y - eye_y)))
 
     def look_towards(self, pitch: float) -> None:
         """Move the head's pitch towards an angle, rad, at the pace of a glance."""
@@ -166,18 +158,18 @@ def wrap(angle: float) -> float:
 
 
 @kernel
-def slew(
-    motion: NDArray[np.float64],
+def change_command(
+    command: NDArray[np.float64],
     forward: float,
     left: float,
     turn: float,
     look: float,
     limits: NDArray[np.float64],
 ) -> None:
-    """What `Person.walk` does to `Rig.motion`.
+    """Change a command towards a wanted move, within limits, by one control step.
 
     Args:
-        motion: Commanded velocity (forward, left), yaw rate and pitch; changed.
+        command: Commanded velocity (forward, left), yaw rate and pitch; changed.
         forward: Wanted velocity forward, m/s.
         left: Wanted velocity to the left, m/s.
         turn: Wanted yaw rate, rad/s.
@@ -186,9 +178,9 @@ def slew(
             pitch, and the control step; SI units, (8,).
     """
     max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
-    slew_walk(motion, forward, left, max_speed, acceleration * dt)
-    slew_turn(motion, turn, max_turn, turn_acceleration * dt)
-    slew_look(motion, look, max_look, lowest, highest, dt)
+    change_velocity(command, forward, left, max_speed, acceleration * dt)
+    change_turn_rate(command, turn, max_turn, turn_acceleration * dt)
+    change_pitch(command, look, max_look, lowest, highest, dt)
 
 
 def _clip(value: float, limit: float) -> float:

@@ -5,11 +5,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.kernels import kernel
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.options import REST_STEPS
 from mjsim.person.hand_path import STRAIGHT
 from mjsim.person.person import Motion, Person, Steps, wrap
-from mjsim.person.slots import Slot, best_slot, held_footprint, object_corners
+from mjsim.person.slots import Slot, best_slot, load_extent, object_corners
 
 Vector = NDArray[np.float64]
 
@@ -29,11 +30,11 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
     yield from person.face(receptacle.center, person.motion.receptacle_tolerance, heading)
     person.moving_hand = hand
     corners = object_corners(person.scene.model, person.scene.index.geoms(person.scene.index.names[item]))
-    footprint = held_footprint(person, hand, item, receptacle, corners)
-    slot = best_slot(person, item, receptacle, footprint)
-    hover = hover_height(person, receptacle, slot) - footprint.low[2]
+    extent = load_extent(person, hand, item, receptacle, corners)
+    slot = best_slot(person, item, receptacle, extent)
+    hover = hover_height(person, receptacle, slot) - extent.low[2]
     yield from _travel(person, hand, receptacle, np.array([*slot.hand, hover]))
-    low = float(held_footprint(person, hand, item, receptacle, corners).low[2])
+    low = float(load_extent(person, hand, item, receptacle, corners).low[2])
     yield from _descend(person, hand, item, receptacle, slot, low)
     person.grips.open(hand)
     success = yield from _settle(person, hand, item, receptacle, pitch)
@@ -100,12 +101,32 @@ def _descend(
 
 def overlap(person: Person, item: int) -> float:
     """Deepest overlap of object `item` with anything but the person, m."""
-    data, owner = person.data, person.scene.index.geom_owner
+    data = person.data
     if not data.ncon:
         return 0.0
-    geoms = data.contact.geom
-    mine = (owner[geoms] == item).any(axis=1) & (geoms != person.rig.foot).all(axis=1)
-    return float(max(0.0, -data.contact.dist[mine].min())) if mine.any() else 0.0
+    geoms, distances = map(np.ascontiguousarray, (data.contact.geom, data.contact.dist))
+    return deepest_overlap(geoms, distances, person.scene.index.geom_owner, item, person.rig.foot)
+
+
+@kernel
+def deepest_overlap(
+    geoms: NDArray[np.int32], distances: Vector, owner: NDArray[np.int32], item: int, foot: int
+) -> float:
+    """Deepest overlap of an object in contacts, m, the person's foot apart; 0 without one.
+
+    Args:
+        geoms: Geoms of each contact, shape (k, 2).
+        distances: Distance of each contact, m, negative where geoms overlap, shape (k,).
+        owner: Object of each geom, or -1, shape (ngeom,).
+        item: The object.
+        foot: The person's foot, a geom.
+    """
+    deepest = 0.0
+    for c in range(len(distances)):
+        first, second = geoms[c, 0], geoms[c, 1]
+        if (owner[first] == item or owner[second] == item) and first != foot and second != foot:
+            deepest = max(deepest, -distances[c])
+    return deepest
 
 
 def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
@@ -116,7 +137,7 @@ def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry
         if step < motion.withdraw_steps:
             person.rig.hand_targets[hand, 2] += motion.withdraw_step
         else:
-            person.retire(hand)
+            person.move_hand_to_rest(hand)
         person.look_towards(pitch)
         yield
         quiet = person.speed(item) < options.settle_speed or person.asleep(item)

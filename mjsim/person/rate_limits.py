@@ -1,7 +1,7 @@
-"""How commands change: walking, turning and looking within what a person can do, as numba kernels.
+"""Limits on how fast commands change: walking, turning and looking within what a person can do, as numba kernels.
 
-A motion holds the commanded velocity forward and to the left, m/s, the yaw rate, rad/s, and the pitch of the head,
-rad: `Rig.motion`, or part of a body of `mjsim.fidelity.kinematics`.
+A command holds the velocity forward and to the left, m/s, the yaw rate, rad/s, and the pitch of the head, rad:
+`Rig.motion`, or part of a body of `mjsim.fidelity.kinematics`.
 """
 
 import math
@@ -11,38 +11,40 @@ from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
 
-Motion = NDArray[np.float64]
+Command = NDArray[np.float64]
 
 FORWARD, LEFT, TURN, LOOK = 0, 1, 2, 3
 
 
 @kernel
-def slew_walk(motion: Motion, forward: float, left: float, fastest: float, most: float) -> None:
-    """Change the velocity towards a wanted one, no faster than `fastest`, by `most` at most; all m/s."""
-    speed = math.hypot(forward, left)
-    if speed > fastest:
-        forward, left = forward * (fastest / speed), left * (fastest / speed)
-    change_f, change_l = forward - motion[FORWARD], left - motion[LEFT]
-    size = math.hypot(change_f, change_l)
-    if size <= most:
-        motion[FORWARD], motion[LEFT] = forward, left
-    else:
-        motion[FORWARD] += change_f * (most / size)
-        motion[LEFT] += change_l * (most / size)
-
-
-@kernel
-def slew_turn(motion: Motion, rate: float, fastest: float, most: float) -> None:
-    """Change the yaw rate towards a wanted one, no faster than `fastest`, by `most` at most; all rad/s."""
-    change = min(fastest, max(-fastest, rate)) - motion[TURN]
-    motion[TURN] += min(most, max(-most, change))
-
-
-@kernel
-def slew_look(
-    motion: Motion, rate: float, fastest: float, lowest: float, highest: float, seconds: float
+def change_velocity(
+    command: Command, forward: float, left: float, max_speed: float, max_change: float
 ) -> None:
-    """Move the pitch at a wanted rate, rad/s, no faster than `fastest`, between the lowest and the highest, rad."""
-    rate = min(fastest, max(-fastest, rate))
+    """Change the velocity towards a wanted one, no faster than `max_speed`, by `max_change` at most; all m/s."""
+    speed = math.hypot(forward, left)
+    if speed > max_speed:
+        forward, left = forward * (max_speed / speed), left * (max_speed / speed)
+    change_f, change_l = forward - command[FORWARD], left - command[LEFT]
+    size = math.hypot(change_f, change_l)
+    if size <= max_change:
+        command[FORWARD], command[LEFT] = forward, left
+    else:
+        command[FORWARD] += change_f * (max_change / size)
+        command[LEFT] += change_l * (max_change / size)
+
+
+@kernel
+def change_turn_rate(command: Command, rate: float, max_rate: float, max_change: float) -> None:
+    """Change the yaw rate towards a wanted one, no faster than `max_rate`, by `max_change` at most; all rad/s."""
+    change = min(max_rate, max(-max_rate, rate)) - command[TURN]
+    command[TURN] += min(max_change, max(-max_change, change))
+
+
+@kernel
+def change_pitch(
+    command: Command, rate: float, max_rate: float, lowest: float, highest: float, seconds: float
+) -> None:
+    """Move the pitch at a wanted rate, rad/s, no faster than `max_rate`, between the lowest and the highest, rad."""
+    rate = min(max_rate, max(-max_rate, rate))
     if rate != 0.0:
-        motion[LOOK] = min(highest, max(lowest, motion[LOOK] + rate * seconds))
+        command[LOOK] = min(highest, max(lowest, command[LOOK] + rate * seconds))

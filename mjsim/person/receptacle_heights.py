@@ -1,6 +1,7 @@
 """Heights of what lies in a receptacle: many rays straight down at once, against the few geoms that are near."""
 
 import math
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,8 +21,32 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
 )
 
 
+class Shapes(NamedTuple):
+    """Shapes of all geoms of a model, as in `MjModel`.
+
+    Attributes:
+        types: `geom_type`, shape (ngeom,).
+        sizes: `geom_size`, m, shape (ngeom, 3).
+        bounds: `geom_rbound`, m, shape (ngeom,).
+        meshes: `geom_dataid`, shape (ngeom,).
+        first_vertex, first_face, face_count: `mesh_vertadr`, `mesh_faceadr` and `mesh_facenum`, shape (nmesh,).
+        vertices: `mesh_vert`, m, shape (nmeshvert, 3).
+        faces: `mesh_face`, shape (nmeshface, 3).
+    """
+
+    types: Ints
+    sizes: Floats
+    bounds: Floats
+    meshes: Ints
+    first_vertex: Ints
+    first_face: Ints
+    face_count: Ints
+    vertices: Floats
+    faces: Ints
+
+
 class ReceptacleHeights:
-    """Sounds the depth of receptacles in one scene."""
+    """Measures how high the receptacles of one scene are filled, by rays."""
 
     def __init__(self, scene: Scene) -> None:
         model = scene.model
@@ -31,40 +56,42 @@ class ReceptacleHeights:
         self._model = model
         self._moving = np.flatnonzero(solid & moving).astype(np.int32)
         self._static = np.flatnonzero(solid & (model.body_weldid[model.geom_bodyid] == 0)).astype(np.int32)
-        self._corners = np.ascontiguousarray(model.mesh_vert, np.float64)
+        self._shapes = Shapes(
+            model.geom_type,
+            model.geom_size,
+            model.geom_rbound,
+            model.geom_dataid,
+            model.mesh_vertadr,
+            model.mesh_faceadr,
+            model.mesh_facenum,
+            vertices=np.ascontiguousarray(model.mesh_vert, np.float64),
+            faces=model.mesh_face,
+        )
         self._near: dict[str, Ints] = {}
 
     def heights(
         self, data: mujoco.MjData, receptacle: ReceptacleGeometry, points: Floats, top: float, ignore: Ints
     ) -> Floats:
-        """Height of the first solid surface below each point, m; -inf where there is none.
+        """Height of the first solid surface below each point, m, shape (k,); -inf where there is none.
 
         Args:
             data: State; positions are those of the last physics step.
             receptacle: What the points are in.
             points: Horizontal positions in the house, m, shape (k, 2).
-            top: Height from which to sound, m.
-            ignore: Body ids that are looked through.
+            top: Height at which the rays start, m.
+            ignore: Body ids that the rays pass through.
         """
-        geoms = np.concatenate(
-            (self._static_near(data, receptacle), self._moving_near(data, receptacle, ignore))
-        )
-        model = self._model
-        return sound(
-            np.ascontiguousarray(points), top, geoms, model.geom_type, model.geom_size, model.geom_rbound,
-            data.geom_xpos, data.geom_xmat, model.geom_dataid, model.mesh_vertadr, model.mesh_faceadr,
-            model.mesh_facenum, self._corners, model.mesh_face,
-        )  # fmt: skip
+        moving = self._within_reach(data, receptacle, self._moving)
+        bodies = self._model.geom_bodyid[moving]
+        moving = moving[(bodies[:, None] != ignore).all(axis=1)]
+        geoms = np.concatenate((self._static_near(data, receptacle), moving))
+        points = np.ascontiguousarray(points)
+        return cast_down(points, top, geoms, data.geom_xpos, data.geom_xmat, self._shapes)
 
     def _static_near(self, data: mujoco.MjData, receptacle: ReceptacleGeometry) -> Ints:
         if receptacle.key not in self._near:
             self._near[receptacle.key] = self._within_reach(data, receptacle, self._static)
         return self._near[receptacle.key]
-
-    def _moving_near(self, data: mujoco.MjData, receptacle: ReceptacleGeometry, ignore: Ints) -> Ints:
-        near = self._within_reach(data, receptacle, self._moving)
-        bodies = self._model.geom_bodyid[near]
-        return np.asarray(near[(bodies[:, None] != ignore).all(axis=1)])
 
     def _within_reach(self, data: mujoco.MjData, receptacle: ReceptacleGeometry, geoms: Ints) -> Ints:
         offsets = data.geom_xpos[geoms, :2] - receptacle.center[:2]
@@ -73,36 +100,48 @@ class ReceptacleHeights:
 
 
 @kernel
-def sound(
-    points: Floats, top: float, geoms: Ints, kinds: Ints, sizes: Floats, bounds: Floats, positions: Floats,
-    rotations: Floats, meshes: Ints, first_corner: Ints, first_face: Ints, face_count: Ints,
-    corners: Floats, faces: Ints,
-) -> Floats:  # fmt: skip
-    """Height of the first geom below each point (k, 2) at height `top`, m; the rest are arrays of a model and state."""
+def cast_down(
+    points: Floats, top: float, geoms: Ints, positions: Floats, rotations: Floats, shapes: Shapes
+) -> Floats:
+    """Height of the first of some geoms below each point at height `top`, m, shape (k,); -inf where there is none.
+
+    Args:
+        points: Horizontal positions in the house, m, shape (k, 2).
+        top: Height at which the rays start, m.
+        geoms: Geom ids.
+        positions: `MjData.geom_xpos`, m, shape (ngeom, 3).
+        rotations: `MjData.geom_xmat`, shape (ngeom, 9).
+        shapes: Shapes of all geoms.
+    """
     heights = np.full(len(points), -math.inf)
     start, along = np.empty(3), np.empty(3)
     for geom in geoms:
-        kind, size, centre = kinds[geom], sizes[geom], positions[geom]
+        centre, bound = positions[geom], shapes.bounds[geom]
         for k in range(len(points)):
             dx, dy, dz = points[k, 0] - centre[0], points[k, 1] - centre[1], top - centre[2]
-            if dx * dx + dy * dy > bounds[geom] * bounds[geom]:
+            if dx * dx + dy * dy > bound * bound:
                 continue
             for axis in range(3):  # columns of the rotation are the geom's axes
                 rx, ry, rz = rotations[geom, axis], rotations[geom, 3 + axis], rotations[geom, 6 + axis]
                 start[axis] = rx * dx + ry * dy + rz * dz
                 along[axis] = -rz
-            if kind == _BOX:
-                depth = _into_box(start, along, size)
-            elif kind == _MESH:
-                mesh = meshes[geom]
-                depth = _into_mesh(
-                    start, along, corners[first_corner[mesh] :], faces[first_face[mesh] :], face_count[mesh]
-                )
-            else:
-                depth = _into_round(start, along, size, kind)
+            depth = _into_geom(start, along, geom, shapes)
             if depth >= 0.0:
                 heights[k] = max(heights[k], top - depth)
     return heights
+
+
+@kernel
+def _into_geom(start: Floats, along: Floats, geom: int, shapes: Shapes) -> float:
+    """Where a ray enters a geom, in its own frame; -1 if it misses."""
+    kind, size = shapes.types[geom], shapes.sizes[geom]
+    if kind == _BOX:
+        return _into_box(start, along, size)
+    if kind != _MESH:
+        return _into_round(start, along, size, kind)
+    mesh = shapes.meshes[geom]
+    vertices, faces = shapes.vertices[shapes.first_vertex[mesh] :], shapes.faces[shapes.first_face[mesh] :]
+    return _into_mesh(start, along, vertices, faces, shapes.face_count[mesh])
 
 
 @kernel
@@ -176,11 +215,11 @@ def _sooner(first: float, second: float) -> float:
 
 
 @kernel
-def _into_mesh(start: Floats, along: Floats, corners: Floats, faces: Ints, count: int) -> float:
+def _into_mesh(start: Floats, along: Floats, vertices: Floats, faces: Ints, count: int) -> float:
     """Where a ray first meets a triangle (Moeller and Trumbore, 1997); -1 if it misses all."""
     best = -1.0
     for face in range(count):
-        a, b, c = corners[faces[face, 0]], corners[faces[face, 1]], corners[faces[face, 2]]
+        a, b, c = vertices[faces[face, 0]], vertices[faces[face, 1]], vertices[faces[face, 2]]
         ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
         px, py, pz = (

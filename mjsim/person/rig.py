@@ -97,22 +97,9 @@ class Rig:
         self._command[:] = state.command
 
     @property
-    def velocity(self) -> Vector:
-        """Commanded walking velocity in the body frame (forward, left), m/s, shape (2,)."""
-        return np.array(self.motion[:2])
-
-    @velocity.setter
-    def velocity(self, velocity: Vector) -> None:
-        self.motion[:2] = velocity
-
-    @property
     def turn(self) -> float:
         """Commanded yaw rate, rad/s."""
         return float(self.motion[2])
-
-    @turn.setter
-    def turn(self, rate: float) -> None:
-        self.motion[2] = rate
 
     @property
     def pitch_target(self) -> float:

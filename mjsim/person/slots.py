@@ -1,4 +1,4 @@
-"""How full a receptacle is, and where in it the next object goes: heights sounded all over it, and the best slot."""
+"""How full a receptacle is, and where in it the next object goes: a height map by rays, and the best slot."""
 
 import itertools
 from dataclasses import dataclass
@@ -13,19 +13,24 @@ from mjsim.person.person import Person
 
 Vector = NDArray[np.float64]
 
-_WALL_GAP = 0.012
-_ELBOW_ROOM = 0.006  # m around an object on its way down
-_CELL = 0.02  # m between receptacle_heights at most
-_PROBE_ABOVE = 0.2
+_WALL_GAP = 0.012  # m
+_SIDE_GAP = 0.006  # m around an object on its way down
+_MAX_SPACING = 0.02  # m between the points of the height map
+_RAYS_ABOVE = 0.2  # m above the receptacle's volume, where the rays start
 _SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
-_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
-_SLOPE = 2.0  # cost of a metre that is missing below, in metres of fill
-_WORTH = 0.015  # m by which a place must be lower to be taken instead of a slot
+_OTHER_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
+_SLOPE_COST = 2.0  # metres of fill that a metre of mean gap below the object counts for
+_MIN_GAIN = 0.015  # m of cost by which another place must be better to be taken instead of a slot
 
 
 @dataclass(frozen=True, eq=False)
-class Footprint:
-    """Extent of a held object about the hand, in the receptacle's axes: lowest and highest corner, m, (3,)."""
+class LoadExtent:
+    """Extent of a held object about the hand, in the receptacle's axes.
+
+    Attributes:
+        low: Least coordinates of its corners, m, shape (3,).
+        high: Largest coordinates, m, shape (3,).
+    """
 
     low: Vector
     high: Vector
@@ -33,7 +38,7 @@ class Footprint:
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Where the hand lets go.
+    """Where the hand releases an object.
 
     Attributes:
         hand: Horizontal position of the hand in the receptacle's axes, m, shape (2,).
@@ -71,60 +76,60 @@ def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
     return np.asarray(box[:3] + signs * box[3:])
 
 
-def held_footprint(
+def load_extent(
     person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, corners: Vector
-) -> Footprint:
-    """Extent of an object, whose `corners` (k, 3) enclose it in its own frame, as `hand` holds it now."""
+) -> LoadExtent:
+    """Extent of an object as `hand` holds it now; its `corners`, (k, 3) m, are in its own frame."""
     body = int(person.scene.index.bodies[item])
     world = corners @ person.data.xmat[body].reshape(3, 3).T + person.data.xpos[body]
     local = (world - person.data.site_xpos[person.rig.grip_sites[hand]]) @ receptacle.rotation
-    return Footprint(low=local.min(axis=0), high=local.max(axis=0))
+    return LoadExtent(low=local.min(axis=0), high=local.max(axis=0))
 
 
-def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, footprint: Footprint) -> Slot:
+def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, extent: LoadExtent) -> Slot:
     """Where the object comes to lie lowest and most level.
 
-    The 2 x 2 slots come first; among equals, the one that is nearest to the person. Where another place is lower by
-    more than `_WORTH`, the object goes there. Slots and places are such that the object clears the walls where it can.
+    That is one of 2 x 2 slots; among equals, the one nearest to the person. Another place is taken only if it is
+    better by more than `_MIN_GAIN`. All are chosen such that the object clears the walls, if it can.
     """
     half = receptacle.half_size[:2]
-    middle = 0.5 * (footprint.low + footprint.high)[:2]
-    extent = 0.5 * (footprint.high - footprint.low)[:2]
-    room = np.maximum(half - extent - _WALL_GAP, 0.0)
-    points, heights = _sound(person, item, receptacle)
-    slots, places = np.clip(half * _SLOTS, -room, room), room * _PLACES
-    fills, costs = _below(np.concatenate((slots, places)), extent, points, heights)
+    middle = 0.5 * (extent.low + extent.high)[:2]
+    half_extent = 0.5 * (extent.high - extent.low)[:2]
+    room = np.maximum(half - half_extent - _WALL_GAP, 0.0)
+    points, heights = _height_map(person, item, receptacle)
+    slots, others = np.clip(half * _SLOTS, -room, room), room * _OTHER_PLACES
+    places = np.concatenate((slots, others))
+    fills, costs = _fill_below(places, half_extent, points, heights)
     me = (np.array([*person.rig.position, 0.0]) - receptacle.center) @ receptacle.rotation
     far = np.hypot(*(slots - me[:2]).T)
     count = len(slots)
     best = int(np.lexsort((far, costs[:count].round(3)))[0])
     other = count + int(costs[count:].round(3).argmin())
-    if costs[other] < costs[best] - _WORTH:
+    if costs[other] < costs[best] - _MIN_GAIN:
         best = other
-    at = np.concatenate((slots, places))[best]
-    return Slot(hand=at - middle, fill=float(fills[best]), top=float(heights.max()))
+    return Slot(hand=places[best] - middle, fill=float(fills[best]), top=float(heights.max()))
 
 
-def _sound(person: Person, item: int, receptacle: ReceptacleGeometry) -> tuple[Vector, Vector]:
+def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tuple[Vector, Vector]:
     """Points (k, 2) all over the receptacle, in its axes, and the height of what lies there without `item`, m."""
     half = receptacle.half_size
-    axes = [np.linspace(-h, h, 1 + 2 * int(np.ceil(h / _CELL))) for h in half[:2]]
+    axes = [np.linspace(-h, h, 1 + 2 * int(np.ceil(h / _MAX_SPACING))) for h in half[:2]]
     local = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     points = receptacle.center[:2] + local @ receptacle.rotation[:2, :2].T
     ignore = np.array([*person.carried_bodies(), person.scene.index.bodies[item]], np.int32)
-    top = float(receptacle.center[2] + half[2]) + _PROBE_ABOVE
+    top = float(receptacle.center[2] + half[2]) + _RAYS_ABOVE
     heights = person.receptacle_heights.heights(person.data, receptacle, points, top, ignore)
     return local, np.asarray(np.maximum(heights - receptacle.center[2], -half[2]))
 
 
 @kernel
-def _below(centres: Vector, extent: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
-    """Fill height under a footprint at each centre (k, 2), and its cost: on a slope things tip over.
+def _fill_below(centres: Vector, half: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
+    """Fill height under an object at each centre (k, 2), m, and its cost, m, both (k,).
 
-    What is missing below the highest point counts for more than what is filled.
+    Objects tip over on a slope, so the mean gap below the highest point adds to the cost.
     """
     fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
-    reach = np.maximum(extent + _ELBOW_ROOM, _CELL)  # at least one sounding
+    reach = np.maximum(half + _SIDE_GAP, _MAX_SPACING)  # at least one point of the map
     for k in range(len(centres)):
         total, count = 0.0, 0
         for p in range(len(points)):
@@ -133,5 +138,5 @@ def _below(centres: Vector, extent: Vector, points: Vector, heights: Vector) -> 
                 fills[k] = max(fills[k], heights[p])
                 total += heights[p]
                 count += 1
-        costs[k] = fills[k] + _SLOPE * (fills[k] - total / count)
+        costs[k] = fills[k] + _SLOPE_COST * (fills[k] - total / count)
     return fills, costs
