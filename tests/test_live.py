@@ -10,7 +10,7 @@ from experiments import records
 from experiments.cli import main
 from experiments.house import House
 from experiments.records import EventLog
-from experiments.replaying.logged_plans import LoggedPlans
+from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.trial import TrialConfig, prepare_session
 from mjsim.model.scene import compose
 from planner.checker import check
@@ -282,7 +282,7 @@ def test_a_better_plan_that_was_logged_is_handed_out_when_it_was_shown(mirrored)
 
     now = [0.0]
     first, second = ("left", "right"), ("right", "left")
-    plans = LoggedPlans([logged(0.0, first), logged(1.0, second, improved=True)], lambda: now[0])
+    plans = LoggedReplanner([logged(0.0, first), logged(1.0, second, improved=True)], lambda: now[0])
     assert plans.update(mirrored).next.object == "left"
     now[0] = 0.5
     assert not plans.pending
