@@ -27,7 +27,7 @@ from mjsim.world import World
 PARTS = {
     "planning": ("planner.replanner.Replanner.update",),
     "shortest paths": ("planner.geodesics.Geodesics.shortest_path",),
-    "looking": ("experiments.session.visible_objects",),
+    "looking": ("experiments.perception.visible_objects",),
     "world": tuple(f"mjsim.world.World.{n}" for n in ("reset", "step", "walk", "finish", "state", "restore")),
     "house and scene": (
         "experiments.house.House.sample_episode",
