@@ -71,11 +71,11 @@ def clearance_at(x: float, y: float, field: ClearanceField) -> tuple[float, floa
     return (1 - b) * low + b * high, gradient[near_i, near_j, 0], gradient[near_i, near_j, 1]
 
 
-CARRY_BAND = (0.93, 1.60)  # heights that carried things take up, m
+CARRY_BAND = (0.93, 1.60)  # heights of carried objects, m
 
 
 def carry_clearance(scene: Scene) -> ClearanceField:
-    """Clearance at the heights of what is carried; worked out once per house."""
+    """Clearance at the heights of what is carried; computed once per house."""
     low, high = CARRY_BAND
     return compiled_house(scene.catalogue).once(
         ("clearance", low, high), lambda: ClearanceField.from_model(scene.model, low=low, high=high)

@@ -1,4 +1,4 @@
-"""Lines of sight and probing rays against the compiled model."""
+"""Ray casts against the compiled model: the nearest geom, and lines of sight."""
 
 import math
 from collections.abc import Collection

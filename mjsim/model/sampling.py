@@ -6,7 +6,7 @@ the same at every level and a change in one choice leaves the others as they are
 
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -170,12 +170,12 @@ def _point_models(catalogue: Catalogue, categories: Sequence[str], rng: np.rando
 
 def _drop(episode: Episode, catalogue: Catalogue, rng: np.random.Generator) -> Episode:
     """Drop the objects upright with a random yaw; those that roll away are dropped again."""
-    dropped = tuple(_held_up(o, rng) for o in episode.objects)
+    dropped = tuple(_above_floor(o, rng) for o in episode.objects)
     for _ in range(DROPS):
         settled = settle(replace(episode, objects=dropped), catalogue)
         if not settled.faults:
             return replace(episode, objects=settled.objects)
-        dropped = tuple(_held_up(o, rng) if o.name in settled.faults else o for o in dropped)
+        dropped = tuple(_above_floor(o, rng) if o.name in settled.faults else o for o in dropped)
     name, fault = next(iter(settled.faults.items()))
     model = next(o.model for o in episode.objects if o.name == name)
     raise SamplingError(
@@ -184,31 +184,36 @@ def _drop(episode: Episode, catalogue: Catalogue, rng: np.random.Generator) -> E
     )
 
 
-def _held_up(placed: PlacedObject, rng: np.random.Generator) -> PlacedObject:
+def _above_floor(placed: PlacedObject, rng: np.random.Generator) -> PlacedObject:
     yaw, height = rng.uniform(-math.pi, math.pi), rng.uniform(*DROP)
     quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
     return replace(placed, position=(*placed.point, float(height)), quaternion=quaternion)
 
 
 def _start(episode: Episode, navigable: NavigablePoints, rng: np.random.Generator) -> StartPose:
-    """The objects' centroid, or else a random point in the smallest circle around it that has one."""
+    """The first candidate where a person can start."""
     objects = np.array([o.position[:2] for o in episode.objects])
-    heading = episode.start.heading
     centroid = objects.mean(axis=0)
-    if _can_start(centroid, objects, navigable):
-        return StartPose(float(centroid[0]), float(centroid[1]), heading)
-    for radius in RADIUS_STEP * np.arange(1, RADII + 1):
-        for _ in range(DRAWS_PER_RADIUS):
-            # The square root spreads the points evenly over the disc.
-            reach, angle = radius * math.sqrt(rng.random()), rng.uniform(-math.pi, math.pi)
-            point = centroid + reach * np.array([math.cos(angle), math.sin(angle)])
-            if _can_start(point, objects, navigable):
-                return StartPose(float(point[0]), float(point[1]), heading)
+    for point in _start_candidates(centroid, rng):
+        if _can_start(point, objects, navigable):
+            return StartPose(float(point[0]), float(point[1]), episode.start.heading)
     raise SamplingError(
         f"no navigable start {START_CLEARANCE} m from every object within {RADIUS_STEP * RADII} m of "
         f"their centroid {centroid.round(2).tolist()} after {RADII * DRAWS_PER_RADIUS} rejections; "
         "take another seed"
     )
+
+
+def _start_candidates(
+    centroid: NDArray[np.float64], rng: np.random.Generator
+) -> Iterator[NDArray[np.float64]]:
+    """The objects' centroid (2,), m, then random points in larger and larger circles around it."""
+    yield centroid
+    for radius in RADIUS_STEP * np.arange(1, RADII + 1):
+        for _ in range(DRAWS_PER_RADIUS):
+            # The square root spreads the points evenly over the disc.
+            reach, angle = radius * math.sqrt(rng.random()), rng.uniform(-math.pi, math.pi)
+            yield centroid + reach * np.array([math.cos(angle), math.sin(angle)])
 
 
 def _can_start(point: NDArray[np.float64], objects: NDArray[np.float64], navigable: NavigablePoints) -> bool:
