@@ -1,4 +1,4 @@
-"""Everything in physics: walking, reaching, carrying, letting go."""
+"""Everything in physics: walking, reaching, carrying, releasing."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from mjsim.actions import IDLE, Action, ActionResult, Move, Pick, Place
 from mjsim.errors import ActionError, StateError
 from mjsim.fidelity.episode_state import EpisodeState
 from mjsim.fidelity.kinematics import LocomotionState
-from mjsim.fidelity.tier import by_steps
+from mjsim.fidelity.tier import Tier
 from mjsim.health.monitor import HealthMonitor
 from mjsim.health.values import Health, HealthSample
 from mjsim.inventory import LEFT, RIGHT
@@ -25,11 +25,10 @@ from mjsim.person.person import Motion, Person
 from mjsim.person.picking import pick, take
 from mjsim.person.placing import place
 from mjsim.person.rig import Rig
-from mjsim.rollout import Rollout
 from mjsim.world_state import PersonState, StateHash, WorldState, set_physics, take_physics
 
-# A delivered object may be shoved a little by the next one; farther out than this it is out.
-_DISLODGED_MARGIN = 0.03
+# The next object may push a delivered one a little; farther out than this it has left its receptacle.
+_DISLODGED_MARGIN = 0.03  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +42,7 @@ class _Motion:
     receptacle: str | None
 
 
-class Full:
+class Full(Tier):
     """The tier `full`; other tiers use its parts where they need physics.
 
     Attributes:
@@ -84,7 +83,7 @@ class Full:
 
     @property
     def health_sample(self) -> HealthSample:
-        """What the physics was like in the latest control step."""
+        """Health of the physics in the latest control step."""
         return self.monitor.sample
 
     @property
@@ -111,14 +110,6 @@ class Full:
             self.begin(result, *self.hand_for(result), self.person.rig.pitch_target)
         self.advance(action if isinstance(action, Move) else IDLE)
         return result
-
-    def walk(self, moves: NDArray[np.float64]) -> Rollout:
-        """One control step per row (n, 4), until a step brings events."""
-        return by_steps(self, (Move(*row) for row in moves.tolist()))
-
-    def finish(self) -> Rollout:
-        """Idle until no pick or place is under way, or a step brings events."""
-        return by_steps(self, iter(lambda: IDLE if self.busy else None, None))
 
     def resolve(self, action: Action, *, busy: bool) -> ActionResult | None:
         """Decide on a pick or place from the state of the physics; None for a move.

@@ -1,7 +1,7 @@
 """Walking without physics, with picks and places that are worked out at once and then played."""
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +15,7 @@ from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_world import KinematicWorld
 from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.fidelity.motion_planner import MotionPlanner, PlannedMotion
+from mjsim.fidelity.tier import Tier
 from mjsim.health.values import Health, HealthSample
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
@@ -45,7 +46,7 @@ class ActiveMotion:
     played: int = 0
 
 
-class KinematicTier(ABC):
+class KinematicTier(Tier):
     """What `windows` and `event` have in common: everything moves without physics unless the tier says otherwise.
 
     Attributes:
@@ -141,10 +142,6 @@ class KinematicTier(ABC):
         self.episode_state.events = []
         self._in_step = self._in_step and not len(moves)
         return self._rollout(self._kinematic.walk(moves))
-
-    @abstractmethod
-    def finish(self) -> Rollout:
-        """Idle until no pick or place is under way, or a step brings events."""
 
     def _rollout(self, rows: RolloutArrays, events: Sequence[WorldEvent] = ()) -> Rollout:
         """Rows that end in the present state."""

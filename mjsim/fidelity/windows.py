@@ -8,7 +8,6 @@ from mjsim.actions import IDLE, Action, ActionResult, Move
 from mjsim.fidelity.kinematic_tier import ActiveMotion, KinematicTier
 from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.fidelity.motion_planner import PlannedMotion
-from mjsim.fidelity.tier import by_steps
 from mjsim.fidelity.transitions import enter, leave
 from mjsim.health.values import HealthSample
 from mjsim.model.scene import Scene
@@ -75,15 +74,11 @@ class Windows(KinematicTier):
         if not self._open:
             return super().walk(moves)
         steps = iter(moves.tolist())
-        physical = by_steps(self, (Move(*next(steps)) for _ in moves if self._open))
+        physical = self.step_each(Move(*next(steps)) for _ in moves if self._open)
         rest = moves[len(physical) :]
         if physical.events or not len(rest):
             return physical
         return physical.followed_by(super().walk(rest))
-
-    def finish(self) -> Rollout:
-        """Idle until no pick or place is under way, or a step brings events."""
-        return by_steps(self, iter(lambda: IDLE if self.busy else None, None))
 
     def observation(self) -> Observation:
         """The present state."""
