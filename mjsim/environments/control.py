@@ -172,20 +172,4 @@ def _pick_or_place(action: Pick | Place) -> Steps:
         step = yield IDLE
 
 
-CONTROLS = {"continuous": Continuous, "discrete": Discrete}
-
-
-def resolve_control(actions: str | Control) -> Control:
-    """The control itself, or the one with that name: `continuous` or `discrete`.
-
-    Raises:
-        EnvironmentConfigError: No control has that name.
-    """
-    if not isinstance(actions, str):
-        return actions
-    if actions not in CONTROLS:
-        raise EnvironmentConfigError(
-            f"no actions {actions!r}; choose from {sorted(CONTROLS)}, or pass a control"
-        )
-    made: Control = CONTROLS[actions]()
-    return made
+CONTROLS: dict[str, Control] = {"continuous": Continuous(), "discrete": Discrete()}

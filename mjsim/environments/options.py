@@ -1,23 +1,25 @@
 """Options of an environment, and how the core is built from them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
-from mjsim.environments.control import Control, resolve_control
+from mjsim.environments.control import CONTROLS, Control
 from mjsim.environments.core import Rearrangement
 from mjsim.environments.episodes import EpisodeCache, sample
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import CameraOptions, ObservationLayout
-from mjsim.environments.rewards import RewardFunction, resolve_reward
+from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
 from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.model.navigable import NavigableBuilder, navigable_floor
 from mjsim.options import WorldOptions
+
+T = TypeVar("T")
 
 SECONDS_PER_OBJECT = 60.0
 DEFAULT_CACHE_SIZE = 8  # compiled episodes
@@ -117,7 +119,8 @@ def build(options: EnvironmentOptions) -> Rearrangement:
         AssetError: The house is malformed.
     """
     sensors = resolve_sensors(options.observations)
-    control, reward = resolve_control(options.actions), resolve_reward(options.reward)
+    control = _named(CONTROLS, options.actions, "actions")
+    reward = _named(REWARDS, options.reward, "reward")
     catalogue = Catalogue.load(options.house)
     floor = compiled_house(catalogue).floor
     make: Callable[[int], Episode]
@@ -147,3 +150,14 @@ def build(options: EnvironmentOptions) -> Rearrangement:
         reward=reward,
         truncate_on_physics_error=options.physics_errors == "truncate",
     )
+
+
+def _named(choices: Mapping[str, T], given: str | T, option: str) -> T:
+    """The value itself, or the choice with that name."""
+    if not isinstance(given, str):
+        return given
+    if given not in choices:
+        raise EnvironmentConfigError(
+            f"no {option} {given!r}; choose from {sorted(choices)}, or pass a value of your own"
+        )
+    return choices[given]

@@ -78,19 +78,4 @@ def potential(scene: Scene, observation: Observation) -> float:
     return -float(walk / WALKING_SPEED + handling)
 
 
-REWARDS = {"time": TimeReward(), "shaped": TimeReward(shaping=1.0)}
-
-
-def resolve_reward(reward: str | RewardFunction) -> RewardFunction:
-    """The reward function itself, or the one with that name: `time` or `shaped`.
-
-    Raises:
-        EnvironmentConfigError: No reward has that name.
-    """
-    if not isinstance(reward, str):
-        return reward
-    if reward not in REWARDS:
-        raise EnvironmentConfigError(
-            f"no reward {reward!r}; choose from {sorted(REWARDS)}, or pass a function"
-        )
-    return REWARDS[reward]
+REWARDS: dict[str, RewardFunction] = {"time": TimeReward(), "shaped": TimeReward(shaping=1.0)}
