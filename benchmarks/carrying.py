@@ -1,26 +1,25 @@
-"""Carrying two things through the house at 1.4 m/s: how far welds stretch and twist, and what is lost on the way."""
+"""Carrying two objects through the house at 1.4 m/s: how far welds stretch and twist, and what is lost meanwhile."""
 
-import os
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from experiments.stress.carrying import Carry, run_session
-from experiments.stress.pool import run_sessions
-from experiments.stress.verdicts import verdicts
+from experiments.requirements import Requirement, requirement_lines
+from experiments.stress.carrying import CarryResult, run_session
+from experiments.stress.sessions import run_sessions
 
 COUNT, QUICK = 200, 20
 STRAIGHT, CORNER = (1.35, 0.2), (1.2, 1.0)  # m/s at least; rad/s at most, at least
-TARGETS = (
-    ("things that arrive, %", "kept_percent", ">=", 99.0),
-    ("weld error, 99th percentile at 1.4 m/s, straight on, mm", "straight_p99_mm", "<", 2.0),
-    ("weld error, 99th percentile at 1.4 m/s, round corners, mm", "corner_p99_mm", "<", 2.0),
-    ("weld error, 99th percentile at 1.4 m/s, round corners, degrees", "corner_p99_deg", "<", 5.0),
-    ("weld error, maximum at 1.4 m/s, straight on, mm", "straight_max_mm", "<", 2.0),
-    ("weld error, maximum at 1.4 m/s, round corners, mm", "corner_max_mm", "<", 2.0),
-    ("weld error, maximum at 1.4 m/s, straight on, degrees", "straight_max_deg", "<", 5.0),
-    ("weld error, maximum at 1.4 m/s, round corners, degrees", "corner_max_deg", "<", 5.0),
+REQUIREMENTS = (
+    Requirement("objects that arrive, %", "kept_percent", ">=", 99.0),
+    Requirement("weld error, 99th percentile at 1.4 m/s, straight on, mm", "straight_p99_mm", "<", 2.0),
+    Requirement("weld error, 99th percentile at 1.4 m/s, round corners, mm", "corner_p99_mm", "<", 2.0),
+    Requirement("weld error, 99th percentile at 1.4 m/s, round corners, degrees", "corner_p99_deg", "<", 5.0),
+    Requirement("weld error, maximum at 1.4 m/s, straight on, mm", "straight_max_mm", "<", 2.0),
+    Requirement("weld error, maximum at 1.4 m/s, round corners, mm", "corner_max_mm", "<", 2.0),
+    Requirement("weld error, maximum at 1.4 m/s, straight on, degrees", "straight_max_deg", "<", 5.0),
+    Requirement("weld error, maximum at 1.4 m/s, round corners, degrees", "corner_max_deg", "<", 5.0),
 )
 
 
@@ -35,11 +34,11 @@ def measure(
         workers: Processes; one per core unless said.
         only: Run this session alone, to look at a failure again.
     """
-    sessions = range(count or (QUICK if quick else COUNT)) if only is None else range(only, only + 1)
-    return summarise(list(run_sessions(run_session, sessions, workers=workers or os.cpu_count() or 1)))
+    sessions = count or (QUICK if quick else COUNT)
+    return summarise(run_sessions(run_session, sessions, workers=workers, only=only))
 
 
-def summarise(walks: Sequence[Carry]) -> dict[str, Any]:
+def summarise(walks: Sequence[CarryResult]) -> dict[str, Any]:
     """Figures over all walks."""
     speed = np.concatenate([walk.speed for walk in walks])
     turn = np.abs(np.concatenate([walk.turn for walk in walks]))
@@ -72,11 +71,11 @@ def summarise(walks: Sequence[Carry]) -> dict[str, Any]:
 def lines(result: dict[str, Any]) -> Iterator[str]:
     """The result for people."""
     yield (
-        f"{result['walks']} walks with two things each, {result['metres']:.0f} m; {result['arrived']} arrived, "
-        f"{result['lost']} things lost; deepest overlap {result['penetration_max_mm']:.1f} mm"
+        f"{result['walks']} walks with two objects each, {result['metres']:.0f} m; {result['arrived']} arrived, "
+        f"{result['lost']} objects lost; deepest overlap {result['penetration_max_mm']:.1f} mm"
     )
     yield f"{'weld error':12}{'p99 mm':>9}{'max mm':>9}{'p99 deg':>9}{'max deg':>9}"
     for name in ("straight", "corner", "all"):
         figures = [result[f"{name}_{kind}_{unit}"] for unit in ("mm", "deg") for kind in ("p99", "max")]
         yield f"{name:12}" + "".join(f"{figure:9.2f}" for figure in figures)
-    yield from verdicts(result, TARGETS)
+    yield from requirement_lines(result, REQUIREMENTS)

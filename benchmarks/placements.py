@@ -1,25 +1,24 @@
-"""10,000 placements by the person's own hands: how many are delivered at the first try, and how the physics fares."""
+"""10,000 placements by the person's hands: how many are delivered at the first try, and the health of the physics."""
 
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from experiments.requirements import Requirement, requirement_lines
 from experiments.stress.placements import LEVELS, NOT_TRIED, Placement, run_session
-from experiments.stress.pool import run_sessions
-from experiments.stress.verdicts import verdicts
+from experiments.stress.sessions import run_sessions
 
 COUNT, QUICK = 10_000, 300
-TARGETS = (
-    ("delivered at the first try, %", "delivered_percent", ">=", 99.9),
-    ("steps that are not finite, or MuJoCo warnings", "errors", "<=", 0),
-    ("ejections", "ejections", "<=", 0),
-    ("tunnellings", "tunnellings", "<=", 0),
-    ("penetration, 99th percentile of control steps, mm", "penetration_p99_mm", "<", 2.0),
-    ("penetration, 99th percentile of placements' deepest, mm", "deepest_p99_mm", "<", 2.0),
-    ("penetration, maximum, mm", "penetration_max_mm", "<", 10.0),
+REQUIREMENTS = (
+    Requirement("delivered at the first try, %", "delivered_percent", ">=", 99.9),
+    Requirement("steps that are not finite, or MuJoCo warnings", "errors", "<=", 0),
+    Requirement("ejections", "ejections", "<=", 0),
+    Requirement("tunnellings", "tunnellings", "<=", 0),
+    Requirement("penetration, 99th percentile of control steps, mm", "penetration_p99_mm", "<", 2.0),
+    Requirement("penetration, 99th percentile of placements' deepest, mm", "deepest_p99_mm", "<", 2.0),
+    Requirement("penetration, maximum, mm", "penetration_max_mm", "<", 10.0),
 )
 
 
@@ -35,9 +34,8 @@ def measure(
         only: Run this session alone, to look at a failure again.
     """
     total = count or (QUICK if quick else COUNT)
-    sessions = range(-(-total // LEVELS)) if only is None else range(only, only + 1)
-    found = run_sessions(run_session, sessions, workers=workers or os.cpu_count() or 1)
-    return summarise([placement for session in found for placement in session])
+    sessions = run_sessions(run_session, math.ceil(total / LEVELS), workers=workers, only=only)
+    return summarise([placement for session in sessions for placement in session])
 
 
 def summarise(placements: Sequence[Placement]) -> dict[str, Any]:
@@ -112,4 +110,4 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
         f"{result['settle_p99_s']:.2f} s in 99 %, {result['settle_max_s']:.2f} s at most; weld error at most "
         f"{result['weld_error_max_mm']:.2f} mm and {result['weld_error_max_deg']:.1f} degrees"
     )
-    yield from verdicts(result, TARGETS)
+    yield from requirement_lines(result, REQUIREMENTS)

@@ -1,27 +1,28 @@
 """One simulated hour of running into walls, corners, furniture and heaps of objects at 1 to 8 m/s."""
 
 import math
-import os
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from experiments.stress.pool import run_sessions
-from experiments.stress.verdicts import verdicts
-from experiments.stress.walking import SECONDS, Walk, run_session
+from experiments.requirements import Requirement, requirement_lines
+from experiments.stress.sessions import run_sessions
+from experiments.stress.walking import SECONDS, WalkResult, run_session
 
 HOURS, QUICK = 1.0, 0.05
 SLOW = 2.0  # m/s: sessions up to this speed are reported apart
-TARGETS = (
-    ("control steps at which the body was in or had crossed something solid", "tunnelled", "<=", 0),
-    ("escapes in which the body got no farther than 0.2 m in 2 s", "stuck", "<=", 0),
-    ("drift while standing, at most, mm in 1 s", "drift_max_mm", "<=", 1.0),
-    ("turning while standing, at most, degrees in 1 s", "turn_max_deg", "<=", 0.1),
-    ("steps that are not finite, or MuJoCo warnings", "errors", "<=", 0),
-    ("objects that tunnelled", "object_tunnellings", "<=", 0),
-    ("objects ejected", "ejections", "<=", 0),
-    ("objects outside the house at the end", "lost", "<=", 0),
+REQUIREMENTS = (
+    Requirement(
+        "control steps at which the body was in or had crossed something solid", "tunnelled", "<=", 0
+    ),
+    Requirement("retreats in which the body got no farther than 0.2 m in 2 s", "stuck", "<=", 0),
+    Requirement("drift while standing, at most, mm in 1 s", "drift_max_mm", "<=", 1.0),
+    Requirement("turning while standing, at most, degrees in 1 s", "turn_max_deg", "<=", 0.1),
+    Requirement("steps that are not finite, or MuJoCo warnings", "errors", "<=", 0),
+    Requirement("objects that tunnelled", "object_tunnellings", "<=", 0),
+    Requirement("objects ejected", "ejections", "<=", 0),
+    Requirement("objects outside the house at the end", "lost", "<=", 0),
 )
 
 
@@ -37,11 +38,10 @@ def measure(
         only: Run this session alone, to look at a failure again.
     """
     total = math.ceil(3600.0 * (hours or (QUICK if quick else HOURS)) / SECONDS)
-    sessions = range(total) if only is None else range(only, only + 1)
-    return summarise(list(run_sessions(run_session, sessions, workers=workers or os.cpu_count() or 1)))
+    return summarise(run_sessions(run_session, total, workers=workers, only=only))
 
 
-def summarise(walks: Sequence[Walk]) -> dict[str, Any]:
+def summarise(walks: Sequence[WalkResult]) -> dict[str, Any]:
     """Figures over all sessions."""
     overlap = 1e3 * np.concatenate([walk.overlap for walk in walks])
     slow = 1e3 * np.concatenate([[0.0], *(walk.overlap for walk in walks if walk.speed <= SLOW)])
@@ -49,7 +49,7 @@ def summarise(walks: Sequence[Walk]) -> dict[str, Any]:
         "benchmark": "walking",
         "simulated_s": sum(walk.simulated for walk in walks),
         "sessions": len(walks),
-        "escapes": sum(walk.escapes for walk in walks),
+        "retreats": sum(walk.retreats for walk in walks),
         "tunnelled": sum(walk.tunnelled for walk in walks),
         "stuck": sum(walk.stuck for walk in walks),
         "drift_max_mm": 1e3 * max(max(walk.drift, default=0.0) for walk in walks),
@@ -82,7 +82,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     for failure in result["failures"]:
         yield "failed: at {speed:.1f} m/s; --only {session} runs it again".format(**failure)
     yield (
-        f"{result['simulated_s']:.0f} simulated s in {result['sessions']} sessions, {result['escapes']} escapes; "
+        f"{result['simulated_s']:.0f} simulated s in {result['sessions']} sessions, {result['retreats']} retreats; "
         f"fastest object {result['fastest_object']:.1f} m/s, {result['ejections']} ejected"
     )
     yield (
@@ -90,4 +90,4 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
         f"{result['overlap_max_mm']:.1f} mm; up to {SLOW:g} m/s {result['overlap_slow_p99_mm']:.1f} and "
         f"{result['overlap_slow_max_mm']:.1f} mm"
     )
-    yield from verdicts(result, TARGETS)
+    yield from requirement_lines(result, REQUIREMENTS)

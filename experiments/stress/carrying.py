@@ -1,7 +1,7 @@
-"""Carrying two objects through the house at full speed: how far welds stretch and twist, and what is lost on the way.
+"""Carrying two objects through the house at full speed: how far welds stretch and twist, and what is lost meanwhile.
 
-A session is an ordinary world: somebody picks up two things that lie beside them and walks to another point of the
-house by the shortest way, at 1.4 m/s round every corner.
+In a session the person picks up two objects that lie beside them and walks to another point of the house by the
+shortest path, at 1.4 m/s round every corner.
 """
 
 import math
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.path_following import wrap_angle
+from experiments.stress.sessions import session_episode, upright_object
 from mjsim.actions import IDLE, Action, EventKind, Move, Pick
-from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.episode import Episode
 from mjsim.model.scene import compose
 from mjsim.world import World
 from planner.polyline import path_length, point_along, project
@@ -23,21 +24,21 @@ SPEED = 1.4  # m/s
 LOOK_AHEAD = 0.3  # m
 BRAKING = 1.5  # m/s^2
 BESIDE = 0.55  # m
-SHORTEST = 6.0  # m
-LONGEST = 900  # control steps of a walk
+MIN_LENGTH = 6.0  # m of the path
+MAX_STEPS = 900  # control steps of a walk
 ARRIVED = 0.1  # m
 
 
 @dataclass(frozen=True)
-class Carry:
-    """A walk with full hands.
+class CarryResult:
+    """What a walk with two objects brought.
 
     Attributes:
         session: Its number; `run_session` repeats it.
-        models: What was carried, left and right.
-        lost: How many of them were lost on the way.
+        models: Models of the objects.
+        lost: How many of them slipped out of a hand.
         arrived: Whether the person got there.
-        length: Length of the way, m.
+        length: Length of the path, m.
         speed: Speed of the body at each control step, m/s, (T,).
         turn: Its yaw rate, rad/s, (T,).
         stretch: Weld errors, m, (T, 2), NaN where nothing is held.
@@ -57,7 +58,7 @@ class Carry:
     penetration: NDArray[np.float64]
 
 
-def run_session(house: House, number: int) -> Carry:
+def run_session(house: House, number: int) -> CarryResult:
     """Run session `number`; the same number gives the same session, to the last bit."""
     rng = np.random.default_rng([SEED, number])
     path = _path(house, rng)
@@ -68,7 +69,7 @@ def run_session(house: House, number: int) -> Carry:
         world.finish()
     rows, lost = [], 0
     heading = world.observation().heading
-    for _ in range(LONGEST):
+    for _ in range(MAX_STEPS):
         o = world.observation()
         step = world.step(_towards(path, o.position, o.heading))
         lost += sum(event.kind is EventKind.GRIP_LOST for event in step.events)
@@ -80,7 +81,7 @@ def run_session(house: House, number: int) -> Carry:
             break
     table = np.array(rows)
     first, second = (o.model for o in episode.objects)
-    return Carry(
+    return CarryResult(
         session=number,
         models=(first, second),
         lost=lost,
@@ -95,39 +96,30 @@ def run_session(house: House, number: int) -> Carry:
 
 
 def _path(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
-    """A shortest path of some length that begins where there is room to pick things up."""
+    """A shortest path, (k, 2) m, that begins where there is room to pick objects up."""
     while True:
         start, goal = house.navmesh.sample(rng), house.navmesh.sample(rng)
         around = [start + BESIDE * np.array([math.cos(a), math.sin(a)]) for a in np.arange(0, 6.2, 0.8)]
         if all(house.navmesh.is_navigable(point) for point in around):
             path = np.asarray(house.geodesics.shortest_path(start, goal).points)
-            if path_length(path) >= SHORTEST:
+            if path_length(path) >= MIN_LENGTH:
                 return path
 
 
 def _episode(house: House, number: int, start: NDArray[np.float64], rng: np.random.Generator) -> Episode:
+    """The person at a floor point (2,) m with two random objects in front, one on each side."""
     heading = float(rng.uniform(-math.pi, math.pi))
-    categories = house.catalogue.categories
     objects = []
     for i, side in enumerate((0.8, -0.8)):
         model = str(rng.choice(list(house.catalogue.objects)))
         angle, yaw = heading + side, rng.uniform(-math.pi, math.pi)
-        x, y = (float(v) for v in start + BESIDE * np.array([math.cos(angle), math.sin(angle)]))
-        quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
-        category = house.catalogue.objects[model].category
-        objects.append(PlacedObject(f"o{i}", category, model, (x, y), (x, y, 0.01), quaternion))
-    return Episode(
-        house=house.catalogue.name,
-        seed=number,
-        start=StartPose(float(start[0]), float(start[1]), heading),
-        objects=tuple(objects),
-        receptacles=tuple(house.catalogue.receptacles),
-        targets={o.name: categories[o.category].receptacle for o in objects},
-    )
+        xy = start + BESIDE * np.array([math.cos(angle), math.sin(angle)])
+        objects.append(upright_object(house, i, model, xy, 0.01, yaw))
+    return session_episode(house, number, start, heading, objects)
 
 
 def _towards(path: NDArray[np.float64], position: NDArray[np.float64], heading: float) -> Action:
-    """Full speed along a path, the body turning after the walk; slower only at the very end."""
+    """Full speed along a path (k, 2) m, turning into its direction; slower only at the very end."""
     x, y = (float(v) for v in position)
     arc, _ = project(path, x, y)
     to_x, to_y = point_along(path, arc + LOOK_AHEAD)

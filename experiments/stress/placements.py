@@ -1,8 +1,8 @@
 """Seeded placements over all object models, receptacles and fill levels.
 
-A session is an ordinary world: somebody stands near a receptacle, at a random place from which it can be used, with
-objects of its category on the floor around. They pick them one after another and place each into the receptacle, which
-the earlier ones fill. Nothing is put anywhere by other means than the person's own hands.
+In a session the person stands at a random point near a receptacle, with objects of its category on the floor around.
+The person picks one after another and places each into the receptacle, which so fills up. Only the person's hands
+move objects.
 """
 
 import math
@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
+from experiments.stress.sessions import session_episode, upright_object
 from mjsim.actions import IDLE, EventKind, Pick, Place
-from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.episode import Episode, PlacedObject
 from mjsim.errors import PhysicsError
 from mjsim.model.scene import compose
 from mjsim.person.feasibility import receptacle_distance
@@ -22,11 +23,11 @@ from mjsim.world import World
 SEED = 2026
 LEVELS = 6  # the receptacle holds 0 to 5 objects before
 AROUND = (0.4, 0.92)  # m from the person to the objects on the floor
-STRAY = 0.3  # m from the receptacle's own approach point at most, in x and in y
+STRAY = 0.3  # m from the receptacle's approach point at most, in x and in y
 REACH = 0.8  # m from the person to the receptacle's volume at most
 SPACING = 0.3  # m between objects on the floor
 DROP = 0.01  # m
-LONGEST = 400  # control steps of one motion
+MAX_STEPS = 400  # control steps of one motion
 NOT_TRIED = ("pick_failed", "refused")
 _OUTCOMES = (
     EventKind.PICKED, EventKind.PICK_FAILED, EventKind.PLACED, EventKind.PLACE_FAILED, EventKind.GRIP_LOST,
@@ -43,7 +44,7 @@ class Placement:
         receptacle: Receptacle key.
         fill: How many objects the receptacle held before.
         outcome: `placed`, or `place_failed`, `pick_failed`, `grip_lost`, `refused`, `dislodged` if it was placed and
-            shoved another one out, `error` if the physics failed.
+            pushed another one out, `error` if the physics failed.
         ejections: Objects ejected meanwhile.
         tunnellings: Objects that tunnelled meanwhile.
         settle_s: Time from release to rest, s.
@@ -81,7 +82,7 @@ def run_session(house: House, number: int) -> list[Placement]:
 
 
 def make_episode(house: House, number: int) -> Episode:
-    """Somebody near a receptacle with objects around: receptacles in turn, everything else by chance."""
+    """The person near a receptacle with objects around: categories in turn, everything else drawn by chance."""
     rng = np.random.default_rng([SEED, number])
     category = list(house.catalogue.categories.values())[number % len(house.catalogue.categories)]
     receptacle = house.receptacles[category.receptacle]
@@ -91,25 +92,16 @@ def make_episode(house: House, number: int) -> Episode:
         if len(spots) == LEVELS:
             break
     models = [str(model) for model in rng.permutation(list(category.objects) * 2)[:LEVELS]]
-    objects = []
-    for i, (model, spot) in enumerate(zip(models, spots, strict=True)):
-        yaw = rng.uniform(-math.pi, math.pi)
-        x, y = (float(v) for v in spot)
-        quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
-        objects.append(PlacedObject(f"o{i}", category.key, model, (x, y), (x, y, DROP), quaternion))
-    heading = math.atan2(*(receptacle.center[:2] - stand)[::-1]) + rng.uniform(-1.5, 1.5)
-    return Episode(
-        house=house.catalogue.name,
-        seed=number,
-        start=StartPose(float(stand[0]), float(stand[1]), float(heading)),
-        objects=tuple(objects),
-        receptacles=tuple(house.catalogue.receptacles),
-        targets={o.name: category.receptacle for o in objects},
-    )
+    objects = [
+        upright_object(house, i, model, spot, DROP, rng.uniform(-math.pi, math.pi))
+        for i, (model, spot) in enumerate(zip(models, spots, strict=True))
+    ]
+    towards = math.atan2(*(receptacle.center[:2] - stand)[::-1])
+    return session_episode(house, number, stand, float(towards + rng.uniform(-1.5, 1.5)), objects)
 
 
 def _stand(house: House, key: str, rng: np.random.Generator) -> NDArray[np.float64]:
-    """A floor point from which a receptacle can be used, near the point that is meant for it."""
+    """A floor point (2,) m from which a receptacle is in reach, near its approach point."""
     receptacle = house.receptacles[key]
     while True:
         point = receptacle.approach + rng.uniform(-STRAY, STRAY, 2)
@@ -118,7 +110,7 @@ def _stand(house: House, key: str, rng: np.random.Generator) -> NDArray[np.float
 
 
 def _spots(house: House, stand: NDArray[np.float64], rng: np.random.Generator) -> list[NDArray[np.float64]]:
-    """Places for objects on the floor in reach of somebody, apart from each other and from what stands there."""
+    """Floor points (2,) m in reach of the person, apart from each other and from furniture."""
     spots: list[NDArray[np.float64]] = []
     for _ in range(400):
         angle, radius = rng.uniform(-math.pi, math.pi), rng.uniform(*AROUND)
@@ -163,12 +155,12 @@ def _transport(world: World, session: int, placed: PlacedObject, fill: int) -> P
 
 
 def _motion(world: World, action: Pick | Place, rows: list[tuple[float, ...]]) -> str:
-    """Do one thing to its end; the outcome. `rows` takes the health of every control step."""
+    """Outcome of a pick or place; `rows` takes the health of every control step."""
     step = world.step(action)
     if step.result is None or not step.result.applied:
         return "refused"
     kinds: list[EventKind] = []
-    for _ in range(LONGEST):
+    for _ in range(MAX_STEPS):
         rows.append(world.health_sample.row)
         kinds += [event.kind for event in step.events]
         if not world.busy:

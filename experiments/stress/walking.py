@@ -1,8 +1,8 @@
 """Walking into everything: charges at 1 to 8 m/s into walls, corners, furniture and heaps of objects.
 
-A session is an ordinary world, in which somebody charges in any direction, pushes on, is then told to walk away by the
-shortest way, and stands still for a while. Whether the body went through something, got stuck or drifts is judged
-by its position and the floor plan alone, by nothing of what is tested.
+In a session the person runs in random directions, pushes on, then walks away by the shortest path, and stands still
+for a while. Whether the body went through something, got stuck or drifts is decided by its position and the floor plan
+alone, not by the code under test.
 """
 
 import math
@@ -13,8 +13,9 @@ import shapely
 from numpy.typing import NDArray
 
 from experiments.house import House
-from mjsim.actions import Move
-from mjsim.episode import Episode, PlacedObject, StartPose
+from experiments.stress.sessions import session_episode, upright_object
+from mjsim.actions import IDLE, Move
+from mjsim.episode import Episode
 from mjsim.errors import PhysicsError
 from mjsim.model.avatar import TRUNK_RADIUS
 from mjsim.model.footprint import footprint
@@ -28,25 +29,25 @@ SEED = 2028
 SPEEDS = (1.0, 8.0)  # m/s
 ACCELERATION = 12.0  # m/s^2; more than the body's servos have force for
 SECONDS = 36.0  # of a session
-CHARGE, PUSH, ESCAPE, STAND = (0.8, 2.5), (0.4, 1.2), 2.0, (1.0, 1.0)  # s
+CHARGE, PUSH, RETREAT, STAND = (0.8, 2.5), (0.4, 1.2), 2.0, 1.0  # s
 HEAPED, LAYER = 6, 0.33  # objects, and m from one to the next before they fall: more than any is long
 ROOM = 0.4  # m of free floor around a heap
-NOT_STUCK = 0.2  # m in `ESCAPE` seconds
-ESCAPE_SPEED = 1.4  # m/s
+NOT_STUCK = 0.2  # m in `RETREAT` seconds
+RETREAT_SPEED = 1.4  # m/s
 LOOK_AHEAD = 0.3  # m
 
 
 @dataclass
-class Walk:
-    """What a session found.
+class WalkResult:
+    """What a session brought.
 
     Attributes:
         session: Its number; `run_session` repeats it.
         speed: Commanded speed, m/s.
         simulated: Simulated time, s.
         tunnelled: Control steps at which the body's axis was in something solid or had crossed it.
-        stuck: AnomalyDetector in which the body got no farther than `NOT_STUCK` m from where it was.
-        escapes: AnomalyDetector tried.
+        stuck: Walks away in which the body got no farther than `NOT_STUCK` m from where it was.
+        retreats: Walks away.
         drift: How far the body moved in the last second of standing still, m, by occasion.
         turned: How far it turned then, rad, by occasion.
         overlap: Depth of the trunk in walls and furniture at each control step, m.
@@ -62,7 +63,7 @@ class Walk:
     simulated: float = 0.0
     tunnelled: int = 0
     stuck: int = 0
-    escapes: int = 0
+    retreats: int = 0
     drift: list[float] = field(default_factory=list)
     turned: list[float] = field(default_factory=list)
     overlap: list[float] = field(default_factory=list)
@@ -73,18 +74,18 @@ class Walk:
     error: str | None = None
 
 
-def run_session(house: House, number: int, seconds: float = SECONDS) -> Walk:
+def run_session(house: House, number: int, seconds: float = SECONDS) -> WalkResult:
     """Run session `number`; the same number gives the same session, to the last bit."""
     return _Session(house, number).run(seconds)
 
 
 class _Session:
-    """One session under way."""
+    """A session under way."""
 
     def __init__(self, house: House, number: int) -> None:
         self._house = house
         self._rng = np.random.default_rng([SEED, number])
-        self._found = Walk(number, float(self._rng.uniform(*SPEEDS)))
+        self._found = WalkResult(number, float(self._rng.uniform(*SPEEDS)))
         self._heap = _free_place(house, self._rng)
         scene = compose(_episode(house, number, self._heap, self._rng), house.catalogue)
         self._solid = shapely.union_all([shapely.Polygon(p) for p in footprint(scene.model).obstacles])
@@ -93,12 +94,12 @@ class _Session:
         self._world = World(scene, options)
         self._position = self._world.observation().position
 
-    def run(self, seconds: float) -> Walk:
+    def run(self, seconds: float) -> WalkResult:
         found, world = self._found, self._world
         try:
             while world.observation().time < seconds:
                 self._charge()
-                self._escape()
+                self._retreat()
                 self._stand()
         except PhysicsError as error:
             found.error = str(error)
@@ -113,36 +114,36 @@ class _Session:
         """Run in some direction, every third time at the heap, then push on at another angle while turning."""
         rng, o = self._rng, self._world.observation()
         at_heap = rng.random() < 1 / 3
-        way = self._heap - o.position
-        course = math.atan2(way[1], way[0]) if at_heap else rng.uniform(-math.pi, math.pi)
+        offset = self._heap - o.position
+        course = math.atan2(offset[1], offset[0]) if at_heap else rng.uniform(-math.pi, math.pi)
         for duration, veer in ((CHARGE, 0.0), (PUSH, rng.uniform(-1.6, 1.6))):
             turn = rng.uniform(-2.5, 2.5)
             for _ in range(self._steps(rng.uniform(*duration))):
                 self._go(course + veer, self._found.speed, turn)
 
-    def _escape(self) -> None:
-        """Walk away by the shortest way to somewhere else."""
+    def _retreat(self) -> None:
+        """Walk away towards somewhere else by the shortest path."""
         house, start = self._house, self._position
         goal = _far_point(house, house.navmesh.snap(start), self._rng)
-        self._found.escapes += 1
+        self._found.retreats += 1
         farthest = 0.0
-        for _ in range(self._steps(ESCAPE)):
+        for _ in range(self._steps(RETREAT)):
             here = house.navmesh.snap(self._position)
             path = np.asarray(house.geodesics.shortest_path(here, goal).points)
-            # First of all back to where one can walk, if the charge has left the body elsewhere.
+            # First back onto navigable floor, if the charge has left the body off it.
             out, ahead = here - self._position, np.array(point_along(path, LOOK_AHEAD)) - here
-            way = 4.0 * out + ahead / LOOK_AHEAD
-            self._go(math.atan2(way[1], way[0]), ESCAPE_SPEED, 0.0)
+            course = 4.0 * out + ahead / LOOK_AHEAD
+            self._go(math.atan2(course[1], course[0]), RETREAT_SPEED, 0.0)
             farthest = max(farthest, float(np.linalg.norm(self._position - start)))
         self._found.stuck += farthest < NOT_STUCK
 
     def _stand(self) -> None:
-        """Stop, and see whether the body stays where it is."""
-        for _ in range(self._steps(STAND[0])):
-            self._step(Move())
+        """Stop, and measure for a while whether the body stays where it is."""
+        for _ in range(self._steps(STAND)):
+            self._step(IDLE)
         before = self._world.observation()
-        for _ in range(self._steps(STAND[1])):
-            self._step(Move())
+        for _ in range(self._steps(STAND)):
+            self._step(IDLE)
         after = self._world.observation()
         self._found.drift.append(float(np.linalg.norm(after.position - before.position)))
         self._found.turned.append(abs(after.heading - before.heading))
@@ -177,36 +178,23 @@ def _free_place(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _far_point(house: House, here: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """A point of the floor that is too far to arrive at during an escape."""
+    """A point of the floor that is too far away to be reached during a retreat."""
     while True:
         goal = house.navmesh.sample(rng)
         try:
-            if house.geodesics.shortest_path(here, goal).geodesic_distance > 2.0 * ESCAPE * ESCAPE_SPEED:
+            if house.geodesics.shortest_path(here, goal).geodesic_distance > 2.0 * RETREAT * RETREAT_SPEED:
                 return goal
         except UnreachableError:
             continue
 
 
 def _episode(house: House, number: int, heap: NDArray[np.float64], rng: np.random.Generator) -> Episode:
-    """Somebody anywhere in the house, and objects that fall onto a heap."""
-    catalogue = house.catalogue
+    """The person anywhere in the house, and objects that fall onto a heap at a floor point (2,) m."""
     start = house.navmesh.sample(rng)
     while np.linalg.norm(start - heap) < 1.0:
         start = house.navmesh.sample(rng)
     objects = []
-    for i, model in enumerate(rng.choice(list(catalogue.objects), HEAPED, replace=False)):
-        x, y = (float(v) for v in heap + rng.uniform(-0.1, 0.1, 2))
-        yaw = rng.uniform(-math.pi, math.pi)
-        quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
-        category = catalogue.objects[str(model)].category
-        objects.append(
-            PlacedObject(f"o{i}", category, str(model), (x, y), (x, y, 0.01 + LAYER * i), quaternion)
-        )
-    return Episode(
-        house=catalogue.name,
-        seed=number,
-        start=StartPose(float(start[0]), float(start[1]), float(rng.uniform(-math.pi, math.pi))),
-        objects=tuple(objects),
-        receptacles=tuple(catalogue.receptacles),
-        targets={o.name: catalogue.categories[o.category].receptacle for o in objects},
-    )
+    for i, model in enumerate(rng.choice(list(house.catalogue.objects), HEAPED, replace=False)):
+        xy, yaw = heap + rng.uniform(-0.1, 0.1, 2), rng.uniform(-math.pi, math.pi)
+        objects.append(upright_object(house, i, str(model), xy, 0.01 + LAYER * i, yaw))
+    return session_episode(house, number, start, float(rng.uniform(-math.pi, math.pi)), objects)

@@ -1,0 +1,83 @@
+"""Stress sessions: their episodes, and how many of them run on several cores with a progress bar."""
+
+import functools
+import math
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+
+from experiments.house import House
+from mjsim.episode import Episode, PlacedObject, StartPose
+
+T = TypeVar("T")
+
+
+def run_sessions(
+    run: Callable[[House, int], T], count: int, *, workers: int | None = None, only: int | None = None
+) -> list[T]:
+    """Run sessions 0 to count - 1, or one of them alone.
+
+    Args:
+        run: Runs the session of a number; a function of a module.
+        count: How many.
+        workers: Processes; one per core unless said.
+        only: Number of the one session to run, to look at a failure again.
+
+    Returns:
+        Their results, in the order of the numbers.
+    """
+    numbers = range(count) if only is None else range(only, only + 1)
+    results = _results(run, numbers, workers or os.cpu_count() or 1)
+    return list(track(results, "sessions", total=len(numbers), console=Console(stderr=True)))
+
+
+def _results(run: Callable[[House, int], T], numbers: Sequence[int], workers: int) -> Iterator[T]:
+    if workers == 1 or len(numbers) < 2 * workers:
+        house = House.load()
+        yield from (run(house, number) for number in numbers)
+        return
+    # Spawned, not forked: a forked thread pool would not survive.
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(functools.partial(_run_in_worker, run), numbers)
+
+
+def _run_in_worker(run: Callable[[House, int], T], number: int) -> T:
+    return run(_house(), number)
+
+
+@functools.cache
+def _house() -> House:
+    """One house per process."""
+    return House.load()
+
+
+def upright_object(
+    house: House, number: int, model: str, xy: NDArray[np.float64], height: float, yaw: float
+) -> PlacedObject:
+    """Object `o<number>` of a session: a model at a floor point (2,) m, at a height, m, turned by a yaw, rad."""
+    x, y = xy.tolist()
+    quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+    category = house.catalogue.objects[model].category
+    return PlacedObject(f"o{number}", category, model, (x, y), (x, y, height), quaternion)
+
+
+def session_episode(
+    house: House, number: int, start: NDArray[np.float64], heading: float, objects: Sequence[PlacedObject]
+) -> Episode:
+    """Episode of a session: the person at a floor point (2,) m with a heading, rad, and objects with their targets."""
+    catalogue = house.catalogue
+    return Episode(
+        house=catalogue.name,
+        seed=number,
+        start=StartPose(float(start[0]), float(start[1]), heading),
+        objects=tuple(objects),
+        receptacles=tuple(catalogue.receptacles),
+        targets={o.name: catalogue.categories[o.category].receptacle for o in objects},
+    )
