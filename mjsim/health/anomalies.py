@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mjsim.actions import EventKind
 from mjsim.health.scan import DISPLACED, FAST, OUTSIDE
-from mjsim.health.settling import SettlingObject
+from mjsim.health.settle_times import SettlingObject
 from mjsim.model.rays import first_hit
 from mjsim.model.scene import Scene
 

@@ -15,7 +15,7 @@ from mjsim.actions import EventKind
 from mjsim.errors import PhysicsError
 from mjsim.health.anomalies import CHECK_DISTANCE, AnomalyDetector, AnomalyState
 from mjsim.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan
-from mjsim.health.settling import SettlingState, SettlingTracker
+from mjsim.health.settle_times import SettleTimer, SettleTimerState
 from mjsim.health.values import QUIET, Health, HealthSample
 from mjsim.model.clearance import carry_clearance
 from mjsim.model.scene import Scene
@@ -44,7 +44,7 @@ class HealthState:
     settle_times: tuple[float, ...]
     sample: HealthSample
     anomalies: AnomalyState
-    settling: SettlingState
+    settling: SettleTimerState
 
 
 class HealthMonitor:
@@ -58,7 +58,7 @@ class HealthMonitor:
         index, data = scene.index, rig.data
         self._rig, self._grips = rig, grips
         self._anomalies = AnomalyDetector(scene)
-        self._settling = SettlingTracker(scene)
+        self._settling = SettleTimer(scene)
         self._flags, self._sample = np.zeros(len(index.names), np.uint8), np.zeros(6)
         limits = np.array([CHECK_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
         arrays = ScanArrays(

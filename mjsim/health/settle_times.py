@@ -31,8 +31,8 @@ class SettlingObject:
 
 
 @dataclass(frozen=True)
-class SettlingState:
-    """What a `SettlingTracker` remembers, as a value.
+class SettleTimerState:
+    """What a `SettleTimer` remembers, as a value.
 
     Attributes:
         objects: Number and state of each released object that is not at rest.
@@ -43,7 +43,7 @@ class SettlingState:
     gripped: tuple[tuple[int, float, list[float]], ...]
 
 
-class SettlingTracker:
+class SettleTimer:
     """Follows objects from their release until they rest, a hand grips them again, or the person's foot pushes them.
 
     Attributes:
@@ -91,12 +91,12 @@ class SettlingTracker:
                 del self.objects[item]
         return settled
 
-    def get_state(self) -> SettlingState:
+    def get_state(self) -> SettleTimerState:
         """Everything, as a value."""
         objects = tuple((item, replace(settling)) for item, settling in self.objects.items())
-        return SettlingState(objects, tuple((item, *last) for item, last in self._gripped.items()))
+        return SettleTimerState(objects, tuple((item, *last) for item, last in self._gripped.items()))
 
-    def set_state(self, state: SettlingState) -> None:
+    def set_state(self, state: SettleTimerState) -> None:
         """Go on from what `get_state` gave."""
         self.objects = {item: replace(settling) for item, settling in state.objects}
         self._gripped = {item: (time, center) for item, time, center in state.gripped}
