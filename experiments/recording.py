@@ -1,4 +1,4 @@
-"""What a replay is verified against: state hashes of every control step, log hashes, and checkpoints to go on from."""
+"""What a replay is checked against: state hashes of every control step, log hashes, and checkpoints to start from."""
 
 import dataclasses
 import hashlib
@@ -17,7 +17,7 @@ from mjsim.observation import Observation
 from mjsim.world import World
 from mjsim.world_state import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint
 
-FAR_OFF = 1000  # control steps, where no checkpoint is to come
+NO_CHECKPOINT_AHEAD = 1000  # control steps to the next checkpoint, where there is none
 
 
 class Recording:
@@ -51,7 +51,7 @@ class Recording:
         return self._first + len(self._state_hash)
 
     def pass_checkpoint(self, observation: Observation) -> Observation:
-        """Take the world's state and set the world to it, if that is due; the state as seen from then on."""
+        """Take the world's state and restore the world to it, if a checkpoint is due; the observation after that."""
         if not self._due(observation.busy):
             return observation
         state = self._world.state()
@@ -76,7 +76,9 @@ class Recording:
         """Control steps that can be taken at once before the next checkpoint is due, 1 or more."""
         if self._steps_given is None:
             return max(1, self._last + self._period - self.step)
-        return min((step - self.step for step in self._steps_given if step > self.step), default=FAR_OFF)
+        return min(
+            (step - self.step for step in self._steps_given if step > self.step), default=NO_CHECKPOINT_AHEAD
+        )
 
     def save(self, path: Path, actions: NDArray[np.float64]) -> None:
         """Write a compressed NPZ, whole or not at all.
@@ -121,7 +123,7 @@ class Recorded:
         log_hash: Hash of that much of the log, shape (T + 1,).
         checkpoint_step: Control steps that have a checkpoint, ascending, shape (K,).
         checkpoint_physics: Their states, shape (K, n).
-        checkpoint_details: What the world remembered beside the physics, JSON, shape (K,).
+        checkpoint_details: `WorldState.details_json` of each, shape (K,).
         checkpoint_hash: Hash of each checkpoint, shape (K,).
     """
 
@@ -171,7 +173,7 @@ def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
 
 
 def provenance(world: World) -> dict[str, Any]:
-    """What a run depends on beside its configuration: versions, the compiled model, the rules. JSON-ready."""
+    """Versions, compiled model and rules, on which a run depends as it does on its configuration; JSON-ready."""
     return {
         "versions": engine_versions(),
         "model": model_fingerprint(world.model),

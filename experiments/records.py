@@ -18,9 +18,8 @@ from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.rollout import Rollout
 
-LOG_FORMAT = (
-    4  # 3 had untyped checkpoints, 2 no health of the physics, 1 neither state hashes nor checkpoints
-)
+# 4: typed checkpoints. 3: untyped ones. 2: no health of the physics. 1: neither state hashes nor checkpoints.
+LOG_FORMAT = 4
 EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
     "events.jsonl",

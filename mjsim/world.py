@@ -20,7 +20,7 @@ from mjsim.world_state import WorldState
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """What one control step brought.
+    """The result of one control step.
 
     Attributes:
         observation: State after the step.
@@ -36,16 +36,16 @@ class StepResult:
 class World:
     """A running episode.
 
-    While a pick or place is under way (`Observation.busy`) the person's body belongs to it: a `Move` is ignored,
-    another `Pick` or `Place` is refused. A refused action leaves the world exactly as `IDLE` would.
+    During a pick or place (`Observation.busy`) a `Move` is ignored and another `Pick` or `Place` is refused. A
+    refused action leaves the world exactly as `IDLE` would.
 
     Attributes:
-        scene: What runs; its model is never modified.
-        options: The rules, and how much of it all is physics (`mjsim.fidelity`).
+        scene: The composed episode; its model is never modified.
+        options: The rules, and how much of the world is physics (docs/fidelity.md).
     """
 
     def __init__(self, scene: Scene, options: WorldOptions | None = None) -> None:
-        """Start at the episode's beginning.
+        """Start at the beginning of the episode.
 
         Raises:
             AssetError: The scene has no person, or an object lacks a grip site.
@@ -64,7 +64,7 @@ class World:
 
     @property
     def data(self) -> mujoco.MjData:
-        """The state, for rendering and rays; treat it as read-only. Ask for it anew after every step."""
+        """The state, for rendering and rays; read-only. Get it anew after every step."""
         return self._tier.data
 
     @property
@@ -79,7 +79,7 @@ class World:
 
     @property
     def health_sample(self) -> HealthSample:
-        """What the physics was like in the latest control step."""
+        """Health of the physics in the latest control step."""
         return self._tier.health_sample
 
     @property
@@ -89,7 +89,7 @@ class World:
 
     @property
     def locomotion(self) -> LocomotionState | None:
-        """What the walk depends on, for `mjsim.fidelity.kinematics`; None while physics moves the person."""
+        """What walking depends on, for kernels of `mjsim.fidelity.kinematics`; None while physics moves the person."""
         return self._tier.locomotion
 
     def reset(self) -> Observation:
@@ -102,7 +102,7 @@ class World:
         return self._tier.state_hash()
 
     def state(self) -> WorldState:
-        """Everything from which `restore` goes on, as a value.
+        """The complete state as a value; `restore` continues from it.
 
         Raises:
             StateError: A pick or place is under way.
@@ -114,10 +114,10 @@ class World:
         return self._tier.state()
 
     def restore(self, state: WorldState) -> Observation:
-        """Go on from a state, of this world or of another one of the same scene and options.
+        """Continue from a state of this world, or of another one of the same scene and options.
 
-        The physics is reset on the way, so the world that the state was taken from goes on in the very same
-        way only if it is restored, too (`mjsim.world_state`).
+        This resets the physics: the world that the state was taken from continues identically only if it is restored,
+        too (`mjsim.world_state`).
 
         Raises:
             StateError: The state does not fit the scene, or is of another fidelity.
@@ -136,7 +136,7 @@ class World:
         return StepResult(self._tier.observation(), result, tuple(self._tier.episode_state.events))
 
     def walk(self, moves: ArrayLike) -> Rollout:
-        """Take one control step per row, as `step(Move(*row))` would; stops early after a step with events.
+        """Take one control step per row, as `step(Move(*row))` would; stop early after a step with events.
 
         Args:
             moves: Columns forward, left (m/s), turn and look (rad/s), shape (n, 4).
@@ -155,7 +155,7 @@ class World:
     def finish(self) -> Rollout:
         """Step with `IDLE` until no pick or place is under way; no step at all when none is.
 
-        As `walk`, it stops early after a step with events; where one happened besides, the world is busy still.
+        Stops early after a step with events, as `walk` does. If the motion has not ended then, the world is still busy.
 
         Raises:
             PhysicsError: As in `step`.

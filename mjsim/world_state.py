@@ -1,4 +1,4 @@
-"""What makes a run repeatable: state hashes, checkpoints, and the versions that the physics depends on.
+"""What makes a run repeatable: state hashes, checkpoints, and the versions that determine the physics.
 
 With sleep on, MuJoCo's state vector does not say which bodies sleep, so setting it on live data is not exact. Setting
 it after `mj_resetData` is. A run therefore passes through a checkpoint itself: it takes the state, resets, and sets
@@ -34,7 +34,7 @@ _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _HASHED = int(
     mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_EQ_ACTIVE
 )
-# Looks only: textures, colours, what the renderer needs of meshes and cameras. Names and paths decide nothing either.
+# Looks only: textures, colours, the renderer's share of meshes and cameras. Names and paths do not matter either.
 _LOOKS = (
     "tex_",
     "mat_",
@@ -69,7 +69,7 @@ class PersonState:
 
 @dataclass(frozen=True, eq=False)
 class StateDetails:
-    """What a world remembers beside its physics.
+    """The part of a world's state that is not physics.
 
     Attributes:
         hands: Object in the left and the right hand.
@@ -86,7 +86,7 @@ class StateDetails:
 
 @dataclass(frozen=True, eq=False)
 class WorldState:
-    """A world between two motions, complete: a world that is set to it goes on as the one that it was taken from.
+    """The complete state of a world between two motions.
 
     Attributes:
         physics: MuJoCo's integration state, or that of a world without physics, shape (n,).
@@ -133,7 +133,7 @@ class StateHash:
 
 
 def hash64(content: Any) -> int:
-    """The first 64 bits of the SHA-1 of some bytes; quick, and meant against mishap, not against malice."""
+    """The first 64 bits of the SHA-1 of some bytes: a checksum against accidents, not against forgery."""
     return int.from_bytes(hashlib.sha1(content, usedforsecurity=False).digest()[:8], "little")
 
 
@@ -145,7 +145,7 @@ def take_physics(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float
 
 
 def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.float64]) -> None:
-    """Reset the data and set it to a state of `take_physics`; nothing of what it was before is left.
+    """Reset the data and set it to a state of `take_physics`, independently of what it was before.
 
     Raises:
         StateError: The state is of another model, or not finite.
@@ -164,7 +164,7 @@ def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.
 
 
 def model_fingerprint(model: mujoco.MjModel) -> str:
-    """16 hex digits over everything of a compiled model that moves something; looks are left out."""
+    """16 hex digits over everything in a compiled model that affects the physics; looks are left out."""
     digest = hashlib.sha256()
     for part in (model, model.opt):
         for name in sorted(n for n in dir(part) if not n.startswith("_") and not _is_looks(n)):
@@ -178,7 +178,7 @@ def model_fingerprint(model: mujoco.MjModel) -> str:
 
 
 def engine_versions() -> dict[str, str]:
-    """Versions of everything that decides how a state follows from the one before."""
+    """Versions of everything that determines how a state follows from the one before."""
     return {
         "mjsim": _own_version(),
         "physics_code": _code_fingerprint(),

@@ -136,17 +136,17 @@ def wander(count: int, seed: int) -> np.ndarray:
 
 
 def check_rows(
-    stretch: Rollout, seen: list[Observation], hashes: list[int], health: list[tuple[float, ...]]
+    rollout: Rollout, seen: list[Observation], hashes: list[int], health: list[tuple[float, ...]]
 ) -> None:
-    assert stretch.times.tolist() == [o.time for o in seen]
-    assert np.array_equal(stretch.positions, [o.position for o in seen])
-    assert stretch.headings.tolist() == [o.heading for o in seen]
-    assert stretch.pitches.tolist() == [o.pitch for o in seen]
-    assert np.array_equal(stretch.object_positions, [o.object_positions for o in seen])
-    assert np.array_equal(stretch.object_quaternions, [o.object_quaternions for o in seen])
-    assert stretch.state_hashes.tolist() == hashes
-    assert np.array_equal(stretch.health, health, equal_nan=True)
-    assert same(stretch.observation, seen[-1])
+    assert rollout.times.tolist() == [o.time for o in seen]
+    assert np.array_equal(rollout.positions, [o.position for o in seen])
+    assert rollout.headings.tolist() == [o.heading for o in seen]
+    assert rollout.pitches.tolist() == [o.pitch for o in seen]
+    assert np.array_equal(rollout.object_positions, [o.object_positions for o in seen])
+    assert np.array_equal(rollout.object_quaternions, [o.object_quaternions for o in seen])
+    assert rollout.state_hashes.tolist() == hashes
+    assert np.array_equal(rollout.health, health, equal_nan=True)
+    assert same(rollout.observation, seen[-1])
 
 
 def stepped(
@@ -177,9 +177,9 @@ def test_finishing_in_one_call_is_idling_step_by_step(house: Scene, fidelity: st
     at_once, by_steps = world_of(house, fidelity), world_of(house, fidelity)
     for world in (at_once, by_steps):
         world.step(Pick("o0"))
-    stretch = at_once.finish()
-    check_rows(stretch, *stepped(by_steps, [IDLE] * len(stretch)))
-    assert [e.kind for e in stretch.events] == [EventKind.PICKED]
+    rollout = at_once.finish()
+    check_rows(rollout, *stepped(by_steps, [IDLE] * len(rollout)))
+    assert [e.kind for e in rollout.events] == [EventKind.PICKED]
     assert not at_once.busy
     assert not by_steps.busy
     assert len(at_once.finish()) == 0

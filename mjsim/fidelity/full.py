@@ -151,7 +151,7 @@ class Full(Tier):
         """
         if isinstance(result.action, Pick):
             picking = take if reached else pick
-            steps = picking(self.person, hand, item, self.carrying.place_for, pitch)
+            steps = picking(self.person, hand, item, self.carrying.carry_position, pitch)
         else:
             steps = place(self.person, hand, item, self.scene.receptacles[str(result.receptacle)], pitch)
         self._motion = _Motion(steps, result.action, hand, item, result.receptacle)

@@ -30,7 +30,6 @@ from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person.grips import AWAKE
-from mjsim.person.postures import MIN_HEIGHT, BodyMotion, drawn_in
 from mjsim.rollout import RolloutArrays
 
 # An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.
@@ -143,14 +142,6 @@ class KinematicWorld:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
-
-    def place_for(self, hand: int, item: int) -> NDArray[np.float64]:
-        """Where a hand best carries object `item`, clear of the house: body frame, m, (3,)."""
-        forward, left, up = avatar.posture(hand, avatar.CARRY)
-        body, model = self._body, self.model
-        radius, height = model.loads[item].tolist()
-        point = drawn_in(forward, left, radius, BodyMotion(body, body[FORWARD:], model.clearance))
-        return np.array([*point, max(up, MIN_HEIGHT + height)])
 
     def walk(self, moves: NDArray[np.float64]) -> RolloutArrays:
         """One control step per row (n, 4): forward and left, m/s, turn and look, rad/s."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mjsim.actions import ActionResult, EventKind, Pick
 from mjsim.fidelity import motion_primitives
-from mjsim.fidelity.body_state import HEADING, X, Y
+from mjsim.fidelity.body_state import FORWARD, HEADING, X, Y
 from mjsim.fidelity.fall import Fall, drop
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import HANDS
@@ -23,6 +23,7 @@ from mjsim.fidelity.motion_primitives import HandMovement, MotionTrajectory
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.person.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.person.placing import hover_height, square_heading
+from mjsim.person.postures import BodyMotion
 from mjsim.person.slots import LoadExtent, Slot, best_slot, object_corners
 
 Vector = NDArray[np.float64]
@@ -98,7 +99,9 @@ class MotionPlanner:
         grip = self._reach(motion, item)
         self._kinematic.grasp(motion.hand, item, grip)
         motion.wait(times.align_time)
-        goal = self._kinematic.place_for(motion.hand, item)
+        body = self._kinematic.body
+        body_motion = BodyMotion(body, body[FORWARD:], self._kinematic.model.clearance)
+        goal = self._full.carrying.carry_position(motion.hand, item, body_motion)
         motion.move(goal, motion.steps(times.lift_time), UP_FIRST, _towards(pitch))
         motion.move(motion.hand_position, _SEATING)
         motion.end()

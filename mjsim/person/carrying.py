@@ -95,19 +95,20 @@ class Carrying:
         contacts = self._contacts() if left >= 0 or right >= 0 else self._no_contacts
         _update_hands(self._body, self._hands, holding, contacts, person.dt)
 
-    def place_for(
-        self, hand: int, item: int, held_posture: tuple[float, float, float] = avatar.CARRY
-    ) -> NDArray[np.float64]:
-        """Where a hand best holds object `item` now, clear of the house: body frame, m, (3,)."""
+    def carry_position(self, hand: int, item: int, body: BodyMotion | None = None) -> NDArray[np.float64]:
+        """Where a hand best carries object `item`, clear of the house: body frame, m, (3,).
+
+        Args:
+            hand: The hand.
+            item: The object.
+            body: Pose and commands of the body; by default those of the physics.
+        """
         radius, height = self.loads[item].tolist()
-        forward, side, up = avatar.posture(hand, held_posture)
+        forward, left, up = avatar.posture(hand, avatar.CARRY)
         rig = self._person.rig
-        return np.array(
-            [
-                *drawn_in(forward, side, radius, BodyMotion(rig.pose, rig.motion, self.clearance)),
-                max(up, MIN_HEIGHT + height),
-            ]
-        )
+        body = body or BodyMotion(rig.pose, rig.motion, self.clearance)
+        point = drawn_in(forward, left, radius, body)
+        return np.array([*point, max(up, MIN_HEIGHT + height)])
 
     def _contacts(self) -> tuple[Any, ...]:
         """All contacts of the physics, as `Contacts`."""

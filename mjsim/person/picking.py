@@ -17,7 +17,7 @@ def pick(
     person: Person,
     hand: int,
     item: int,
-    place_for: Callable[[int, int], NDArray[np.float64]],
+    carry_position: Callable[[int, int], NDArray[np.float64]],
     pitch: float,
 ) -> Motion:
     """Reach for object `item` and lift it.
@@ -26,7 +26,7 @@ def pick(
         person: Who picks.
         hand: Hand that reaches.
         item: Object.
-        place_for: Where a hand holds an object clear of the house, body frame, m, (3,).
+        carry_position: Gives where a hand carries an object clear of the house, body frame, m, (3,).
         pitch: Where the head looks afterwards, rad.
 
     Returns:
@@ -42,7 +42,7 @@ def pick(
             break
         rig.hand_targets[hand] = rig.to_body(grips.point(item, grip))
         yield
-    success = yield from take(person, hand, item, place_for, pitch)
+    success = yield from take(person, hand, item, carry_position, pitch)
     return success
 
 
@@ -50,7 +50,7 @@ def take(
     person: Person,
     hand: int,
     item: int,
-    place_for: Callable[[int, int], NDArray[np.float64]],
+    carry_position: Callable[[int, int], NDArray[np.float64]],
     pitch: float,
 ) -> Motion:
     """Lift object `item`, which the hand has reached; the rest is as in `pick`."""
@@ -60,7 +60,7 @@ def take(
     if grips.gap(hand, item, grip) > person.options.grip_distance:
         return False
     grips.close(hand, item, grip, gently=True)
-    yield from _lift(person, hand, place_for(hand, item), pitch)
+    yield from _lift(person, hand, carry_position(hand, item), pitch)
     # Held gently, a load hangs 2 cm off the hand: only now, clear of its neighbours, is it drawn in.
     grips.close(hand, item, grip)
     yield from _draw_in(person, hand)
