@@ -14,8 +14,8 @@ help: ## List the targets
 demo: $(READY) ## Set up, then film an assisted clean-up into runs/demo
 	$(BIN)/mjsim run --objects 6 --assistance optimal --seed 0 --out runs/demo
 
-test: $(READY) ## Set up, then run the whole test suite
-	$(BIN)/python -m pytest -n $(WORKERS)
+test: $(READY) ## Set up, then run the whole test suite; COVERAGE=1 measures what it covers
+	$(BIN)/python -m pytest -n $(WORKERS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered)
 
 check: $(READY) ## Lint, strict types, import contracts
 	$(BIN)/ruff check .

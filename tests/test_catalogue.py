@@ -49,13 +49,6 @@ def test_a_path_gives_the_same_catalogue_as_the_name() -> None:
     assert list(named.objects) == list(by_path.objects)  # sampling depends on the order
 
 
-def test_receptacle_of_follows_the_category() -> None:
-    catalogue = Catalogue.load()
-    assert catalogue.receptacle_of("mug").key == "dish_bin"
-    with pytest.raises(AssetError, match="'banana'"):
-        catalogue.receptacle_of("banana")
-
-
 MISTAKES = {
     "missing object file": ('"objects/mug.xml"', '"objects/mugg.xml"', "mugg.xml"),
     "missing receptacle file": ('"receptacles/toy_box.xml"', '"receptacles/box.xml"', "box.xml"),

@@ -162,7 +162,7 @@ def _on_the_floor(catalogue: Catalogue, *models: str) -> Episode:
         )
         for i, m in enumerate(models)
     )
-    targets = {m: catalogue.receptacle_of(m).key for m in models}
+    targets = {m: catalogue.categories[catalogue.objects[m].category].receptacle for m in models}
     return Episode(
         catalogue.name, 0, StartPose(1.5, 2.5, 0.0), objects, tuple(catalogue.receptacles), targets
     )

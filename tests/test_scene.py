@@ -30,7 +30,7 @@ def small_episode(catalogue: Catalogue, *placed: tuple[str, float, float]) -> Ep
         )
         for i, (model, x, y) in enumerate(placed)
     )
-    targets = {o.name: catalogue.receptacle_of(o.model).key for o in objects}
+    targets = {o.name: catalogue.categories[catalogue.objects[o.model].category].receptacle for o in objects}
     return Episode(
         catalogue.name, 0, StartPose(1.5, 1.5, 0.5), objects, tuple(catalogue.receptacles), targets
     )

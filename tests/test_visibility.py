@@ -34,7 +34,7 @@ def _stand(
     )
     episode = Episode(
         catalogue.name, 0, StartPose(eye[0], eye[1], heading), objects, tuple(catalogue.receptacles),
-        {o.name: catalogue.receptacle_of(o.model).key for o in objects},
+        {o.name: catalogue.categories[catalogue.objects[o.model].category].receptacle for o in objects},
     )  # fmt: skip
     scene = compose(episode, catalogue, avatar=avatar)
     data = mujoco.MjData(scene.model)

@@ -120,18 +120,6 @@ class Catalogue:
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise AssetError(f"cannot read catalogue {path}: {error}") from error
 
-    def receptacle_of(self, model: str) -> Receptacle:
-        """Receptacle that takes the object model `model`.
-
-        Raises:
-            AssetError: No such object model.
-        """
-        if model not in self.objects:
-            raise AssetError(
-                f"object model {model!r} is not in the catalogue {self.name!r}: {sorted(self.objects)}"
-            )
-        return self.receptacles[self.categories[self.objects[model].category].receptacle]
-
 
 def _catalogue_path(house: str) -> Path:
     if house.endswith(".toml"):
