@@ -101,7 +101,7 @@ def visible_objects(
         field: Field of view; by default 80 by 65 degrees and 8 m.
         among: Instance names to look for; None for all. The fewer, the quicker.
     """
-    sight = scene.once("sight", lambda: _sight_geometry(scene, data))
+    sight = scene.once("sight", lambda: _sight_geometry(scene))
     names = scene.index.names
     wanted = np.array([among is None or name in among for name in names], np.bool_)
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView())
@@ -132,8 +132,10 @@ def _first_hit(
     return int(geom[0])
 
 
-def _sight_geometry(scene: Scene, data: mujoco.MjData) -> SightGeometry:
+def _sight_geometry(scene: Scene) -> SightGeometry:
     model, owner = scene.model, scene.index.geom_owner
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     drawn = DRAWN_GROUPS[model.geom_group] > 0
     static = model.body_weldid[model.geom_bodyid] == 0
     geoms = np.flatnonzero((owner >= 0) & drawn)
