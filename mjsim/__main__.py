@@ -8,8 +8,8 @@ from mjsim.conflicts import hidden_package
 
 def main() -> int:
     """Run the command line; say so if other software hides the package that it lives in."""
-    if conflict := hidden_package("experiments"):
-        print(f"mjsim: {conflict.message}", file=sys.stderr)
+    if hidden := hidden_package("experiments"):
+        print(f"mjsim: {hidden}", file=sys.stderr)
         return 1
     return int(importlib.import_module("experiments.cli").main())
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from mjsim.conflicts import Conflict, package_conflicts
+from mjsim.conflicts import PACKAGES, hidden_package, shared_names
 from mjsim.errors import RenderError
 from mjsim.render.context import EGL_PACKAGES, GlInfo, gl_info
 
@@ -22,7 +22,7 @@ class EnvironmentReport:
         python: Version of the interpreter.
         platform: Operating system and processor.
         versions: Distribution -> version, or None where it is not installed.
-        conflicts: Other packages of the names that ours have.
+        hidden: What to do about packages of ours that other software hides.
         egl_vendors: Names of the EGL vendor files found.
         gl: What draws, or None where no context can be made.
         problem: Why there is no context, or None.
@@ -32,7 +32,7 @@ class EnvironmentReport:
     python: str
     platform: str
     versions: Mapping[str, str | None]
-    conflicts: tuple[Conflict, ...]
+    hidden: tuple[str, ...]
     egl_vendors: tuple[str, ...]
     gl: GlInfo | None
     problem: str | None
@@ -41,8 +41,7 @@ class EnvironmentReport:
     @property
     def usable(self) -> bool:
         """Whether everything needed is installed, nothing of it is hidden, and frames can be drawn."""
-        hidden = any(conflict.hidden for conflict in self.conflicts)
-        return self.gl is not None and None not in self.versions.values() and not hidden
+        return self.gl is not None and None not in self.versions.values() and not self.hidden
 
     def lines(self) -> tuple[str, ...]:
         """The report as lines of text, advice last."""
@@ -54,7 +53,7 @@ class EnvironmentReport:
         else:
             kind = "software" if self.gl.software else "hardware"
             rows.append(f"OpenGL: {self.gl.renderer}, {self.gl.vendor}, {self.gl.version} ({kind})")
-        return (*rows, *(conflict.message for conflict in self.conflicts), *self.advice)
+        return (*rows, *self.hidden, *self.advice)
 
 
 def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport:
@@ -75,11 +74,11 @@ def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport
         python=platform.python_version(),
         platform=f"{platform.system()} {platform.machine()}",
         versions=versions,
-        conflicts=package_conflicts(),
+        hidden=tuple(message for name in PACKAGES if (message := hidden_package(name))),
         egl_vendors=vendors,
         gl=gl,
         problem=problem,
-        advice=advise(versions, vendors, gl),
+        advice=(*shared_names(), *advise(versions, vendors, gl)),
     )
 
 

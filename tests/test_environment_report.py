@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim.conflicts import Conflict
 from mjsim.diagnostics import advise, egl_vendors, environment_report
 from mjsim.render.context import GlInfo, is_software
 
@@ -111,11 +110,3 @@ def test_a_folder_called_experiments_ahead_of_ours_is_named_at_every_command(tmp
     done = _command_line("doctor", f"{tmp_path}:{CHECKOUT}")
     assert done.returncode == 1
     assert f"imports experiments from {tmp_path.resolve() / 'experiments'} instead of" in done.stderr
-
-
-def test_a_hidden_package_makes_the_report_unusable():
-    report = environment_report()
-    assert report.conflicts == ()
-    shared = Conflict("hud", False, "gadgets installs hud too")
-    assert dataclasses.replace(report, conflicts=(shared,)).usable
-    assert not dataclasses.replace(report, conflicts=(shared._replace(hidden=True),)).usable

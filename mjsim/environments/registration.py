@@ -31,22 +31,18 @@ class _GymnasiumFinder(importlib.abc.MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> importlib.machinery.ModuleSpec | None:
-        """The spec of Gymnasium's registry, with a loader that registers the environment; None for the rest."""
-        if fullname != _REGISTRY:
-            return None
-        spec = importlib.machinery.PathFinder.find_spec(fullname, path, target)
+        """The spec of Gymnasium's registry, which registers the environment once it has run; None for the rest."""
+        spec = (
+            importlib.machinery.PathFinder.find_spec(fullname, path, target)
+            if fullname == _REGISTRY
+            else None
+        )
         if spec is not None and spec.loader is not None:
-            spec.loader = _RegisteringLoader(spec.loader)
+            execute = spec.loader.exec_module
+
+            def execute_and_register(module: ModuleType) -> None:
+                execute(module)
+                _register()
+
+            spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]
         return spec
-
-
-class _RegisteringLoader(importlib.abc.Loader):
-    def __init__(self, loader: importlib.abc.Loader) -> None:
-        self._loader = loader
-
-    def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType | None:
-        return self._loader.create_module(spec)
-
-    def exec_module(self, module: ModuleType) -> None:
-        self._loader.exec_module(module)
-        _register()

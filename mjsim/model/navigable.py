@@ -31,10 +31,18 @@ class NavigablePoints(Protocol):
         """The nearest point (2,) that `sample` could draw: the point itself if it is one."""
 
 
+class NavigableFloor(NavigablePoints, Protocol):
+    """The navigable floor of a house, with a map for users."""
+
+    @property
+    def topdown_map(self) -> NDArray[np.int32]:
+        """The floor from above, shape (rows, columns): 0 where one can walk, -1 where not, else an island's number."""
+
+
 class NavigableBuilder(Protocol):
     """Makes the navigable floor of a house."""
 
-    def __call__(self, obstacles: Sequence[ArrayLike], bounds: Sequence[float], /) -> NavigablePoints:
+    def __call__(self, obstacles: Sequence[ArrayLike], bounds: Sequence[float], /) -> NavigableFloor:
         """Compute where one can walk.
 
         Args:
@@ -44,7 +52,7 @@ class NavigableBuilder(Protocol):
         ...
 
 
-def navigable_floor(catalogue: Catalogue) -> NavigablePoints:
+def navigable_floor(catalogue: Catalogue) -> NavigableFloor:
     """Where one can walk in a house, computed once per process by the installed builder.
 
     Raises:
