@@ -204,7 +204,11 @@ class _Reader:
         try:
             return msgspec.convert(value, kind)
         except msgspec.ValidationError as error:
-            raise self._error(where, f"{error}; got {value!r:.80}; see docs/models.md") from error
+            if kind is _Tables:
+                remedy = f"the tables are {', '.join(_Tables.__struct_fields__)}, and none is empty"
+            else:
+                remedy = f"got {value!r:.80}; no text may be blank, see docs/models.md"
+            raise self._error(where, f"{error}; {remedy}") from error
 
     def _entries(self, table: dict[str, Any], kind: type[T], name: str) -> dict[str, T]:
         return {key: self._convert(entry, kind, f"{name}.{key}") for key, entry in table.items()}
