@@ -13,6 +13,7 @@ import numpy as np
 from experiments import records
 from experiments.analysis.topdown import draw_topdown
 from experiments.assistant import Assistant
+from experiments.conditions import TaskBoard
 from experiments.errors import ConfigError
 from experiments.files import save_arrays, write_json
 from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
@@ -22,7 +23,7 @@ from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
 from experiments.recording import Recording, provenance
 from experiments.records import EventLog
-from experiments.regrets import RegretsAtOnce, RegretsBeside
+from experiments.regrets import Regrets, RegretsAtOnce, RegretsBeside
 from experiments.run_directory import keep_failed, run_directory
 from experiments.session import OnProgress, Session, Viewer
 from experiments.video import VideoWriter
@@ -37,6 +38,7 @@ from planner.solver import DEFAULT_SOLVER, solver
 
 _SESSION = 77  # keeps the session's chance apart from that of the house with the same seed
 NOTHING_DRAWN = "none: nothing was drawn"  # in place of the renderer's name
+FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock of a live trial starts
 SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
 
 
@@ -243,18 +245,20 @@ def prepare_session(
         episode_sha256=hashlib.sha256(episode.to_json().encode()).hexdigest(),
         order=order,
     )
+    replanner = replanner or Replanner(house.geodesics, solver(config.planner))
+    regrets: Regrets = (RegretsBeside if config.live else RegretsAtOnce)(house.geodesics)
     assistant = Assistant(
-        house,
-        episode,
+        TaskBoard(house, episode, order),
         assistance=config.assistance,
-        replanner=replanner or Replanner(house.geodesics, solver(config.planner)),
-        order=order,
+        planner=replanner,
         log=log,
-        regrets=(RegretsBeside if config.live else RegretsAtOnce)(house.geodesics),
-        judging=config.regret,
+        regrets=regrets,
+        log_regrets=config.regret,
     )
-    if config.live:
-        assistant.familiarise(world.observation())
+    if config.live:  # what takes long is done before the clock starts
+        state = assistant.task_state(world.observation())
+        route = replanner.prepare(state, seconds=FAMILIARISATION)
+        regrets.prepare(state, route.plan)
     session = Session(
         world,
         assistant,

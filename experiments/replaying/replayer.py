@@ -7,6 +7,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from experiments.assistant import Assistant
+from experiments.conditions import TaskBoard
 from experiments.errors import ReplayError
 from experiments.house import House
 from experiments.recording import Recording, provenance
@@ -57,11 +58,9 @@ class Replayer:
         self._log = EventLog()
         self._replanner = LoggedReplanner([e for _, e in record.events if e["event"] == "plan"], lambda: 0.0)
         self._assistant = Assistant(
-            house,
-            record.episode,
+            TaskBoard(house, record.episode, record.start["order"]),
             assistance=assistance,
-            replanner=self._replanner,
-            order=record.start["order"],
+            planner=self._replanner,
             log=self._log,
         )
         number = record.checkpoint_before(start)

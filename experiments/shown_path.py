@@ -1,0 +1,76 @@
+"""The path to the next visit, as the HUD shows it."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.geodesics import Geodesics
+from planner.polyline import first_off_path, project, rest_of
+
+TOLERANCE = 0.6  # m the person may leave the path before a new one is shown
+MAX_GOAL_SHIFT = 0.25  # m an object may be pushed before a new path to it is shown
+
+Point = NDArray[np.float64]
+
+
+class ShownPath:
+    """A shortest path that keeps its place on the floor until the person leaves it or its goal moves.
+
+    It is computed when it is first asked for: under most conditions nobody does.
+
+    Args:
+        geodesics: Finds it.
+    """
+
+    def __init__(self, geodesics: Geodesics) -> None:
+        self._geodesics = geodesics
+        self._start = self._target = self._goal = np.zeros(2)
+        self._points: NDArray[np.float64] | None = None
+
+    def begin(self, start: Point, target: Point, goal: Point) -> None:
+        """Show a new path.
+
+        Args:
+            start: Where the person is, m, shape (2,).
+            target: Where the path leads, m, shape (2,).
+            goal: The object, or the receptacle, m, shape (2,).
+        """
+        self._start, self._target, self._goal, self._points = start.copy(), target.copy(), goal.copy(), None
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """All of it, m, shape (k, 2).
+
+        Raises:
+            UnreachableError: There is no path.
+        """
+        if self._points is None:
+            self._points = self._geodesics.shortest_path(self._start, self._target).points
+        return self._points
+
+    def ahead(self, position: Point) -> NDArray[np.float64]:
+        """What is left of it from its point nearest to the person, m, shape (k, 2)."""
+        return np.asarray(rest_of(self.points, position[0], position[1]))
+
+    def follow(self, position: Point, target: Point, goal: Point) -> None:
+        """Show a new path if the person has left this one or its goal has moved; arguments as in `begin`."""
+        if self._points is None:
+            return
+        gap = project(self._points, position[0], position[1])[1]
+        if gap > TOLERANCE or math.dist(goal, self._goal) > MAX_GOAL_SHIFT:
+            self._renew(position, target, goal)
+
+    def follow_walk(self, positions: NDArray[np.float64], target: Point, goal: Point) -> None:
+        """As `follow` with each of `positions`, m, shape (n, 2), while the goal stays where it is."""
+        first = 0
+        while self._points is not None:
+            off = first_off_path(self._points, positions, first, TOLERANCE)
+            if off < 0:
+                return
+            self._renew(positions[off], target, goal)
+            first = off + 1
+
+    def _renew(self, position: Point, target: Point, goal: Point) -> None:
+        self.begin(position, target, goal)
+        _ = self.points
