@@ -167,7 +167,7 @@ class Assistant:
         )
 
     def finish(self, time: float) -> None:
-        """The task is over: log the regrets of visits that could not be judged in time."""
+        """The task is over: log the regrets of visits that were not known in time."""
         self._regrets.close()
         for number, regret in self._regrets.later():
             self._log.append(time, "regret", visit=number, regret_m=_rounded(regret))
@@ -212,7 +212,7 @@ class Assistant:
             return {}
         if self._route is not None and self._route.plan.status is Status.OPTIMAL and self._next == visit:
             return {"regret_m": 0.0}
-        return {"regret_m": _rounded(self._regrets.judge(self._visits, visit))}
+        return {"regret_m": _rounded(self._regrets.evaluate(self._visits, visit))}
 
     def _alternatives(self, observation: Observation, event: WorldEvent) -> int:
         """How many other visits were feasible when this one was made."""

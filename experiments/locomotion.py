@@ -194,7 +194,7 @@ class LocomotionController:
         self._progress[:] = np.inf, seen.time
 
     def _is_backing_off(self, walk: WalkAlong, time: float) -> bool:
-        """Only on the way to a visit; who is blocked on another walk takes another path at once."""
+        """Only on the way to a visit: a participant that is blocked on another walk takes another path at once."""
         return walk.then is not None and time < self._back_off_until
 
     def _obstacles(self, seen: Observation) -> Obstacles:

@@ -27,10 +27,10 @@ class Metrics:
         refusals: Infeasible attempts.
         failures: Picks and places that were begun but did not succeed in the physics, and objects lost from a hand.
         mean_regret_m: By how much a visit makes the rest of the task longer than the best one at that moment, m; the
-            mean of all judged visits, None if there is none.
-        total_regret_m: Their sum, m: how much longer the way is for the order of visits alone; or None.
-        regretful_visits: Visits that cost more than 1 cm. The others are the best or as good: a tie is no mistake.
-        unjudged_visits: Visits whose regret is not known: the planner could not prove it, or nobody asked.
+            mean of all visits whose regret is known, None if there is none.
+        total_regret_m: Their sum, m: how much longer the walk is for the order of visits alone; or None.
+        regretful_visits: Visits with a regret of more than 1 cm. The others are optimal or tie with the optimal one.
+        unjudged_visits: Visits whose regret is not known: the planner could not prove it, or it was not asked for.
     """
 
     delivered: int
@@ -51,9 +51,9 @@ class Metrics:
 def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> Metrics:
     """Measure a trial.
 
-    A visit's place is where the person stood, not where the object lay: things are reached over up to a metre, and
-    the geodesic between standing places, for a body that brushes along the walls, is the shortest walk that could
-    have joined them. So the inverse path length never exceeds 1.
+    A visit takes place where the person stood, not where the object lay, because objects are picked from up to a
+    metre away. The geodesic between these places, for the body's own radius, is the shortest walk that joins them,
+    so the inverse path length never exceeds 1.
 
     Args:
         events: The event log in order; it ends with `end`, at the moment of the last delivery if that is why.

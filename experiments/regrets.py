@@ -21,7 +21,7 @@ class Regrets(Protocol):
     """Regrets of the possible next visits in the present state of a task.
 
     The state is the one after the last visit or mishap, where the plan was last made or followed: from there on the
-    person is on a way of their own choice.
+    person goes where they choose.
     """
 
     def prepare(self, state: TaskState, plan: Plan) -> None:
@@ -36,11 +36,11 @@ class Regrets(Protocol):
     def exact(self, visit: Visit) -> float | None:
         """Regret of one visit, m, also where `known` only has a bound; None where nothing is proven. May take long."""
 
-    def judge(self, number: int, visit: Visit) -> float | None:
+    def evaluate(self, number: int, visit: Visit) -> float | None:
         """As `exact`, of a visit that is made now, or None if that comes from `later`; `number` counts the visits."""
 
     def later(self) -> Iterator[tuple[int, float | None]]:
-        """After the task: numbers and exact regrets of visits that could not be judged in time."""
+        """After the task: numbers and exact regrets of visits that were not known in time."""
 
     def close(self) -> None:
         """Stop what goes on behind the scenes."""
@@ -69,12 +69,12 @@ class RegretsAtOnce:
         """See :class:`Regrets`."""
         return None if self._state is None else self._evaluator.of(self._state, visit, self._plan)
 
-    def judge(self, number: int, visit: Visit) -> float | None:  # noqa: ARG002 - nothing is left for later
+    def evaluate(self, number: int, visit: Visit) -> float | None:  # noqa: ARG002 - nothing is left for later
         """See :class:`Regrets`."""
         return self.exact(visit)
 
     def later(self) -> Iterator[tuple[int, float | None]]:
-        """Nothing: every visit was judged when it was made."""
+        """Nothing: every visit was evaluated when it was made."""
         return iter(())
 
     def close(self) -> None:
@@ -91,7 +91,7 @@ class _Job:
     found: Mapping[Visit, Regret] | None = None
 
     def run(self, geodesics: Geodesics) -> None:
-        """Find them, unless somebody says stop; the planner itself tells of a task that cannot be done."""
+        """Find them, unless told to stop; the planner itself tells of a task that cannot be done."""
         limit = SolveLimit(seconds=PATIENCE, stop=self.stop)
         with contextlib.suppress(PlannerError):
             found = RegretEvaluator(geodesics, limit=limit).all(self.state, self.plan)
@@ -99,9 +99,9 @@ class _Job:
 
 
 class RegretsBeside:
-    """Works out what is `known` in a thread, from the first question about a state on: nobody waits for it.
+    """Works out what is `known` in a thread, from the first question about a state on; the caller never waits for it.
 
-    Visits are judged after the task.
+    Visits are evaluated after the task.
     """
 
     def __init__(self, geodesics: Geodesics) -> None:
@@ -148,7 +148,7 @@ class RegretsBeside:
         """See :class:`Regrets`."""
         return None if self._state is None else self._evaluator.of(self._state, visit, self._plan)
 
-    def judge(self, number: int, visit: Visit) -> float | None:
+    def evaluate(self, number: int, visit: Visit) -> float | None:
         """None: it is left for `later`."""
         if self._state is not None and self._plan is not None:
             self._made.append((number, self._state, visit, self._plan))

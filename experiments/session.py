@@ -11,7 +11,7 @@ from experiments.assistant import Assistant
 from experiments.errors import SessionError
 from experiments.locomotion import LocomotionController
 from experiments.participants.base import WAIT, Decision, Moves, Participant, Wait, WalkAlong
-from experiments.perception import Perception
+from experiments.perception import SessionPercept
 from experiments.recording import Recording
 from experiments.records import Trajectory
 from hud.projection import CameraView
@@ -94,7 +94,6 @@ class Session:
         self._time_limit = time_limit
         self._viewer = viewer
         self._rollouts = rollouts and viewer is None and world.options.fidelity != "full"
-        self._perception = Perception(world, assistant)
         self._controller = LocomotionController(walls)
         self._answer: ActionResult | None = None
         self._hud: tuple[Observation, HudState] | None = None
@@ -167,11 +166,15 @@ class Session:
         """
         self._now = self.recording.pass_checkpoint(self._now)
         self._show()
-        decision = self._participant.act(
-            self._perception.percept(
-                self._now, self._answer, self._hud_state, blocked=self._controller.blocked
-            )
+        percept = SessionPercept(
+            self._now,
+            self._answer,
+            self._world,
+            self._assistant,
+            self._hud_state,
+            blocked=self._controller.blocked,
         )
+        decision = self._participant.act(percept)
         if not (self._rollouts and self._roll_out(decision)):
             self._step(self._action(decision))
 
@@ -280,7 +283,7 @@ class Session:
             self._assistant.say(refusal, time, result.object)
 
     def _hud_state(self) -> HudState:
-        """What the HUD shows now; composed once per state, and only when somebody asks."""
+        """What the HUD shows now; composed once per state, and only when asked for."""
         if self._hud is None or self._hud[0] is not self._now:
             camera = self._viewer.camera(self._world) if self._viewer is not None else None
             self._hud = self._now, self._assistant.hud_state(self._now, camera)

@@ -17,7 +17,7 @@ Point = NDArray[np.float64]
 class ShownPath:
     """A shortest path that keeps its place on the floor until the person leaves it or its goal moves.
 
-    It is computed when it is first asked for: under most conditions nobody does.
+    It is computed when it is first asked for, which under most conditions it never is.
 
     Args:
         geodesics: Finds it.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments import records
 from experiments.analysis.topdown import draw_topdown
@@ -22,11 +23,12 @@ from experiments.house import House
 from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
 from experiments.recording import Recording, provenance
-from experiments.records import EventLog
+from experiments.records import Event, EventLog
 from experiments.regrets import Regrets, RegretsAtOnce, RegretsBeside
 from experiments.run_directory import keep_failed, run_directory
 from experiments.session import OnProgress, Session, Viewer
 from experiments.video import VideoWriter
+from mjsim.episode import Episode
 from mjsim.errors import PhysicsError
 from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES, WorldOptions
@@ -36,7 +38,7 @@ from planner.live import LiveReplanner
 from planner.replanner import Replanner
 from planner.solver import DEFAULT_SOLVER, solver
 
-_SESSION = 77  # keeps the session's chance apart from that of the house with the same seed
+_SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
 NOTHING_DRAWN = "none: nothing was drawn"  # in place of the renderer's name
 FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock of a live trial starts
 SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
@@ -58,7 +60,7 @@ class TrialConfig:
             the clock starts. Such a run depends on how fast the machine is; a replay of it shows the plans that were
             shown.
         fidelity: How much of the world is physics: `full`, `windows` or `event` (docs/fidelity.md).
-        regret: Judge every visit: by how much it made the rest of the task longer than the best one would have.
+        regret: Log for every visit by how much it makes the rest of the task longer than the best one would.
     """
 
     objects: int
@@ -122,26 +124,21 @@ def run_trial(
     episode = house.sample_episode(objects=config.objects, seed=config.seed)
     with run_directory(out) as folder:
         scene = compose(episode, house.catalogue)
-        ran = _simulate(config, house, scene, folder, film, on_progress)
-        arrays = ran.session.trajectory.arrays()
-        episode.save(folder / records.EPISODE)
-        save_arrays(folder / records.TRAJECTORY, arrays)
-        ran.session.recording.save(folder / records.RECORDING, arrays["action"])
-        plans = [e for e in ran.log.events if e["event"] == "plan"]
-        write_json(folder / records.PLAN, plans)
-        if isinstance(ran.ended, PhysicsError):
+        result = _simulate(config, house, scene, folder, film, on_progress)
+        arrays = _write_record(folder, episode, result)
+        if isinstance(result.ended, PhysicsError):
             kept = keep_failed(folder, out)
-            raise PhysicsError(f"{ran.ended} (kept for `mjsim replay {kept}`)") from ran.ended
+            raise PhysicsError(f"{result.ended} (kept for `mjsim replay {kept}`)") from result.ended
         if topdown:
-            draw_topdown(folder / records.TOPDOWN, house, scene, plans[0], arrays)
+            draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], arrays)
         metrics = {
             **_settings(config),
-            "ended": ran.ended,
-            **dataclasses.asdict(compute_metrics(ran.log.events, arrays["position"])),
-            **summarise_health(ran.log.events, arrays),
+            "ended": result.ended,
+            **dataclasses.asdict(compute_metrics(result.log.events, arrays["position"])),
+            **summarise_health(result.log.events, arrays),
             "simulated_s": float(arrays["time"][-1]),
-            "frames_sha256": ran.frames_sha256,
-            # A floor plan is drawn as well. Asking for the name where nothing is would start a driver for it.
+            "frames_sha256": result.frames_sha256,
+            # The floor plan is drawn as well. Asking for the renderer's name where nothing is drawn would start it.
             "renderer": gl_info().renderer if film or topdown else NOTHING_DRAWN,
             "wall_s": round(time.perf_counter() - started, 3),
         }
@@ -150,13 +147,28 @@ def run_trial(
 
 
 @dataclass(frozen=True, eq=False)
-class _Ran:
-    """A session that is over: why it ended, or how the physics failed, and the hash of the film's frames."""
+class _SessionResult:
+    """A session that is over: why it ended, or how the physics failed, and the hash of the frames filmed."""
 
     session: Session
     log: EventLog
     ended: str | PhysicsError
     frames_sha256: str | None
+
+    @property
+    def plans(self) -> list[Event]:
+        """Every plan that was logged."""
+        return [event for event in self.log.events if event["event"] == "plan"]
+
+
+def _write_record(folder: Path, episode: Episode, result: _SessionResult) -> dict[str, NDArray[Any]]:
+    """Write what the session left behind, and return the arrays of its trajectory."""
+    arrays = result.session.trajectory.arrays()
+    episode.save(folder / records.EPISODE)
+    save_arrays(folder / records.TRAJECTORY, arrays)
+    result.session.recording.save(folder / records.RECORDING, arrays["action"])
+    write_json(folder / records.PLAN, result.plans)
+    return arrays
 
 
 def _simulate(
@@ -166,15 +178,15 @@ def _simulate(
     folder: Path,
     film: FilmConfig | None,
     on_progress: OnProgress,
-) -> _Ran:
+) -> _SessionResult:
     """Run the session of a trial; log and video are complete in `folder` afterwards."""
-    ran = _simulate_once(config, house, scene, folder, film, on_progress, rollouts=True)
-    if isinstance(ran.ended, PhysicsError) and config.fidelity != "full":
+    result = _simulate_once(config, house, scene, folder, film, on_progress, rollouts=True)
+    if isinstance(result.ended, PhysicsError) and config.fidelity != "full":
         # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
         for path in folder.iterdir():
             path.unlink()
-        ran = _simulate_once(config, house, scene, folder, film, on_progress, rollouts=False)
-    return ran
+        result = _simulate_once(config, house, scene, folder, film, on_progress, rollouts=False)
+    return result
 
 
 def _simulate_once(
@@ -186,15 +198,15 @@ def _simulate_once(
     on_progress: OnProgress,
     *,
     rollouts: bool,
-) -> _Ran:
+) -> _SessionResult:
     with ExitStack() as stack:
         log = stack.enter_context(EventLog(folder / records.EVENTS))
         video = viewer = None
         if film is not None:
-            glasses = stack.enter_context(FirstPersonRenderer(scene, house, film))
+            renderer = stack.enter_context(FirstPersonRenderer(scene, house, film))
             target = folder / records.VIDEO
             video = stack.enter_context(VideoWriter(target, width=film.width, height=film.height))
-            viewer = Filming(glasses, video)
+            viewer = Filming(renderer, video)
         replanner = None
         if config.live:
             replanner = stack.enter_context(LiveReplanner(house.geodesics, solver(config.planner)))
@@ -203,7 +215,7 @@ def _simulate_once(
             ended: str | PhysicsError = session.run(on_progress)
         except PhysicsError as error:
             ended = error
-    return _Ran(session, log, ended, video.frames_sha256 if video else None)
+    return _SessionResult(session, log, ended, video.frames_sha256 if video else None)
 
 
 def prepare_session(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.house import House
-from experiments.participants.base import WAIT, Percept
+from experiments.participants.base import WAIT
 from experiments.records import EventLog
 from experiments.session import INTERRUPTED
 from experiments.trial import TrialConfig, prepare_session
@@ -93,9 +93,8 @@ def numbers_in(value):
 
 def told(percept):
     """Everything that a participant can read off a percept, but for the regrets of models of compliance."""
-    names = [n for n in dir(Percept) if not n.startswith("_") and n not in ("hud", "look", "choices")]
-    fields = [f.name for f in dataclasses.fields(percept) if f.name != "senses"]
-    return [getattr(percept, n) for n in {*names, *fields} - {"senses"}] + [percept.look(), percept.hud()]
+    public = [n for n in dir(percept) if not n.startswith("_") and n != "choices"]
+    return [value() if callable(value) else value for value in (getattr(percept, n) for n in public)]
 
 
 @pytest.mark.parametrize("assistance", ["none", "optimal"])

@@ -77,8 +77,8 @@ def test_visits_beside_a_person_are_judged_after_the_task(geodesics):
         stop = list(RegretEvaluator(geodesics).all(task.state))[-1]
         for keeper in (beside, at_once):
             keeper.begin(task.state, plan)
-        expected.append((number, at_once.judge(number, stop)))
-        assert beside.judge(number, stop) is None
+        expected.append((number, at_once.evaluate(number, stop)))
+        assert beside.evaluate(number, stop) is None
         task.do(*stop)
     assert dict(beside.later()) == pytest.approx(dict(expected), abs=1e-9)
     assert list(beside.later()) == list(at_once.later()) == []

@@ -1,7 +1,7 @@
 """Demonstrations for imitation learning: pairs of an observation and the action of a built-in participant."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.locomotion import LocomotionController
-from experiments.participants.base import Choice, Guidance, Percept, Point, WalkAlong
+from experiments.participants.base import Percept, Point, WalkAlong, positions_of
 from experiments.participants.nearest import Nearest
-from hud.state import HudState
 from mjsim.actions import IDLE, Action, ActionResult, Move, Pick
 from mjsim.environments.core import ObservationDict, Rearrangement
 from mjsim.observation import ObjectStatus, Observation
@@ -55,56 +54,20 @@ class Expert:
 
     def act(self, observation: Observation) -> Action:
         """What the participant would do now."""
-        decision = self._participant.act(
-            Percept(
-                time=observation.time,
-                position=observation.position,
-                heading=observation.heading,
-                hands=observation.hands,
-                busy=observation.busy,
-                targets=self._targets,
-                answer=self.answer,
-                blocked=self._controller.blocked,
-                senses=_Flagpoles(observation),
-            )
-        )
+        percept = _Omniscient(observation, self._targets, self.answer, blocked=self._controller.blocked)
+        decision = self._participant.act(percept)
         if not isinstance(decision, WalkAlong):
             return IDLE
         return self._controller.step(decision, _without_objects(observation))
 
 
-class _Flagpoles:
-    """The senses of a participant who sees a flagpole over every misplaced object, and nothing else."""
+class _Omniscient(Percept):
+    """The percept of somebody who sees a flagpole over every misplaced object."""
 
-    def __init__(self, observation: Observation) -> None:
-        self._observation = observation
-
+    @property
     def flagpoles(self) -> Mapping[str, Point]:
         """Object instance name -> floor position, m, shape (2,)."""
-        seen = self._observation
-        positions = zip(seen.object_names, seen.object_positions[:, :2], strict=True)
-        loose = set(seen.names_with(ObjectStatus.LOOSE))
-        return {name: xy for name, xy in positions if name in loose}
-
-    def look(self) -> Mapping[str, Point]:
-        """Nothing."""
-        return {}
-
-    def nearby(self) -> Mapping[str, Point]:
-        """Nothing."""
-        return {}
-
-    def guidance(self) -> Guidance | None:
-        """None."""
-        return None
-
-    def choices(self) -> Sequence[Choice]:
-        """None."""
-        return ()
-
-    def hud(self) -> HudState:
-        """Raises `NotImplementedError`."""
-        raise NotImplementedError("this participant sees only the flagpoles")
+        return positions_of(self._seen, self._seen.names_with(ObjectStatus.LOOSE))
 
 
 def _without_objects(observation: Observation) -> Observation:

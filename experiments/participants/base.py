@@ -1,6 +1,7 @@
 """What a simulated participant perceives and how it answers."""
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Protocol
@@ -11,9 +12,12 @@ from numpy.typing import NDArray
 from experiments.house import House
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult, Pick, Place
+from mjsim.observation import ObjectStatus, Observation
 from planner.plan import Visit
 
 Point = NDArray[np.float64]
+
+NEARBY = 1.3  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,37 +56,16 @@ class Choice:
     find_exact: Callable[[], float | None]
 
 
-class Senses(Protocol):
-    """Finds out what a percept offers, when it is asked for."""
-
-    def nearby(self) -> Mapping[str, Point]:
-        """See `Percept.nearby`."""
-        ...
-
-    def look(self) -> Mapping[str, Point]:
-        """See `Percept.look`."""
-        ...
-
-    def hud(self) -> HudState:
-        """See `Percept.hud`."""
-        ...
-
-    def guidance(self) -> Guidance | None:
-        """See `Percept.guidance`."""
-        ...
-
-    def flagpoles(self) -> Mapping[str, Point]:
-        """See `Percept.flagpoles`."""
-        ...
-
-    def choices(self) -> Sequence[Choice]:
-        """See `Percept.choices`."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
 class Percept:
-    """What a person can know at one control step. What takes work to find out is found out when it is asked for.
+    """What a person can know at one control step, without any assistance.
+
+    A session adds what is in view and what the HUD shows, which is found out when it is asked for.
+
+    Args:
+        seen: State of the world.
+        targets: Object instance name -> receptacle key.
+        answer: The world's answer to the previous action, if that was a pick or place.
+        blocked: Whether the walk makes no progress.
 
     Attributes:
         time: Simulated time, s.
@@ -90,61 +73,65 @@ class Percept:
         heading: Own heading, rad.
         hands: Object in the left and in the right hand.
         busy: Whether a pick or place is under way.
-        targets: Object instance name -> receptacle key, from the lists in the HUD.
-        answer: The world's answer to the previous action, if that was a pick or place.
-        blocked: Whether the walk makes no progress; until the person has backed off.
-        senses: Finds out the rest.
+        targets: As above, from the lists in the HUD.
+        answer: As above.
+        blocked: As above; until the person has backed off.
     """
 
-    time: float
-    position: Point
-    heading: float
-    hands: tuple[str | None, str | None]
-    busy: bool
-    targets: Mapping[str, str]
-    answer: ActionResult | None
-    blocked: bool
-    senses: Senses
+    def __init__(
+        self,
+        seen: Observation,
+        targets: Mapping[str, str],
+        answer: ActionResult | None = None,
+        *,
+        blocked: bool = False,
+    ) -> None:
+        self._seen = seen
+        self.time, self.position, self.heading = seen.time, seen.position, seen.heading
+        self.hands, self.busy = seen.hands, seen.busy
+        self.targets, self.answer, self.blocked = targets, answer, blocked
 
-    def hud(self) -> HudState:
-        """What the HUD shows."""
-        return self.senses.hud()
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """Instance names in the hands."""
+        return self._seen.carried
+
+    @cached_property
+    def nearby(self) -> Mapping[str, Point]:
+        """Misplaced objects at the feet (within 1.3 m) -> floor position, m, shape (2,)."""
+        loose = positions_of(self._seen, self._seen.names_with(ObjectStatus.LOOSE))
+        return {n: p for n, p in loose.items() if math.dist(p, self.position) < NEARBY}
 
     def look(self) -> Mapping[str, Point]:
-        """Misplaced objects in view at this moment -> their floor position, m, shape (2,)."""
-        return self._in_view
+        """Misplaced objects in view at this moment -> floor position, m, shape (2,)."""
+        return {}
 
-    @cached_property
-    def _in_view(self) -> Mapping[str, Point]:
-        return self.senses.look()
+    def hud(self) -> HudState | None:
+        """What the HUD shows; None without one."""
+        return None
 
-    @cached_property
+    @property
     def guidance(self) -> Guidance | None:
         """The step shown by the HUD, in conditions that show a path; None when all is done."""
-        return self.senses.guidance()
+        return None
 
-    @cached_property
+    @property
     def flagpoles(self) -> Mapping[str, Point]:
         """Object instance name -> floor position of the flagpole over it, m, shape (2,); empty where none is shown."""
-        return self.senses.flagpoles()
+        return {}
 
-    @cached_property
+    @property
     def choices(self) -> Sequence[Choice]:
         """All visits that are possible next with their regrets, the best first: for models of compliance.
 
         No condition shows as much. Empty when all is done, and in live planning until the regrets are known.
         """
-        return self.senses.choices()
+        return ()
 
-    @cached_property
-    def nearby(self) -> Mapping[str, Point]:
-        """Misplaced objects at the feet (within 1.3 m) -> floor position, m, shape (2,)."""
-        return self.senses.nearby()
 
-    @property
-    def carried(self) -> tuple[str, ...]:
-        """Instance names in the hands."""
-        return tuple(name for name in self.hands if name is not None)
+def positions_of(seen: Observation, names: Iterable[str]) -> dict[str, Point]:
+    """Floor positions of objects by name, m, shape (2,)."""
+    return {name: seen.object_positions[seen.object_names.index(name), :2] for name in names}
 
 
 @dataclass(frozen=True, eq=False)
