@@ -1,0 +1,118 @@
+"""Walking for a participant: what counts as an obstacle, and what happens when a walk does not get on."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from experiments.locomotion import BACK_OFF, BACK_OFF_TIME, PROGRESS_TIMEOUT, LocomotionController
+from experiments.participants.base import Percept, WalkAlong
+from experiments.participants.visit_executor import CLOSER, MIN_STOP_DISTANCE, STOP_DISTANCE, VisitExecutor
+from mjsim.actions import ActionResult, Move, Pick, Refusal
+from mjsim.observation import ObjectStatus, Observation
+from planner.plan import Visit, VisitKind
+
+STEP = 0.04  # s
+NO_WALLS = np.array([(-9, -9, 9, -9), (9, -9, 9, 9), (9, 9, -9, 9), (-9, 9, -9, -9)], dtype=float)
+
+
+def seen(time=0.0, position=(0.0, 0.0), heading=0.0, objects=()):
+    """A person among loose objects, which are called a, b, ..."""
+    return Observation(
+        time=time,
+        position=np.array(position),
+        heading=heading,
+        pitch=0.0,
+        eye=np.array([*position, 1.6]),
+        velocity=np.zeros(2),
+        object_names=tuple("abcdef"[: len(objects)]),
+        object_positions=np.array([(x, y, 0.0) for x, y in objects]).reshape(-1, 3),
+        object_quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (len(objects), 1)),
+        object_status=(ObjectStatus.LOOSE,) * len(objects),
+        hands=(None, None),
+        busy=False,
+    )
+
+
+def walk_to(x, then=None):
+    return WalkAlong(np.array([(0.0, 0.0), (x, 0.0)]), np.array([x, 0.0]), 0.5, then)
+
+
+def test_an_object_in_the_way_is_sidestepped_unless_the_visit_is_about_it():
+    ahead = seen(objects=[(0.6, 0.1), (5.0, 5.0)])
+    straight = LocomotionController(NO_WALLS).step(walk_to(3.0, Pick("a")), ahead)
+    aside = LocomotionController(NO_WALLS).step(walk_to(3.0, Pick("b")), ahead)
+    assert straight.turn == straight.left == 0.0
+    assert aside.turn < 0.0
+    carried = dataclasses.replace(ahead, object_status=(ObjectStatus.CARRIED, ObjectStatus.LOOSE))
+    assert LocomotionController(NO_WALLS).step(walk_to(3.0, Pick("b")), carried).turn == 0.0
+
+
+def test_at_the_end_of_a_walk_the_person_turns_to_the_goal_and_acts():
+    controller, walk = LocomotionController(NO_WALLS), walk_to(3.0, Pick("a"))
+    turn = controller.step(walk, seen(position=(2.7, 0.0), heading=1.0))
+    assert (turn.forward, turn.left) == (0.0, 0.0)
+    assert turn.turn < 0.0
+    assert controller.step(walk, seen(position=(2.7, 0.0), heading=0.1)) == Pick("a")
+    assert controller.step(walk_to(3.0), seen(position=(2.7, 0.0), heading=1.0)) == Move()
+
+
+def test_a_blocked_person_backs_off_on_the_way_to_a_visit():
+    controller, walk = LocomotionController(NO_WALLS), walk_to(3.0, Pick("a"))
+    moves, blocked = [], []
+    for k in range(round((PROGRESS_TIMEOUT + BACK_OFF_TIME) / STEP) + 3):  # and the person does not move
+        moves.append(controller.step(walk, seen(time=k * STEP)))
+        blocked.append(controller.blocked)
+    assert moves.count(BACK_OFF) == round(BACK_OFF_TIME / STEP) - 1
+    assert blocked.index(True) * STEP == pytest.approx(PROGRESS_TIMEOUT + STEP)
+    assert blocked.count(True) == round(BACK_OFF_TIME / STEP)
+    assert moves[-1] == moves[0]
+    assert blocked[-1] is False
+
+
+def test_a_blocked_person_who_only_walks_is_told_so_and_does_not_back_off():
+    controller, walk = LocomotionController(NO_WALLS), walk_to(3.0)
+    moves = [controller.step(walk, seen(time=k * STEP)) for k in range(60)]
+    assert BACK_OFF not in moves
+
+
+class House:
+    """A floor without walls, where every path has a detour of its own."""
+
+    def __init__(self):
+        self.asked = 0
+        self.geodesics = self.navmesh = self
+
+    def shortest_path(self, start, goal):
+        self.asked += 1
+        return type("Path", (), {"points": np.array([start, goal])})
+
+    def snap(self, position):
+        return position
+
+
+def percept(observation, *, refused=False, blocked=False):
+    answer = ActionResult(Pick("a"), Refusal.OUT_OF_REACH) if refused else None
+    return Percept(observation, {"a": "bin"}, answer, blocked=blocked)
+
+
+def test_refusals_bring_the_person_closer_and_a_new_visit_starts_afresh():
+    executor, there = VisitExecutor(House()), {"a": np.array([3.0, 0.0]), "b": np.array([0.0, 3.0])}
+    pick = Visit(VisitKind.PICK, "a")
+    distances = [executor.act(percept(seen(), refused=k > 0), pick, there).stop_distance for k in range(6)]
+    assert distances[:3] == pytest.approx([STOP_DISTANCE, STOP_DISTANCE - CLOSER, STOP_DISTANCE - 2 * CLOSER])
+    assert distances[-1] == MIN_STOP_DISTANCE
+    other = executor.act(percept(seen()), Visit(VisitKind.PICK, "b"), there)
+    assert (other.stop_distance, other.then) == (STOP_DISTANCE, Pick("b"))
+
+
+def test_a_path_is_kept_until_the_person_leaves_it_or_is_blocked():
+    house = House()
+    executor, there = VisitExecutor(house), {"a": np.array([3.0, 0.0])}
+
+    def asked(position, **more):
+        executor.act(percept(seen(position=position), **more), Visit(VisitKind.PICK, "a"), there)
+        return house.asked
+
+    assert [asked((0.0, 0.0)), asked((1.0, 0.1)), asked((1.0, 0.5)), asked((1.5, 0.4))] == [1, 1, 2, 2]
+    assert asked((1.5, 0.4), blocked=True) == 3
