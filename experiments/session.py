@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from experiments.assistant import Assistant
 from experiments.errors import SessionError
 from experiments.locomotion import LocomotionController
-from experiments.participants.base import WAIT, Decision, Moves, Participant, Wait, WalkAlong
+from experiments.participants.base import Decision, Moves, Participant, Wait, WalkAlong
 from experiments.perception import SessionPercept
 from experiments.recording import Recording
 from experiments.records import Trajectory
@@ -131,10 +131,9 @@ class Session:
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
         """Go on to the end, once started; returns and raises as `run` does."""
         try:
-            while self.end_reason is None:
+            while (reason := self.end_reason) is None:
                 self.advance()
                 on_progress(self.progress)
-            reason = self.end_reason
             self._end(reason)
         except KeyboardInterrupt:
             # What has been done so far is kept and measured, as it would be for a person who stops early.
@@ -200,7 +199,7 @@ class Session:
         if self._assistant.expecting:
             return False
         left = int((self._time_limit - self._now.time) / self._world.control_timestep) - 1
-        if decision is WAIT:
+        if isinstance(decision, Wait):
             if not self._now.busy or left * self._world.control_timestep <= MAX_MOTION:
                 return False
             self._note_events(self._recorded(None).events)
