@@ -16,8 +16,8 @@ from pkgutil import resolve_name
 from typing import Any
 from unittest.mock import patch
 
+from benchmarks.support.recorded_trial import RecordingWorld, play
 from experiments.house import House
-from experiments.recorded_trial import RecordingWorld, play
 from experiments.trial import TrialConfig, run_trial
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions

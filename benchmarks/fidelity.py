@@ -5,7 +5,7 @@ import statistics
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from experiments.agreement import TierResult, run_all_in_tiers
+from benchmarks.support.agreement import TierResult, run_all_in_tiers
 from experiments.trial import TrialConfig
 from mjsim.options import FIDELITIES
 

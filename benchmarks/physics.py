@@ -19,8 +19,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from benchmarks.support.recorded_trial import RecordedTrial, play, record_trial
 from experiments.house import House
-from experiments.recorded_trial import RecordedTrial, play, record_trial
 from mjsim.actions import Move
 from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES

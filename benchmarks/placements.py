@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.support.parallel_sessions import run_sessions
+from benchmarks.support.placement_sessions import LEVELS, NOT_TRIED, Placement, run_session
 from experiments.requirements import Requirement, requirement_lines
-from experiments.stress.placements import LEVELS, NOT_TRIED, Placement, run_session
-from experiments.stress.sessions import run_sessions
 
 COUNT, QUICK = 10_000, 300
 REQUIREMENTS = (

@@ -16,9 +16,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from benchmarks.support.environment_speed import SETTINGS, steps_per_second
+from benchmarks.support.hud_speed import hud_milliseconds, session_states, summary
 from experiments.conditions import TaskBoard
-from experiments.examples.environment_speed import SETTINGS, steps_per_second
-from experiments.examples.hud_speed import hud_milliseconds, session_states, summary
 from experiments.house import House
 from experiments.trial import TrialConfig
 from hud.compose import Compositor
@@ -260,7 +260,7 @@ def off_screen() -> Iterator[None]:
     """Let `mujoco.Renderer` make EGL contexts, whatever MUJOCO_GL was when MuJoCo was imported."""
     from mujoco import egl  # only now, when the driver is known to work
 
-    backend = sys.modules[mujoco.Renderer.__module__].gl_context  # type: ignore[attr-defined]
+    backend = sys.modules[mujoco.Renderer.__module__].gl_context
     kept = backend.GLContext
     backend.GLContext = egl.GLContext
     try:

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.support.parallel_sessions import run_sessions
+from benchmarks.support.walking_sessions import SECONDS, WalkResult, run_session
 from experiments.requirements import Requirement, requirement_lines
-from experiments.stress.sessions import run_sessions
-from experiments.stress.walking import SECONDS, WalkResult, run_session
 
 HOURS, QUICK = 1.0, 0.05
 SLOW = 2.0  # m/s: sessions up to this speed are reported apart

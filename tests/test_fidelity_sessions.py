@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmarks.support.agreement import run_in_tiers
 from experiments import records
-from experiments.agreement import run_in_tiers
 from experiments.errors import ReplayError
 from experiments.files import read_arrays, read_json
 from experiments.house import House

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.support.placement_sessions import LEVELS, Placement, make_episode, run_session
 from experiments.commands.bench import benchmark
 from experiments.house import House
-from experiments.stress.placements import LEVELS, Placement, make_episode, run_session
 
 SESSIONS = 12  # two per receptacle
 MODULE = benchmark("placements")

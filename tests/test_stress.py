@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from benchmarks.support import carrying_sessions as carrying
+from benchmarks.support import walking_sessions as walking
 from experiments.commands.bench import benchmark
 from experiments.house import House
-from experiments.stress import carrying, walking
 
 WALKING, CARRYING = benchmark("walking"), benchmark("carrying")
 

@@ -12,8 +12,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from experiments.stress.sessions import session_episode, upright_object
 from mjsim.actions import IDLE, Move
 from mjsim.episode import Episode
 from mjsim.errors import PhysicsError

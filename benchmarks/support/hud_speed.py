@@ -1,6 +1,6 @@
 """What drawing the HUD costs in a real session: every HUD state of one trial is drawn in turn.
 
-python -m experiments.examples.hud_speed --assistance optimal --objects 6
+python -m benchmarks.support.hud_speed --assistance optimal --objects 6
 """
 
 import argparse

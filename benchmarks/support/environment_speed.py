@@ -1,6 +1,6 @@
 """How fast the environment is: steps and resets per second of one core, and what several processes gain.
 
-python -m experiments.examples.environment_speed
+python -m benchmarks.support.environment_speed
 """
 
 import time

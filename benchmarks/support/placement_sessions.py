@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from experiments.stress.sessions import session_episode, upright_object
 from mjsim.actions import IDLE, EventKind, Pick, Place
 from mjsim.episode import Episode, PlacedObject
 from mjsim.errors import PhysicsError
