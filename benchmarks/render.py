@@ -31,6 +31,7 @@ from mjsim.render.context import current_context
 from mjsim.render.markers import add_markers
 from mjsim.render.rasteriser import buffer_settings
 from mjsim.world import World
+from planner.plan import Visit, VisitKind
 
 SIZES = ((320, 240), (640, 480), (1280, 720))
 REPEATS = {"draft": 5, "fast": 7, "quality": 1}
@@ -134,7 +135,7 @@ def make_subject(clock: Callable[[], float]) -> Subject:
     seen = world.reset()
     path = house.geodesics.shortest_path(seen.position, seen.object_positions[0, :2]).points
     view = TaskBoard(house, scene.episode, seen.object_names).view(
-        seen, plan=[("pick", seen.object_names[0])], path=path
+        seen, visits=[Visit(VisitKind.PICK, seen.object_names[0])], path=path
     )
     places = [seen.position, *house.rooms.centers]
     turns = [seen.heading, *np.random.default_rng(0).uniform(0.0, math.tau, len(house.rooms.centers))]
