@@ -67,53 +67,78 @@ def count_on(table: Table, left: NDArray[np.int64]) -> None:
 
 @kernel
 def fill_rows(inst: Instance, table: Table, first: int, last: int) -> None:
-    """Compute some rows; all before must have been."""
+    """Compute some rows; all before must have been.
+
+    Its parts index whole arrays: to make a view of a row takes numba longer than to add it up.
+    """
     n, m = inst.to_bin.shape
-    w = np.empty((m, n), np.int32)  # W with its pick, [d, j]; infinite where j cannot be picked
-    stay = np.empty(n, np.int32)  # Y with its pick; the same
+    second = np.empty((m, n), np.int32)  # W with its pick, [d, j]; infinite where j cannot be picked
+    only = np.empty((1, n), np.int32)  # Y with its pick; the same
+    carrying, empty = np.empty((m, m), np.int32), np.empty((m, 1), np.int32)
     left = left_of(table, first)
     for row in range(first, last):
-        e = table.bin[row]
-        for j in range(n):
-            if left[table.group[j]] == 0:
-                stay[j] = INFINITE
-                for d in range(m):
-                    w[d, j] = INFINITE
-                continue
-            after = row - table.stride[j]
-            stay[j] = add(table.object[after, j], table.multipliers[j])
-            _picked(inst, table, after, j, w)
-        for b in range(m):
-            e[b, b] = _least(inst.from_bin[b], stay) if row else 0
+        _picked(inst, table, left, row, second, only)
+        _least_sums(inst.from_bin, only, empty)
+        _least_sums(inst.from_bin, second, carrying)
         for d in range(m):
+            e = empty[d, 0] if row else np.int32(0)
             for b in range(m):
-                if b != d:
-                    e[b, d] = min(add(inst.bins[b, d], e[d, d]), _least(inst.from_bin[b], w[d]))
-        for i in range(n):  # no object follows itself, as `between` is infinite there
-            if left[table.group[i]] < table.size[table.group[i]]:
-                c = inst.home[i]
-                drop = add(inst.to_bin[i, c], e[c, c])
-                table.object[row, i] = min(drop, _least(inst.between[i], w[c]))
+                table.bin[row, b, d] = min(add(inst.bins[b, d], e), carrying[b, d])
+            table.bin[row, d, d] = e
+        _holding(inst, table, left, row, second)
         count_on(table, left)
 
 
 @kernel
-def _least(a: NDArray[np.int32], b: NDArray[np.int32]) -> Any:
-    """Least sum of two rows, entry by entry."""
-    best: Any = np.int32(INFINITE)
-    for k in range(a.size):
-        best = min(best, add(a[k], b[k]))
-    return best
+def _picked(
+    inst: Instance,
+    table: Table,
+    left: NDArray[np.int64],
+    row: int,
+    second: NDArray[np.int32],
+    only: NDArray[np.int32],
+) -> None:
+    """W (second, [d, j]) and Y (only, [0, j]), with the pick, of every object j in a row."""
+    n, m = inst.to_bin.shape
+    for j in range(n):
+        if left[table.group[j]] == 0:
+            only[0, j] = INFINITE
+            for d in range(m):
+                second[d, j] = INFINITE
+            continue
+        after, price, c = row - table.stride[j], table.multipliers[j], inst.home[j]
+        only[0, j] = add(table.object[after, j], price)
+        last = add(inst.to_bin[j, c], price)
+        for d in range(m):
+            other_first = add(add(inst.to_bin[j, d], price), table.bin[after, d, c])
+            second[d, j] = min(other_first, add(last, table.bin[after, c, d]))
 
 
 @kernel
-def _picked(inst: Instance, table: Table, left: int, j: int, w: NDArray[np.int32]) -> None:
-    """W with its pick for object j and every d."""
-    c = inst.home[j]
-    e = table.bin[left]
-    last, price = inst.to_bin[j, c], table.multipliers[j]
-    for d in range(w.shape[0]):
-        w[d, j] = add(price, min(add(inst.to_bin[j, d], e[d, c]), add(last, e[c, d])))
+def _least_sums(a: NDArray[np.int32], b: NDArray[np.int32], sums: NDArray[np.int32]) -> None:
+    """Least sum of each row of `a` (p, n) and each row of `b` (q, n), entry by entry, into `sums` (p, q)."""
+    for q in range(b.shape[0]):
+        for p in range(a.shape[0]):
+            best: Any = np.int32(INFINITE)
+            for k in range(a.shape[1]):
+                best = min(best, add(a[p, k], b[q, k]))
+            sums[p, q] = best
+
+
+@kernel
+def _holding(
+    inst: Instance, table: Table, left: NDArray[np.int64], row: int, second: NDArray[np.int32]
+) -> None:
+    """Y of the objects of which some of the group were picked."""
+    n = inst.to_bin.shape[0]
+    for i in range(n):
+        if left[table.group[i]] == table.size[table.group[i]]:
+            continue
+        c = inst.home[i]
+        best = add(inst.to_bin[i, c], table.bin[row, c, c])
+        for k in range(n):  # no object follows itself, as `between` is infinite there
+            best = min(best, add(inst.between[i, k], second[c, k]))
+        table.object[row, i] = best
 
 
 @kernel

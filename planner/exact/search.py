@@ -168,17 +168,19 @@ def expand_carrying(
             continue
         expanded += 1
         if i >= 0:
-            d, legs, home_leg = inst.home[i], inst.between[i], inst.to_bin[i, inst.home[i]]
+            d, home_leg = inst.home[i], inst.to_bin[i, inst.home[i]]
         else:
-            legs, home_leg = inst.from_bin[b], inst.bins[b, d]
+            home_leg = inst.bins[b, d]
         left = here.key[k] >> PLACE_BITS
         row = row_of(table, left)
         offer_bin(inst, table, here, left, row, d, d, here.cost[k] + home_leg, limit, 2 * k + 1)
-        after, dropped = with_room_among(after, 2 * n, width)
-        smallest = min(smallest, dropped)
+        if after.size[0] + 2 * n > after.key.size:
+            after, dropped = with_room_among(after, 2 * n, width)
+            smallest = min(smallest, dropped)
         for j in range(n):
             if (left >> j) & 1:
-                offer_second(inst, table, after, left, row, j, d, here.cost[k] + legs[j], limit, 2 * k)
+                leg = inst.between[i, j] if i >= 0 else inst.from_bin[b, j]
+                offer_second(inst, table, after, left, row, j, d, here.cost[k] + leg, limit, 2 * k)
     return after, smallest, expanded
 
 
@@ -211,8 +213,9 @@ def expand_empty(
         if left == 0 and (end < 0 or here.cost[k] < here.cost[end]):
             end = k
         row = row_of(table, left)
-        after, dropped = with_room_among(after, n, width)
-        smallest = min(smallest, dropped)
+        if after.size[0] + n > after.key.size:
+            after, dropped = with_room_among(after, n, width)
+            smallest = min(smallest, dropped)
         for i in range(n):
             if (left >> i) & 1:
                 offer_only(inst, table, after, left, row, i, here.cost[k] + inst.from_bin[b, i], limit, 2 * k)
