@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from experiments.conditions import TaskBoard
 from experiments.participants.base import Choice, Guidance
 from experiments.records import EventLog
-from experiments.regrets import Regrets, RegretsAtOnce
+from experiments.regrets import Regrets
 from experiments.shown_path import TOLERANCE, ShownPath
 from hud.conditions import condition
 from hud.projection import CameraView
@@ -81,7 +81,7 @@ class Assistant:
         self._show = condition(assistance)
         self._planner = planner
         self._log = log
-        self._regrets = regrets or RegretsAtOnce(self._house.geodesics)
+        self._regrets = regrets or Regrets(self._house.geodesics)
         self._log_regrets = log_regrets
         self._number = {placed.name: i for i, placed in enumerate(self._episode.objects)}
         self._approaches = {

@@ -1,10 +1,9 @@
-"""What alternatives to the plan cost: worked out at once in runs that repeat, in a thread beside a person."""
+"""What alternatives to the plan cost: computed at once in runs that must repeat, in a thread in live use."""
 
 import contextlib
 import threading
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from planner.errors import PlannerError
 from planner.geodesics import Geodesics
@@ -14,76 +13,57 @@ from planner.regret_evaluator import RegretEvaluator, same_state
 from planner.route import TaskState
 from planner.solver import SolveLimit
 
-PATIENCE = 5.0  # s of wall time for the regrets of one state, beside a person
+PATIENCE = 5.0  # s of wall time for the regrets of one state, in live use
 
 
-class Regrets(Protocol):
-    """Regrets of the possible next visits in the present state of a task.
+class Regrets:
+    """Regrets of the possible next visits in the present state of a task, computed when asked for.
 
-    The state is the one after the last visit or mishap, where the plan was last made or followed: from there on the
-    person goes where they choose.
+    The state is the one after the last visit or mishap, where the plan was last made or followed. Budgets count work,
+    so the answers repeat.
+
+    Args:
+        geodesics: Distances.
     """
 
+    def __init__(self, geodesics: Geodesics) -> None:
+        self._geodesics = geodesics
+        self._evaluator = RegretEvaluator(geodesics)
+        self._task: tuple[TaskState, Plan] | None = None
+
     def prepare(self, state: TaskState, plan: Plan) -> None:
-        """What takes long is done before the clock starts."""
+        """Do what takes long before the clock starts."""
 
     def begin(self, state: TaskState, plan: Plan) -> None:
         """The task is in this state from now on; `plan` is what was planned for it or before."""
+        self._task = state, plan
 
     def known(self) -> Mapping[Visit, Regret]:
         """Of all possible next visits, the best first; empty as long as nothing is known."""
+        return {} if self._task is None else self._evaluator.all(*self._task)
 
     def exact(self, visit: Visit) -> float | None:
         """Regret of one visit, m, also where `known` only has a bound; None where nothing is proven. May take long."""
-
-    def evaluate(self, number: int, visit: Visit) -> float | None:
-        """As `exact`, of a visit that is made now, or None if that comes from `later`; `number` counts the visits."""
-
-    def later(self) -> Iterator[tuple[int, float | None]]:
-        """After the task: numbers and exact regrets of visits that were not known in time."""
-
-    def close(self) -> None:
-        """Stop what goes on behind the scenes."""
-
-
-class RegretsAtOnce:
-    """Works out what is asked when it is asked. Budgets count work, so the answers repeat."""
-
-    def __init__(self, geodesics: Geodesics) -> None:
-        self._evaluator = RegretEvaluator(geodesics)
-        self._state: TaskState | None = None
-        self._plan: Plan | None = None
-
-    def prepare(self, state: TaskState, plan: Plan) -> None:
-        """Nothing takes long here but the answers."""
-
-    def begin(self, state: TaskState, plan: Plan) -> None:
-        """See :class:`Regrets`."""
-        self._state, self._plan = state, plan
-
-    def known(self) -> Mapping[Visit, Regret]:
-        """See :class:`Regrets`."""
-        return {} if self._state is None else self._evaluator.all(self._state, self._plan)
-
-    def exact(self, visit: Visit) -> float | None:
-        """See :class:`Regrets`."""
-        return None if self._state is None else self._evaluator.of(self._state, visit, self._plan)
+        if self._task is None:
+            return None
+        state, plan = self._task
+        return self._evaluator.of(state, visit, plan)
 
     def evaluate(self, number: int, visit: Visit) -> float | None:  # noqa: ARG002 - nothing is left for later
-        """See :class:`Regrets`."""
+        """As `exact`, of a visit that is made now, or None if that comes from `later`; `number` counts the visits."""
         return self.exact(visit)
 
     def later(self) -> Iterator[tuple[int, float | None]]:
-        """Nothing: every visit was evaluated when it was made."""
+        """After the task: numbers and exact regrets of visits that were not known in time."""
         return iter(())
 
     def close(self) -> None:
-        """Nothing goes on."""
+        """Stop what goes on in the background."""
 
 
 @dataclass(eq=False)
 class _Job:
-    """The regrets of one state, being worked out in a thread."""
+    """The regrets of one state, being computed in a thread."""
 
     state: TaskState
     plan: Plan
@@ -91,48 +71,45 @@ class _Job:
     found: Mapping[Visit, Regret] | None = None
 
     def run(self, geodesics: Geodesics) -> None:
-        """Find them, unless told to stop; the planner itself tells of a task that cannot be done."""
+        """Find them, unless told to stop. A task that cannot be done is the replanner's to report."""
         limit = SolveLimit(seconds=PATIENCE, stop=self.stop)
         with contextlib.suppress(PlannerError):
             found = RegretEvaluator(geodesics, limit=limit).all(self.state, self.plan)
             self.found = None if self.stop.is_set() else found
 
 
-class RegretsBeside:
-    """Works out what is `known` in a thread, from the first question about a state on; the caller never waits for it.
+class LiveRegrets(Regrets):
+    """Computes what is `known` in a thread, from the first question about a state on, and never holds up the caller.
 
     Visits are evaluated after the task.
     """
 
     def __init__(self, geodesics: Geodesics) -> None:
-        self._geodesics = geodesics
-        self._evaluator = RegretEvaluator(geodesics)
+        super().__init__(geodesics)
         self._job: _Job | None = None
         self._thread: threading.Thread | None = None
-        self._state: TaskState | None = None
-        self._plan: Plan | None = None
         self._made: list[tuple[int, TaskState, Visit, Plan]] = []
 
     def prepare(self, state: TaskState, plan: Plan) -> None:
-        """Work out the first regrets: that loads the kernels."""
+        """Compute the first regrets, which loads the kernels."""
         self.begin(state, plan)
         self.known()
         self.wait()
 
     def begin(self, state: TaskState, plan: Plan) -> None:
-        """See :class:`Regrets`."""
-        if self._state is not None and same_state(self._state, state):
-            self._plan = plan
-            return
-        self.close()
-        self._state, self._plan = state, plan
+        """As in `Regrets`; a new plan for the same state does not start over."""
+        if self._task is None or not same_state(self._task[0], state):
+            self.close()
+        else:
+            state = self._task[0]
+        self._task = state, plan
 
     def known(self) -> Mapping[Visit, Regret]:
-        """See :class:`Regrets`."""
-        if self._state is None or self._plan is None:
+        """As in `Regrets`; empty until the thread has found them."""
+        if self._task is None:
             return {}
         if self._job is None:
-            self._job = _Job(self._state, self._plan)
+            self._job = _Job(*self._task)
             self._thread = threading.Thread(
                 target=self._job.run, args=(self._geodesics,), name="regrets", daemon=True
             )
@@ -144,24 +121,21 @@ class RegretsBeside:
         if self._thread is not None:
             self._thread.join()
 
-    def exact(self, visit: Visit) -> float | None:
-        """See :class:`Regrets`."""
-        return None if self._state is None else self._evaluator.of(self._state, visit, self._plan)
-
     def evaluate(self, number: int, visit: Visit) -> float | None:
         """None: it is left for `later`."""
-        if self._state is not None and self._plan is not None:
-            self._made.append((number, self._state, visit, self._plan))
+        if self._task is not None:
+            state, plan = self._task
+            self._made.append((number, state, visit, plan))
         return None
 
     def later(self) -> Iterator[tuple[int, float | None]]:
-        """See :class:`Regrets`."""
+        """All visits that were made."""
         for number, state, visit, plan in self._made:
             yield number, self._evaluator.of(state, visit, plan)
         self._made = []
 
     def close(self) -> None:
-        """See :class:`Regrets`."""
+        """Stop the thread."""
         if self._job is not None:
             self._job.stop.set()
         self._job = None

@@ -24,7 +24,7 @@ from experiments.metrics import compute_metrics
 from experiments.participants import default_participant, participant
 from experiments.recording import Recording, provenance
 from experiments.records import Event, EventLog
-from experiments.regrets import Regrets, RegretsAtOnce, RegretsBeside
+from experiments.regrets import LiveRegrets, Regrets
 from experiments.run_directory import keep_failed, run_directory
 from experiments.session import OnProgress, Session, Viewer
 from experiments.video import VideoWriter
@@ -258,7 +258,7 @@ def prepare_session(
         order=order,
     )
     replanner = replanner or Replanner(house.geodesics, solver(config.planner))
-    regrets: Regrets = (RegretsBeside if config.live else RegretsAtOnce)(house.geodesics)
+    regrets: Regrets = (LiveRegrets if config.live else Regrets)(house.geodesics)
     assistant = Assistant(
         TaskBoard(house, episode, order),
         assistance=config.assistance,

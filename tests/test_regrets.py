@@ -1,4 +1,4 @@
-"""Regrets beside a person: nobody waits for them, and what was too late is worked out after the task."""
+"""Regrets in live use: the caller never waits for them, and what was too late is computed after the task."""
 
 import threading
 
@@ -6,7 +6,7 @@ import pytest
 from planning_cases import Task, two_rooms
 
 from experiments import regrets
-from experiments.regrets import RegretsAtOnce, RegretsBeside
+from experiments.regrets import LiveRegrets, Regrets
 from planner.plan import VisitKind
 from planner.regret_evaluator import RegretEvaluator
 from planner.replanner import Replanner
@@ -20,7 +20,7 @@ def geodesics():
 
 @pytest.fixture
 def slow(monkeypatch):
-    """A judge that answers only when told to."""
+    """An evaluator that answers only when told to."""
     go = threading.Event()
     states = []
 
@@ -38,10 +38,10 @@ def planned(geodesics, task):
     return Replanner(geodesics, solver("exact")).plan(task.state).plan
 
 
-def test_nobody_waits_and_the_answer_is_that_of_a_run_that_repeats(geodesics, slow):
+def test_the_caller_never_waits_and_the_answer_is_that_of_a_run_that_repeats(geodesics, slow):
     go, states = slow
     task = Task(geodesics, 8, 1)
-    beside, at_once = RegretsBeside(geodesics), RegretsAtOnce(geodesics)
+    beside, at_once = LiveRegrets(geodesics), Regrets(geodesics)
     plan = planned(geodesics, task)
     for keeper in (beside, at_once):
         keeper.begin(task.state, plan)
@@ -56,7 +56,7 @@ def test_nobody_waits_and_the_answer_is_that_of_a_run_that_repeats(geodesics, sl
 def test_what_was_worked_out_for_a_state_that_is_past_is_not_shown(geodesics, slow):
     go, _ = slow
     task = Task(geodesics, 6, 2)
-    keeper = RegretsBeside(geodesics)
+    keeper = LiveRegrets(geodesics)
     keeper.begin(task.state, planned(geodesics, task))
     keeper.known()
     task.do(VisitKind.PICK, "object_03")
@@ -68,9 +68,9 @@ def test_what_was_worked_out_for_a_state_that_is_past_is_not_shown(geodesics, sl
     assert (VisitKind.PICK, "object_03") not in keeper.known()
 
 
-def test_visits_beside_a_person_are_judged_after_the_task(geodesics):
+def test_visits_in_live_use_are_evaluated_after_the_task(geodesics):
     task = Task(geodesics, 7, 3)
-    beside, at_once = RegretsBeside(geodesics), RegretsAtOnce(geodesics)
+    beside, at_once = LiveRegrets(geodesics), Regrets(geodesics)
     expected = []
     for number in range(4):
         plan = planned(geodesics, task)
@@ -87,7 +87,7 @@ def test_visits_beside_a_person_are_judged_after_the_task(geodesics):
 def test_a_better_plan_for_the_same_state_does_not_start_over(geodesics, slow):
     go, states = slow
     task = Task(geodesics, 5, 4)
-    keeper = RegretsBeside(geodesics)
+    keeper = LiveRegrets(geodesics)
     for _ in range(3):
         keeper.begin(task.state, planned(geodesics, task))
         keeper.known()
