@@ -14,7 +14,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from planner.errors import UnreachableError
 from planner.navmesh import TOLERANCE, NavMesh
-from planner.visibility_graph import VisibilityGraph, direct_distances, join, point_vertices
+from planner.visibility_graph import VisibilityGraph, direct_distances, join, visible_vertices
+
+MAX_REMEMBERED = (
+    4096  # points whose visible vertices are kept; bins and objects at rest are asked for again and again
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +36,7 @@ class ShortestPath:
 
 @dataclass(frozen=True, eq=False)
 class _Query:
-    """Points on the navmesh and the vertices they see."""
+    """Points on the navmesh and the vertices they see; rows as `visibility_graph.join` takes them."""
 
     points: NDArray[np.float64]
     island: NDArray[np.int64]
@@ -56,6 +60,9 @@ class Geodesics:
     navmesh: NavMesh
     max_snap: float = 1.0
     _graph: VisibilityGraph = field(init=False, repr=False)
+    _remembered: dict[tuple[float, float], tuple[NDArray[np.int32], NDArray[np.float64]]] = field(
+        init=False, repr=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_graph", VisibilityGraph.build(self.navmesh))
@@ -67,11 +74,11 @@ class Geodesics:
             NotNavigableError: No navigable point lies within `max_snap` of an end.
             UnreachableError: The ends lie on different islands.
         """
-        query = self._query(np.stack([np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)]))
-        first, last = query.points
-        straight = float(direct_distances(query.points[:1], query.points[1:], self._graph.walls)[0, 0])
-        if np.isfinite(straight) and query.island[0] == query.island[1]:
-            return ShortestPath(query.points, straight)
+        points, islands = self._locate([np.asarray(a, np.float64), np.asarray(b, np.float64)])
+        straight = float(direct_distances(points[:1], points[1:], self._graph.walls)[0, 0])
+        if np.isfinite(straight) and islands[0] == islands[1]:
+            return ShortestPath(points, straight)
+        query, (first, last) = self._query(points, islands), points
         from_a, before = dijkstra(
             self._with_sources(query, 1), indices=[self._size], return_predecessors=True
         )
@@ -92,7 +99,7 @@ class Geodesics:
             NotNavigableError: No navigable point lies within `max_snap` of a point.
             UnreachableError: Two points lie on different islands.
         """
-        query = self._query(points)
+        query = self._query(*self._locate(points))
         result = self._between(query, query, len(query.points))
         result = np.minimum(result, result.T)
         np.fill_diagonal(result, 0.0)
@@ -116,14 +123,15 @@ class Geodesics:
             NotNavigableError: No navigable point lies within `max_snap` of a point.
             UnreachableError: Two points lie on different islands.
         """
-        source = self._query(sources)
-        return self._between(source, self._query(targets), len(source.points))
+        source, target = (self._query(*self._locate(points)) for points in (sources, targets))
+        return self._between(source, target, len(source.points))
 
     @property
     def _size(self) -> int:
         return len(self._graph.vertices)
 
-    def _query(self, points: ArrayLike) -> _Query:
+    def _locate(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Points (m, 2), m, snapped where they are not navigable, and the island of each."""
         array = np.array(points, dtype=np.float64).reshape(-1, 2)
         islands = np.zeros(len(array), dtype=np.int64)
         for k, point in enumerate(array):
@@ -132,9 +140,26 @@ class Geodesics:
                 array[k] = self.navmesh.snap(point, self.max_snap)
             else:
                 islands[k] = island
-        graph = self._graph
-        seen = point_vertices(array, islands, graph.vertices, graph.island, graph.walls, TOLERANCE)
-        return _Query(array, islands, *seen)
+        return array, islands
+
+    def _query(self, points: NDArray[np.float64], islands: NDArray[np.int64]) -> _Query:
+        views = [self._view(x, y, i) for (x, y), i in zip(points.tolist(), islands.tolist(), strict=True)]
+        starts = np.zeros(len(points) + 1, np.int32)
+        np.cumsum([len(seen) for seen, _ in views], out=starts[1:])
+        seen = np.concatenate([np.empty(0, np.int32), *(seen for seen, _ in views)])
+        lengths = np.concatenate([np.empty(0), *(lengths for _, lengths in views)])
+        return _Query(points, islands, starts, seen, lengths)
+
+    def _view(self, x: float, y: float, island: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Vertices that a point, m, sees along tangents, and the distances to them, m."""
+        if (x, y) not in self._remembered:
+            if len(self._remembered) >= MAX_REMEMBERED:
+                self._remembered.clear()
+            graph = self._graph
+            self._remembered[x, y] = visible_vertices(
+                x, y, graph.vertices, graph.island == island, graph.walls, TOLERANCE
+            )
+        return self._remembered[x, y]
 
     def _with_sources(self, query: _Query, count: int) -> csr_array:
         """The vertex graph and the first `count` points of a query as further nodes, edges leading out."""

@@ -113,28 +113,22 @@ def vertex_pairs(
 
 
 @kernel
-def point_vertices(
-    points: NDArray[np.float64],
-    point_island: NDArray[np.int64],
+def visible_vertices(
+    x: float,
+    y: float,
     vertices: NDArray[np.float64],
-    island: NDArray[np.int64],
+    usable: NDArray[np.bool_],
     walls: SegmentGrid,
     slack: float,
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
-    """For each point the vertices it sees along tangents: row starts, vertex indices, distances."""
-    starts = np.zeros(points.shape[0] + 1, np.int32)
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Usable vertices that a point sees along tangents, and the distances to them, m."""
     found, lengths = [0], [0.0]
-    for i in range(points.shape[0]):
-        x, y = points[i, 0], points[i, 1]
-        for j in range(vertices.shape[0]):
-            q = vertices[j]
-            if island[j] != point_island[i] or not is_tangent(x, y, q, slack):
-                continue
-            if is_visible(x, y, q[0], q[1], walls):
-                found.append(j)
-                lengths.append(np.hypot(q[0] - x, q[1] - y))
-        starts[i + 1] = len(found) - 1
-    return starts, np.array(found[1:]).astype(np.int32), np.array(lengths[1:])
+    for j in range(vertices.shape[0]):
+        q = vertices[j]
+        if usable[j] and is_tangent(x, y, q, slack) and is_visible(x, y, q[0], q[1], walls):
+            found.append(j)
+            lengths.append(np.hypot(q[0] - x, q[1] - y))
+    return np.array(found[1:]).astype(np.int32), np.array(lengths[1:])
 
 
 @kernel
@@ -161,7 +155,8 @@ def join(
 
     Args:
         from_source: Distance from each source to each vertex, (s, v), m.
-        starts, seen, lengths: What `point_vertices` returned for the m points.
+        starts: First entry of each of the m points in `seen` and `lengths`, (m + 1,).
+        seen, lengths: What `visible_vertices` returned for the points, one after the other.
 
     Returns:
         Distances (s, m) in m, infinite without a path, and the last vertex of each path, -1 without.
