@@ -89,7 +89,8 @@ class Carrying:
             held_posture: Where a hand that holds something belongs, such as `avatar.CARRY`.
         """
         person = self._person
-        left, right = (-1 if item is None else item for item in person.held)
+        left, right = person.held
+        left, right = -1 if left is None else left, -1 if right is None else right
         moving = -1 if person.moving_hand is None else person.moving_hand
         holding = (left, right, moving, self._postures[held_posture])
         contacts = self._contacts() if left >= 0 or right >= 0 else self._no_contacts
@@ -136,7 +137,7 @@ class Carrying:
             options.grip_patience / person.dt,
             self._strained,
         )
-        return tuple(hand for hand in (LEFT, RIGHT) if found & (1 << hand))
+        return tuple(hand for hand in (LEFT, RIGHT) if found & (1 << hand)) if found else ()
 
 
 @kernel

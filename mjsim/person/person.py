@@ -122,9 +122,10 @@ class Person:
 
     def look_towards(self, pitch: float) -> None:
         """Move the head's pitch towards an angle, rad, at the pace of a glance."""
-        rig, motion = self.rig, self.motion
-        change = motion.look_gain * (pitch - rig.pitch_target)
-        rig.look_at_pitch(rig.pitch_target + _clip(change, motion.look_speed * self.dt))
+        target, motion = self.rig.pitch_target, self.motion
+        target += _clip(motion.look_gain * (pitch - target), motion.look_speed * self.dt)
+        lowest, highest = avatar.PITCH_RANGE
+        self.rig.motion[3] = min(highest, max(lowest, target))
 
     def face(self, point: NDArray[np.float64], tolerance: float, heading: float | None = None) -> Steps:
         """Stand still and turn to a point, or to a heading while glancing at the point; the tolerance is in rad."""

@@ -109,7 +109,7 @@ class Rig:
     @property
     def position(self) -> Vector:
         """Body axis on the floor, m, shape (2,)."""
-        return np.array(self.pose[:2])
+        return self.pose[:2].copy()
 
     @property
     def heading(self) -> float:
@@ -124,7 +124,7 @@ class Rig:
     @property
     def planar_velocity(self) -> Vector:
         """Velocity in the house frame, m/s, shape (2,)."""
-        return np.array(self.rates[:2])
+        return self.rates[:2].copy()
 
     @property
     def speed(self) -> float:
@@ -139,17 +139,12 @@ class Rig:
     @property
     def hands(self) -> Vector:
         """Hand positions in the body frame, m, shape (2, 3)."""
-        return np.array(self.pose[4:].reshape(2, 3))
+        return self.pose[4:].reshape(2, 3).copy()
 
     @property
     def eye(self) -> Vector:
         """Eye camera in the house frame, m, shape (3,)."""
         return np.array(avatar.eye_position(*self.pose[:4].tolist()))
-
-    def look_at_pitch(self, pitch: float) -> None:
-        """Command a pitch of the head, rad, kept within what a neck can do."""
-        low, high = avatar.PITCH_RANGE
-        self.motion[3] = min(high, max(low, pitch))
 
     def to_body(self, point: Vector) -> Vector:
         """A point of the house frame, (3,) m, in the body frame."""
