@@ -2,14 +2,17 @@
 
 import math
 
+import mujoco
 import numpy as np
 import pytest
 
 from experiments.health import summarise_health
 from mjsim.actions import IDLE, EventKind, Pick
 from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.health.scan import is_path_clear, static_boxes
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.scene import compose
+from mjsim.model.rays import first_hit
+from mjsim.model.scene import Scene, compose
 from mjsim.world import World
 
 
@@ -72,6 +75,22 @@ def test_through_a_wall_is_tunnelling_and_through_the_doorway_is_not(world: Worl
     put(world, "cube", 2.0, 3.4, 0.0)  # now the partition does
     assert kinds(world, 2) == [EventKind.TUNNELLED]
     assert world.health.tunnellings == 1
+
+
+def test_boxes_call_no_path_clear_on_which_a_ray_meets_the_house(scene: Scene) -> None:
+    model, data = scene.model, mujoco.MjData(scene.model)
+    mujoco.mj_forward(model, data)
+    rng = np.random.default_rng(0)
+    low, high = scene.rooms.bounds[:2], scene.rooms.bounds[2:]
+    boxes, clear = static_boxes(scene), 0
+    for _ in range(1500):
+        start = np.array([*rng.uniform(low, high), rng.uniform(0.0, 2.2)])
+        end = start + rng.normal(0.0, 0.05, 3)
+        if is_path_clear(start, end, boxes):
+            clear += 1
+            distance, geom = first_hit(model, data, start, end - start, static_only=True, reach=1.0)
+            assert distance >= 1.0 or not (model.geom_contype[geom] or model.geom_conaffinity[geom])
+    assert 750 < clear < 1500  # of both kinds
 
 
 def test_outside_the_house_is_ejected_once(world: World) -> None:

@@ -14,10 +14,9 @@ import numpy as np
 from mjsim.actions import EventKind
 from mjsim.errors import PhysicsError
 from mjsim.health.anomalies import CHECK_DISTANCE, AnomalyDetector, AnomalyState
-from mjsim.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan
+from mjsim.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan, static_boxes
 from mjsim.health.settle_times import SettleTimer, SettleTimerState
 from mjsim.health.values import QUIET, Health, HealthSample
-from mjsim.model.clearance import carry_clearance
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person.grips import Grips
@@ -74,7 +73,7 @@ class HealthMonitor:
             trunk=rig.trunk,
             foot=rig.foot,
             limits=limits,
-            clearance=tuple(carry_clearance(scene)),
+            boxes=static_boxes(scene),
             rooms=scene.rooms.rectangles,
             grip_sites=grips.sites,
             anchors=self._anomalies.anchors,

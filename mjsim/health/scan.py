@@ -3,12 +3,14 @@
 import math
 from typing import Any, NamedTuple
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
-from mjsim.model.clearance import ClearanceField, is_path_clear
+from mjsim.model.house import compiled_house
 from mjsim.model.rooms import nearest_rectangle
+from mjsim.model.scene import Scene
 from mjsim.person.grips import site_angle, site_gap
 
 Floats = NDArray[np.float64]
@@ -16,11 +18,29 @@ Ints = NDArray[np.int32]
 
 OUTSIDE = 0.3  # m; rooms end at their walls, and doorways lie in between
 
+_TOLERANCE = 1e-6  # m
+
 # What a scan finds.
 NORMAL, SUSPECT, WARNED, NOT_FINITE = 0, 1, 2, 3
 # Flags of an object: farther than a distance from its anchor, faster than a speed, slower than another, and touched
 # by the person's foot.
 DISPLACED, FAST, SLOW, PUSHED = 1, 2, 4, 8
+
+
+def static_boxes(scene: Scene) -> Floats:
+    """Lowest and highest corner of a box around each colliding geom of the house, m, shape (k, 6)."""
+    return compiled_house(scene.catalogue).once(("static boxes",), lambda: _static_boxes(scene.model))
+
+
+def _static_boxes(model: mujoco.MjModel) -> Floats:
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    static = model.body_weldid[model.geom_bodyid] == 0
+    geoms = np.flatnonzero(static & ((model.geom_contype | model.geom_conaffinity) > 0))
+    rotations, boxes = data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_aabb[geoms]
+    centers = data.geom_xpos[geoms] + np.einsum("kij,kj->ki", rotations, boxes[:, :3])
+    half_sizes = np.einsum("kij,kj->ki", np.abs(rotations), boxes[:, 3:]) + _TOLERANCE
+    return np.hstack((centers - half_sizes, centers + half_sizes))
 
 
 class ScanArrays(NamedTuple):
@@ -39,11 +59,11 @@ class ScanArrays(NamedTuple):
         trunk, foot: The person's trunk and foot, geoms.
         limits: Squares of the distance from its anchor, m, beyond which an object is `DISPLACED`, of the speed, m/s,
             beyond which it is `FAST`, and of the speed below which it is `SLOW`, shape (3,).
-        clearance: Fields of the `ClearanceField` at the heights of what is carried.
+        boxes: `static_boxes`.
         rooms: `RoomMap.rectangles`.
         grip_sites: `Grips.sites`.
-        anchors: Where each object was when its path was last checked, m, shape (n, 3); moved along where `clearance`
-            shows the path to be clear.
+        anchors: Where each object was when its path was last checked, m, shape (n, 3); moved along where `boxes`
+            show the path to be clear.
         flags: Flags of each object, shape (n,); overwritten.
         sample: The deepest overlap of an object with anything but the person, and that of the trunk with the house,
             both in m and not negative; how far the weld of either hand is stretched, m, and twisted, rad, NaN for a
@@ -62,7 +82,7 @@ class ScanArrays(NamedTuple):
     trunk: int
     foot: int
     limits: Floats
-    clearance: tuple[Any, ...]
+    boxes: Floats
     rooms: tuple[Floats, Floats, Floats]
     grip_sites: NDArray[np.intp]
     anchors: Floats
@@ -109,7 +129,6 @@ def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -
 @kernel
 def _flag_objects(arrays: ScanArrays) -> int:
     state, anchors, limits, rooms = NORMAL, arrays.anchors, arrays.limits, arrays.rooms
-    clearance = ClearanceField(*arrays.clearance)
     for item in range(len(arrays.bodies)):
         center, dof, flags = arrays.xipos[arrays.bodies[item]], arrays.dofs[item], 0
         gap = speed = 0.0
@@ -117,7 +136,7 @@ def _flag_objects(arrays: ScanArrays) -> int:
             gap += (center[k] - anchors[item, k]) ** 2
             speed += arrays.qvel[dof + k] ** 2
         if gap > limits[0]:
-            clear = is_path_clear(anchors[item], center, clearance)
+            clear = is_path_clear(anchors[item], center, arrays.boxes)
             if clear and nearest_rectangle(center[0], center[1], rooms[0], rooms[1], rooms[2]) <= OUTSIDE:
                 anchors[item, 0], anchors[item, 1], anchors[item, 2] = center[0], center[1], center[2]
             else:
@@ -130,6 +149,22 @@ def _flag_objects(arrays: ScanArrays) -> int:
             flags |= SLOW
         arrays.flags[item] = flags
     return state
+
+
+@kernel
+def is_path_clear(start: Floats, end: Floats, boxes: Floats) -> bool:
+    """Whether the box around two points (3,), m, overlaps none of some boxes."""
+    low_x, high_x = min(start[0], end[0]), max(start[0], end[0])
+    low_y, high_y = min(start[1], end[1]), max(start[1], end[1])
+    low_z, high_z = min(start[2], end[2]), max(start[2], end[2])
+    for box in boxes:
+        if (
+            low_x <= box[3] and high_x >= box[0]
+            and low_y <= box[4] and high_y >= box[1]
+            and low_z <= box[5] and high_z >= box[2]
+        ):  # fmt: skip
+            return False
+    return True
 
 
 @kernel

@@ -82,16 +82,6 @@ def carry_clearance(scene: Scene) -> ClearanceField:
     )
 
 
-@kernel
-def is_path_clear(start: NDArray[np.float64], end: NDArray[np.float64], field: ClearanceField) -> bool:
-    """Whether nothing static can lie between two points (3,), m, by the field of `carry_clearance` alone."""
-    low, high = CARRY_BAND
-    if min(start[2], end[2]) < low or max(start[2], end[2]) > high:
-        return False
-    room, _, _ = clearance_at(start[0], start[1], field)
-    return bool(math.hypot(end[0] - start[0], end[1] - start[1]) < room - 2.0 * field.resolution)
-
-
 def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:
     """Mark the cells whose centre lies within half a cell of a convex polygon, given in cells, (k, 2)."""
     low = np.maximum(np.floor(polygon.min(axis=0)).astype(int), 0)
