@@ -13,7 +13,7 @@ from planner.relaxation_checker import FINE, closed, relax
 
 UNIT = 1e-4  # m per unit of a certificate
 FEW = 7  # objects whose tours are all tried
-MOST_ROWS = 1 << 16  # of a table that is computed anew: some 2 s
+MAX_ROWS = 1 << 16  # of a table that is computed anew: some 2 s
 
 Matrix = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def proven_bound(problem: RoutingProblem, plan: Plan) -> float:
         derived = _spanning_tree(problem, closed(problem.distances))
     elif certificate.proof in (Proof.FULL_TABLE, Proof.RELAXATION) and problem.capacity == 2:
         group, prices = claim(problem, certificate)
-        if np.prod(np.bincount(group) + 1.0) > MOST_ROWS:
+        if np.prod(np.bincount(group) + 1.0) > MAX_ROWS:
             return 0.0
         derived = FINE * relax(problem, group, prices).root
     else:

@@ -23,7 +23,7 @@ from planner.tour import (
 
 FIRST_SOLUTIONS = (1, 10)  # of the anytime form
 DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
-LONGEST_SECONDS = 60.0  # ends a search that is limited by work but finds no more solutions
+MAX_SECONDS = 60.0  # ends a search that is limited by work but finds no more solutions
 
 
 @dataclass(frozen=True)
@@ -163,6 +163,6 @@ def _parameters(limit: SolveLimit) -> object:
     parameters.local_search_metaheuristic = routing_enums_pb2.LocalSearchMetaheuristic.GUIDED_LOCAL_SEARCH
     if limit.work is not None:
         parameters.solution_limit = limit.work
-    seconds = limit.seconds if limit.seconds is not None else LONGEST_SECONDS
+    seconds = limit.seconds if limit.seconds is not None else MAX_SECONDS
     parameters.time_limit.FromMilliseconds(max(1, round(seconds * 1000)))
     return parameters

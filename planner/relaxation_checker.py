@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from planner.problem import RoutingProblem
 
 FINE = 1e-5  # m per unit of this check, ten times finer than that of certificates
-LONGEST = 1 << 29  # units; longer than any tour, and its double fits 32 bits
+MAX_LENGTH = 1 << 29  # units; longer than any tour, and its double fits 32 bits
 
 Whole = NDArray[Any]  # of int32, or of int64 where tours are kilometres long
 
@@ -66,14 +66,14 @@ def relax(problem: RoutingProblem, group: NDArray[np.int64], prices: NDArray[np.
     fine = closed(np.floor(closed(problem.distances) / FINE))
     n = len(problem.shipments)
     reach = (2 * n + 3) * fine.max(initial=0) + np.abs(prices).sum()
-    kind = np.int32 if reach < LONGEST else np.int64
+    kind = np.int32 if reach < MAX_LENGTH else np.int64
     bins = np.array(sorted({s.delivery for s in problem.shipments} | set(problem.onboard)), np.int64)
     at = np.array([s.pickup for s in problem.shipments], np.int64)
     home = np.searchsorted(bins, np.array([s.delivery for s in problem.shipments], np.int64))
     size = np.bincount(group)
     stride = np.concatenate([[1], np.cumprod(size + 1)])[:-1][group] if n else group
     rows = int(np.prod(size + 1))
-    far = kind(min(2 * reach, LONGEST) if kind is np.int32 else 2 * reach)
+    far = kind(min(2 * reach, MAX_LENGTH) if kind is np.int32 else 2 * reach)
     carrying = np.full((rows, len(bins), len(bins)), far)
     table = Relaxed(
         fine.astype(kind), at, bins, home, prices.astype(kind), group, stride,
@@ -125,9 +125,9 @@ def _first(table: Relaxed) -> list[int]:
 def _first_leg(problem: RoutingProblem, table: Relaxed, start: tuple[Whole, Any]) -> int:
     bins, carried = table.bins.tolist(), problem.onboard
     if len(carried) == 2:
-        ways = [
+        lengths = [
             table.d[problem.start, one] + table.carrying[-1, bins.index(one), bins.index(other)]
             for one, other in (carried, carried[::-1])
         ]
-        return int(min(ways))
+        return int(min(lengths))
     return int(start[0][bins.index(carried[0])] if carried else start[1])

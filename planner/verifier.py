@@ -20,8 +20,8 @@ from planner.relaxation_checker import FINE, Relaxed, closed, relax
 from planner.tour_sweep import sweep_orders
 
 UNIT = 1e-4  # m per unit of a certificate
-MOST_STATES = 30_000_000
-MOST_ROWS = 1 << 20  # of the certificate's table: some 30 s
+MAX_STATES = 30_000_000
+MAX_ROWS = 1 << 20  # of the certificate's table: some 30 s
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,13 @@ class Verified:
     why: str = ""
 
 
-def verify_optimal(problem: RoutingProblem, plan: Plan, *, most_states: int = MOST_STATES) -> Verified:
+def verify_optimal(problem: RoutingProblem, plan: Plan, *, max_states: int = MAX_STATES) -> Verified:
     """Check a plan's tour, and its lower bound as far as possible, from the problem and the certificate alone.
 
     Args:
         problem: What the plan claims to solve.
         plan: The plan; OPTIMAL or not, its claim is its lower bound.
-        most_states: Give up beyond so many states.
+        max_states: Give up beyond so many states.
 
     Returns:
         What could be verified, which is less than the plan claims only where it says `why`.
@@ -63,41 +63,41 @@ def verify_optimal(problem: RoutingProblem, plan: Plan, *, most_states: int = MO
     wanted = plan.lower_bound - rounding
     states, why = 0, ""
     if derived < wanted:
-        derived, states, why = _by_search(problem, plan, derived, wanted, most_states)
+        derived, states, why = _by_search(problem, plan, derived, wanted, max_states)
     optimal = plan.status is Status.OPTIMAL and derived >= plan.cost - 2 * rounding
     return Verified(plan.cost, min(derived, plan.cost), optimal, states, why)
 
 
 def _by_search(
-    problem: RoutingProblem, plan: Plan, derived: float, wanted: float, most_states: int
+    problem: RoutingProblem, plan: Plan, derived: float, wanted: float, max_states: int
 ) -> tuple[float, int, str]:
     """A lower bound, how many states it took, and what is missing."""
     certificate = plan.certificate
     n = len(problem.shipments)
     apart = bool((problem.distances - closed(problem.distances)).max(initial=0.0) > 2 * UNIT * n + UNIT)
     if problem.capacity != 2 or apart or certificate is None or certificate.proof is Proof.EXHAUSTIVE:
-        found = sweep_orders(problem, wanted, most_states // 30)
+        found = sweep_orders(problem, wanted, max_states // 30)
     elif certificate.proof is Proof.SPANNING_TREE:
         return derived, 0, "a spanning tree bounds the tour no better"
     else:
         group, prices = claim(problem, certificate)
         rows = int(np.prod(np.bincount(group) + 1.0))
-        if rows > MOST_ROWS:
-            return derived, 0, f"the certificate's table has {rows} rows, more than {MOST_ROWS}"
+        if rows > MAX_ROWS:
+            return derived, 0, f"the certificate's table has {rows} rows, more than {MAX_ROWS}"
         table = relax(problem, group, prices)
         derived = max(derived, table.root * FINE)
         if derived >= wanted:
             return derived, 0, ""
-        found = sweep(problem, table, int(np.floor(wanted / FINE)), most_states)
+        found = sweep(problem, table, int(np.floor(wanted / FINE)), max_states)
     if found is None:
-        return derived, most_states, f"more than {most_states} states may lead to a shorter tour"
+        return derived, max_states, f"more than {max_states} states may lead to a shorter tour"
     shortest, states = found
     if shortest:
         raise ProblemError(f"the lower bound claims {plan.lower_bound} m, but there is a shorter tour")
     return wanted, states, ""
 
 
-def sweep(problem: RoutingProblem, table: Relaxed, limit: int, most_states: int) -> tuple[bool, int] | None:
+def sweep(problem: RoutingProblem, table: Relaxed, limit: int, max_states: int) -> tuple[bool, int] | None:
     """Look for a tour shorter than a limit, units of 1e-5 m, among the states that may lead to one.
 
     A state is the set of objects left and a place: bin b with an object for bin c in hand is b m + c, with empty
@@ -113,7 +113,7 @@ def sweep(problem: RoutingProblem, table: Relaxed, limit: int, most_states: int)
     for _ in range(n + 1):
         here = _shortest([here, _dropped(table, _kept(table, here, limit))], table, limit)
         states += len(here[0])
-        if states > most_states:
+        if states > max_states:
             return None
         left, place, cost = here
         if ((left == 0) & (place < m * m) & (place // max(m, 1) == place % max(m, 1))).any():

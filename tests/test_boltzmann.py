@@ -61,13 +61,13 @@ def test_without_any_temperature_the_best_is_taken():
 
 def walked_by_drawing(geodesics, temperature, seed):
     """Length of a task of eight objects, done in an order drawn from its regrets."""
-    task, rng, judge, length = (
+    task, rng, evaluator, length = (
         Task(geodesics, 8, seed),
         np.random.default_rng(seed),
         RegretEvaluator(geodesics),
         0.0,
     )
-    while found := judge.all(task.state):
+    while found := evaluator.all(task.state):
         options = [Choice(visit, np.zeros(2), r.regret, False, lambda: None) for visit, r in found.items()]
         drawn, here = draw(options, temperature, rng), task.position
         task.do(*drawn.visit)

@@ -14,7 +14,7 @@ from planner.exact.beam import beam_pass
 from planner.exact.deadline import NEVER
 from planner.exact.groups import alone, numbered
 from planner.exact.instance import make_instance, to_visits
-from planner.exact.multipliers import first_bound, grown, told_apart
+from planner.exact.multipliers import counted_by_bin, first_bound, grown
 from planner.exact.relaxation import fill, walk
 from planner.exact.search import row_of
 from planner.exact.solver import ExactSolver
@@ -165,7 +165,7 @@ def test_fitted_multipliers_bound_the_optimum_and_growing_does_not_harm(seed, n,
     optimum, _ = walk(instance, table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
     bound = first_bound(instance, optimum)
     roots = [bound.root]
-    roots.append(told_apart(bound, optimum, 1 << n, NEVER).root)
+    roots.append(counted_by_bin(bound, optimum, 1 << n, NEVER).root)
     for rows in [3 << k for k in range(n)]:
         bound = grown(bound, optimum, rows, NEVER)
         roots.append(bound.root)

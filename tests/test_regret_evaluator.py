@@ -30,13 +30,13 @@ def possible(task):
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_table_that_was_kept_says_what_a_fresh_one_would(geodesics, seed):
     task, rng = Task(geodesics, 7, seed), np.random.default_rng(seed)
-    judge, fresh = RegretEvaluator(geodesics), TaskProblems(geodesics)
+    evaluator, fresh = RegretEvaluator(geodesics), TaskProblems(geodesics)
     while possible(task):
         state = task.state
-        found = judge.all(state)
+        found = evaluator.all(state)
         expected = {r.visit: r.regret for r in regrets(fresh.problem(state), solver("exact"))}
         assert {stop: r.regret for stop, r in found.items()} == pytest.approx(expected, abs=3e-3)
-        assert all(judge.of(state, stop) == found[stop].regret for stop in found)
+        assert all(evaluator.of(state, stop) == found[stop].regret for stop in found)
         if rng.random() < 0.15:
             task.misfortune()
         else:
@@ -48,13 +48,13 @@ def test_a_table_that_was_kept_says_what_a_fresh_one_would(geodesics, seed):
 def test_regrets_add_up_to_the_detour_of_the_whole_task(geodesics, seed, planner):
     """Whatever order things are done in: its length is the optimum's and all regrets together."""
     task, rng = Task(geodesics, 6, seed), np.random.default_rng(seed)
-    judge = RegretEvaluator(geodesics, solver=planner)
+    evaluator = RegretEvaluator(geodesics, solver=planner)
     shortest = optimum(TaskProblems(geodesics).problem(task.state))
     walked = regretted = 0.0
     while possible(task):
         state, here = task.state, task.position
         stop = possible(task)[int(rng.integers(len(possible(task))))]
-        regretted += judge.of(state, stop)
+        regretted += evaluator.of(state, stop)
         task.do(*stop)
         walked += geodesics.shortest_path(here, task.position).geodesic_distance
     assert walked == pytest.approx(shortest + regretted, abs=0.02)
@@ -82,19 +82,19 @@ def test_a_plan_that_is_known_to_be_best_need_not_be_found_again(geodesics):
 
     task = Task(geodesics, 12, 3)
     plan = SEARCH.solve(TaskProblems(geodesics).problem(task.state))
-    judge, stop = RegretEvaluator(geodesics, solver=Counting(table_bytes=0)), possible(task)[4]
-    known = judge.of(task.state, stop, plan)
+    evaluator, stop = RegretEvaluator(geodesics, solver=Counting(table_bytes=0)), possible(task)[4]
+    known = evaluator.of(task.state, stop, plan)
     assert Counting.solved == 0
     assert known == pytest.approx(RegretEvaluator(geodesics).of(task.state, stop), abs=3e-3)
-    judge.all(task.state, plan)
+    evaluator.all(task.state, plan)
     assert Counting.solved == 0
 
 
 def test_what_is_impossible_or_not_proven_has_no_regret(geodesics):
     task = Task(geodesics, 14, 1)
-    judge = RegretEvaluator(geodesics, solver=SEARCH, limit=SolveLimit(work=1))
-    assert judge.of(task.state, Visit(VisitKind.PLACE, "object_00")) is None
-    hard = [judge.of(task.state, stop) for stop in possible(task)]
+    evaluator = RegretEvaluator(geodesics, solver=SEARCH, limit=SolveLimit(work=1))
+    assert evaluator.of(task.state, Visit(VisitKind.PLACE, "object_00")) is None
+    hard = [evaluator.of(task.state, stop) for stop in possible(task)]
     assert None in hard
 
 

@@ -19,7 +19,7 @@ SMALL_TABLE = 1 << 22  # bytes, 14 objects and 6 bins: filled in 10 ms by kernel
 
 
 @dataclass(frozen=True)
-class Found:
+class Solution:
     """What is known of an instance.
 
     Attributes:
@@ -38,11 +38,11 @@ def full_table_bytes(instance: Instance) -> int:
     return table_bytes(instance, 1 << len(instance.home))
 
 
-def by_table(instance: Instance) -> Found:
+def by_table(instance: Instance) -> Solution:
     """Fill the full table and follow a shortest tour."""
     table = filled_table(instance)
     length, actions = follow_table(instance, table, len(table.bin) - 1)
-    return Found(actions, length, Certificate(Proof.FULL_TABLE, length))
+    return Solution(actions, length, Certificate(Proof.FULL_TABLE, length))
 
 
 def filled_table(instance: Instance) -> Table:
@@ -58,7 +58,7 @@ def filled_table(instance: Instance) -> Table:
 
 
 def follow_table(instance: Instance, table: Table, row: int) -> tuple[int, list[int]]:
-    """A shortest tour by a full table: its length, and its actions as in `Found`.
+    """A shortest tour by a full table: its length, and its actions as in `Solution`.
 
     Args:
         instance: The instance, with its root.

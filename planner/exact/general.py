@@ -17,7 +17,7 @@ Matrix = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Found:
+class Ending:
     """Where a best-first search ended.
 
     Attributes:
@@ -30,9 +30,9 @@ class Found:
 
 
 def best_first(
-    problem: RoutingProblem, distances: Matrix, metric: Matrix, most_states: int, deadline: Deadline = NEVER
-) -> Found:
-    """Search states by cost so far plus the farthest errand left (A*).
+    problem: RoutingProblem, distances: Matrix, metric: Matrix, max_states: int, deadline: Deadline = NEVER
+) -> Ending:
+    """Search states by cost so far plus the farthest trip left (A*).
 
     In a metric, what belongs where one is, is dropped at once: that is free and never wrong. Otherwise a detour over
     the same place may pay later, so each drop is a move of its own.
@@ -41,7 +41,7 @@ def best_first(
         problem: What is left to do.
         distances: Length of each leg, integers, (k, k).
         metric: The same, closed to a metric.
-        most_states: How many states may be expanded.
+        max_states: How many states may be expanded.
         deadline: Give up when it is over.
     """
     search = _Search(problem, distances.tolist(), metric.tolist(), at_once=np.array_equal(distances, metric))
@@ -55,9 +55,9 @@ def best_first(
         if state in closed:
             continue
         if not state[1] and not state[2]:
-            return Found(search.visits(state, before), so_far)
-        if len(closed) == most_states or (len(closed) % 16 == 0 and deadline.over()):
-            return Found(None, estimate)
+            return Ending(search.visits(state, before), so_far)
+        if len(closed) == max_states or (len(closed) % 16 == 0 and deadline.over()):
+            return Ending(None, estimate)
         closed.add(state)
         for leg, following in search.moves(state):
             total = so_far + leg
@@ -77,7 +77,7 @@ class _Search:
         self._legs = legs
         self._metric = metric
         self._at_once = at_once
-        self._errand = [metric[s.pickup][s.delivery] for s in problem.shipments]
+        self._trip = [metric[s.pickup][s.delivery] for s in problem.shipments]
 
     def arrive(self, here: int, left: int, carried: tuple[int, ...]) -> State:
         """State on arrival, after what is dropped at once."""
@@ -100,13 +100,13 @@ class _Search:
         return found
 
     def still_to_go(self, state: State) -> int:
-        """A lower bound: the farthest single errand that is left."""
+        """A lower bound: the farthest single trip that is left."""
         here, left, carried = state
         row = self._metric[here]
         farthest = max((row[j] for j in carried), default=0)
         for k, shipment in enumerate(self._problem.shipments):
             if left >> k & 1:
-                farthest = max(farthest, row[shipment.pickup] + self._errand[k])
+                farthest = max(farthest, row[shipment.pickup] + self._trip[k])
         return farthest
 
     def visits(self, end: State, before: dict[State, State]) -> list[Visit]:

@@ -24,14 +24,14 @@ def numbered(labels: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def with_one_alone(
-    group: NDArray[np.int64], trouble: NDArray[np.float64], most_rows: int
+    group: NDArray[np.int64], miscount: NDArray[np.float64], max_rows: int
 ) -> NDArray[np.int64] | None:
     """Give one object a group of its own.
 
     Args:
         group: Group of each object, numbered from 0, (n,).
-        trouble: Which object matters most, (n,).
-        most_rows: Of the table afterwards.
+        miscount: The object with the largest one is taken, (n,).
+        max_rows: Of the table afterwards.
 
     Returns:
         The new groups; None if all objects are alone or the table would be too large.
@@ -40,5 +40,5 @@ def with_one_alone(
     if size.max(initial=1) == 1:
         return None
     new = group.copy()
-    new[np.argmax(np.where(size > 1, trouble, -1.0))] = group.max() + 1
-    return new if rows_of(new) <= most_rows else None
+    new[np.argmax(np.where(size > 1, miscount, -1.0))] = group.max() + 1
+    return new if rows_of(new) <= max_rows else None

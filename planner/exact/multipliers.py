@@ -14,11 +14,11 @@ from planner.exact.relaxation import fill, walk
 from planner.exact.table import Table, new_table, rows_of
 from planner.exact.warm_start import Start
 
-MEMORY = 0.97  # of a step in the record of what is picked too often or too rarely
+DECAY = 0.97  # of the record of miscounts, from one step to the next
 MOMENTUM = 0.8
-FIRST_STEPS, FIRST_STRIDES = 150, (1.0, 0.02)
-MOST_STEPS, LEAST_STEPS, STRIDES = 30, 4, (0.2, 0.03)
-STEP_ROWS = 60_000  # filled in a fit with many rows, at least
+FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
+MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
+STEP_ROWS = 60_000  # rows filled by one fit of a large table, about
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +29,13 @@ class Bound:
         instance: The instance.
         table: Relaxed cost-to-go.
         root: Bound at the root, units.
-        trouble: How far relaxed tours, recent ones most, were from picking each object once, (n,).
+        miscount: How far relaxed tours were from picking each object once, recent ones most, (n,).
     """
 
     instance: Instance
     table: Table
     root: int
-    trouble: NDArray[np.float64]
+    miscount: NDArray[np.float64]
 
     @property
     def prices(self) -> int:
@@ -52,7 +52,7 @@ def first_bound(instance: Instance, upper: int) -> Bound:
     """
     n = len(instance.home)
     table = new_table(instance, together(n))
-    bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STRIDES, NEVER)
+    bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STEP_SIZES, NEVER)
     return cast(Bound, bound)  # it never runs out of time
 
 
@@ -74,28 +74,28 @@ def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
     return Bound(instance, table, int(total) - int(table.multipliers.sum()), np.zeros(n))
 
 
-def grown(bound: Bound, upper: int, most_rows: int, deadline: Deadline) -> Bound:
-    """Count fewer objects together and fit again, until the gap closes, the table is full grown, or time is over.
+def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
+    """Split the groups and fit again, until the gap closes, the table has reached its size, or time is over.
 
-    Each time the object that the relaxed tours treat worst gets a group of its own.
+    Each time the object with the largest miscount gets a group of its own.
 
     Args:
         bound: The bound so far.
         upper: Length of a known tour, units.
-        most_rows: Of the table.
+        max_rows: Of the table.
         deadline: Stop growing when it is over.
     """
-    warm = not bound.trouble.any()  # prices from elsewhere: find out first how good they are here
+    warm = not bound.miscount.any()  # a warm start: first see how good its multipliers are here
     while bound.root < upper:
         group: NDArray[np.int64] | None = bound.table.group
         if not warm:
-            group = with_one_alone(bound.table.group, bound.trouble, most_rows)
-        elif rows_of(bound.table.group) > most_rows:
+            group = with_one_alone(bound.table.group, bound.miscount, max_rows)
+        elif rows_of(bound.table.group) > max_rows:
             break
         warm = False
         if group is None:
             break
-        steps = max(LEAST_STEPS, min(MOST_STEPS, STEP_ROWS // rows_of(group)))
+        steps = max(MIN_STEPS, min(MAX_STEPS, STEP_ROWS // rows_of(group)))
         fitted = _refitted(bound, group, upper, steps, deadline)
         if fitted is None:
             break
@@ -103,22 +103,22 @@ def grown(bound: Bound, upper: int, most_rows: int, deadline: Deadline) -> Bound
     return bound
 
 
-def told_apart(bound: Bound, upper: int, most_rows: int, deadline: Deadline) -> Bound:
-    """Count the objects for each bin together if that gives a better bound.
+def counted_by_bin(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
+    """Group the objects by bin if that gives a better bound.
 
-    Where bins are far apart, a relaxed tour that need not visit each as often as there are objects for it is a poor
-    one, and no other small table notices that.
+    Where bins are far apart, much of a tour's length is in how often it visits each bin. A small table counts that
+    only with these groups.
 
     Args:
         bound: The bound so far.
         upper: Length of a known tour, units.
-        most_rows: Of the table.
+        max_rows: Of the table.
         deadline: Leave the bound as it is when this is over.
     """
     group = numbered(bound.instance.home)
-    if bound.root >= upper or rows_of(group) > most_rows:
+    if bound.root >= upper or rows_of(group) > max_rows:
         return bound
-    fitted = _refitted(bound, group, upper, MOST_STEPS, deadline)
+    fitted = _refitted(bound, group, upper, MAX_STEPS, deadline)
     return bound if fitted is None or fitted.root <= bound.root else fitted
 
 
@@ -127,7 +127,7 @@ def _refitted(
 ) -> Bound | None:
     table = new_table(bound.instance, group)
     start = bound.table.multipliers.astype(np.float64)
-    return fit(bound.instance, table, start, upper, steps, STRIDES, deadline)
+    return fit(bound.instance, table, start, upper, steps, STEP_SIZES, deadline)
 
 
 def fit(
@@ -136,7 +136,7 @@ def fit(
     multipliers: NDArray[np.float64],
     upper: int,
     steps: int,
-    strides: tuple[float, float],
+    step_sizes: tuple[float, float],
     deadline: Deadline,
 ) -> Bound | None:
     """Subgradient ascent with momentum (Held, Wolfe and Crowder 1974).
@@ -147,7 +147,7 @@ def fit(
         multipliers: Where to start, (n,).
         upper: Length of a known tour.
         steps: How many tables to try.
-        strides: Length of the first and the last step, as a share of what would close the gap.
+        step_sizes: Length of the first and the last step, as a share of what would close the gap.
         deadline: Stop when it is over.
 
     Returns:
@@ -156,8 +156,8 @@ def fit(
     n = len(instance.home)
     actions: NDArray[np.int64] = np.empty(2 * n + 2, np.int64)
     current, direction = multipliers.copy(), np.zeros(n)
-    best, kept = -1, table.multipliers.copy()
-    trouble = np.zeros(n)
+    best, best_multipliers = -1, table.multipliers.copy()
+    miscount = np.zeros(n)
     for k in range(steps):
         table.multipliers[:] = np.rint(current)
         if not fill(instance, table, deadline):
@@ -166,27 +166,27 @@ def fit(
         value = int(total) - int(table.multipliers.sum())
         if value > best:
             best = value
-            kept[:] = table.multipliers
+            best_multipliers[:] = table.multipliers
         if best >= upper or k == steps - 1:
             break
-        stride = strides[0] * (strides[1] / strides[0]) ** (k / steps)
-        if not step(actions[:count], 1.002 * upper - value, stride, current, direction, trouble):
+        step_size = step_sizes[0] * (step_sizes[1] / step_sizes[0]) ** (k / steps)
+        if not step(actions[:count], 1.002 * upper - value, step_size, current, direction, miscount):
             break
-    if (table.multipliers != kept).any():
-        table.multipliers[:] = kept
+    if (table.multipliers != best_multipliers).any():
+        table.multipliers[:] = best_multipliers
         if not fill(instance, table, deadline):
             return None
-    return Bound(instance, table, best, trouble)
+    return Bound(instance, table, best, miscount)
 
 
 @kernel
 def step(
     actions: NDArray[np.int64],
     gap: float,
-    stride: float,
+    step_size: float,
     current: NDArray[np.float64],
     direction: NDArray[np.float64],
-    trouble: NDArray[np.float64],
+    miscount: NDArray[np.float64],
 ) -> bool:
     """Make what a relaxed tour picks too often dearer; False if it picks each object once."""
     n = current.size
@@ -197,10 +197,10 @@ def step(
     norm = 0.0
     for j in range(n):  # loops rather than slices: they compile much faster
         norm += surplus[j] * surplus[j]
-        trouble[j] = MEMORY * trouble[j] + abs(surplus[j])
+        miscount[j] = DECAY * miscount[j] + abs(surplus[j])
     if norm == 0.0:
         return False
     for j in range(n):
-        direction[j] = stride * gap / norm * surplus[j] + MOMENTUM * direction[j]
+        direction[j] = step_size * gap / norm * surplus[j] + MOMENTUM * direction[j]
         current[j] += direction[j]
     return True

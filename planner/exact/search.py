@@ -46,85 +46,71 @@ def row_of(table: Table, left: int) -> int:
     return row
 
 
+class Step(NamedTuple):
+    """Where a leg of a tour begins, or ends.
+
+    Attributes:
+        left: Set of objects left, as bits.
+        row: Its row in the bound's table.
+        cost: Length so far, multipliers of picks included.
+        parent: As in `Nodes`.
+    """
+
+    left: int
+    row: int
+    cost: int
+    parent: int
+
+
 @kernel
-def offer_bin(
-    inst: Instance,
-    table: Table,
-    nodes: Nodes,
-    left: int,
-    row: int,
-    b: int,
-    d: int,
-    cost: int,
-    limit: int,
-    parent: int,
-) -> None:
+def offer_bin(inst: Instance, table: Table, nodes: Nodes, step: Step, b: int, d: int, limit: int) -> None:
     """Offer the state at bin b carrying one for d (d = b: nothing), unless its total reaches the limit."""
-    total = cost + table.bin[row, b, d]
+    total = step.cost + table.bin[step.row, b, d]
     if total < limit:
-        m = inst.bins.shape[0]
-        offer(nodes, (left << PLACE_BITS) | (b * m + d), cost, total, parent)
+        place = b * inst.bins.shape[0] + d
+        offer(nodes, (step.left << PLACE_BITS) | place, step.cost, total, step.parent)
 
 
 @kernel
-def offer_second(
-    inst: Instance,
-    table: Table,
-    nodes: Nodes,
-    left: int,
-    row: int,
-    j: int,
-    d: int,
-    cost: int,
-    limit: int,
-    parent: int,
-) -> None:
-    """Pick j, reached at a cost with one for d in hand, and offer both ways on; `left` and `row` have j."""
+def offer_second(inst: Instance, table: Table, nodes: Nodes, step: Step, j: int, d: int, limit: int) -> None:
+    """Pick j with one for d in hand, and offer the state at either bin; the step ends at j, before the pick."""
     c = inst.home[j]
-    left, row = left ^ (1 << j), row - table.stride[j]
-    cost += table.multipliers[j]
-    offer_bin(inst, table, nodes, left, row, d, c, cost + inst.to_bin[j, d], limit, parent)
+    left, row = step.left ^ (1 << j), step.row - table.stride[j]
+    cost = step.cost + table.multipliers[j]
+    first = Step(left, row, cost + inst.to_bin[j, d], step.parent)
+    offer_bin(inst, table, nodes, first, d, c, limit)
     if c != d:
-        offer_bin(inst, table, nodes, left, row, c, d, cost + inst.to_bin[j, c], limit, parent)
+        second = Step(left, row, cost + inst.to_bin[j, c], step.parent)
+        offer_bin(inst, table, nodes, second, c, d, limit)
 
 
 @kernel
-def offer_only(
-    inst: Instance,
-    table: Table,
-    nodes: Nodes,
-    left: int,
-    row: int,
-    i: int,
-    cost: int,
-    limit: int,
-    parent: int,
-) -> None:
-    """Pick i, reached at a cost with empty hands, and offer the state there; `left` and `row` have i."""
-    m = inst.bins.shape[0]
-    cost += table.multipliers[i]
-    total = cost + table.object[row - table.stride[i], i]
+def offer_only(inst: Instance, table: Table, nodes: Nodes, step: Step, i: int, limit: int) -> None:
+    """Pick i with empty hands, and offer the state there; the step ends at i, before the pick."""
+    cost = step.cost + table.multipliers[i]
+    total = cost + table.object[step.row - table.stride[i], i]
     if total < limit:
-        offer(nodes, ((left ^ (1 << i)) << PLACE_BITS) | (m * m + i), cost, total, parent)
+        place = inst.bins.shape[0] ** 2 + i
+        offer(nodes, ((step.left ^ (1 << i)) << PLACE_BITS) | place, cost, total, step.parent)
 
 
 @kernel
 def offer_roots(inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int) -> None:
     """Put the states that can follow the root into the first two layers."""
     n = inst.home.size
-    everything, row = (1 << n) - 1, table.bin.shape[0] - 1
+    left, row = (1 << n) - 1, table.bin.shape[0] - 1
     if inst.carried.size == 0:
         for i in range(n):
-            offer_only(inst, table, after, everything, row, i, inst.root[i], limit, NO_PARENT)
+            step = Step(left, row, int(inst.root[i]), NO_PARENT)
+            offer_only(inst, table, after, step, i, limit)
         return
-    d = inst.carried[0]
-    other = inst.carried[inst.carried.size - 1]
-    offer_bin(inst, table, here, everything, row, d, other, inst.root_bin[d], limit, NO_PARENT)
+    d, other = inst.carried[0], inst.carried[inst.carried.size - 1]
+    offer_bin(inst, table, here, Step(left, row, int(inst.root_bin[d]), NO_PARENT), d, other, limit)
     if inst.carried.size == 2:
-        offer_bin(inst, table, here, everything, row, other, d, inst.root_bin[other], limit, NO_PARENT)
+        offer_bin(inst, table, here, Step(left, row, int(inst.root_bin[other]), NO_PARENT), other, d, limit)
         return
     for j in range(n):
-        offer_second(inst, table, after, everything, row, j, d, inst.root[j], limit, NO_PARENT)
+        offer_second(inst, table, after, Step(left, row, int(inst.root[j]), NO_PARENT), j, d, limit)
 
 
 def expand(
@@ -144,7 +130,9 @@ def expand(
         if deadline.over():
             return None
         last = min(size, first + SLICE)
-        after, dropped, count, end = expand_empty(inst, table, here, after, limit, width, first, last, end)
+        after, dropped, count, ending = expand_empty(inst, table, here, after, limit, width, first, last)
+        if ending >= 0 and (end < 0 or here.cost[ending] < here.cost[end]):
+            end = ending
         smallest, expanded = min(smallest, dropped), expanded + count
     return Expanded(here, after, smallest, expanded, end)
 
@@ -173,36 +161,30 @@ def expand_carrying(
             home_leg = inst.bins[b, d]
         left = here.key[k] >> PLACE_BITS
         row = row_of(table, left)
-        offer_bin(inst, table, here, left, row, d, d, here.cost[k] + home_leg, limit, 2 * k + 1)
+        step = Step(left, row, int(here.cost[k] + home_leg), 2 * k + 1)
+        offer_bin(inst, table, here, step, d, d, limit)
         if after.size[0] + 2 * n > after.key.size:
             after, dropped = with_room_among(after, 2 * n, width)
             smallest = min(smallest, dropped)
         for j in range(n):
             if (left >> j) & 1:
                 leg = inst.between[i, j] if i >= 0 else inst.from_bin[b, j]
-                offer_second(inst, table, after, left, row, j, d, here.cost[k] + leg, limit, 2 * k)
+                step = Step(left, row, int(here.cost[k] + leg), 2 * k)
+                offer_second(inst, table, after, step, j, d, limit)
     return after, smallest, expanded
 
 
 @kernel
 def expand_empty(
-    inst: Instance,
-    table: Table,
-    here: Nodes,
-    after: Nodes,
-    limit: int,
-    width: int,
-    first: int,
-    last: int,
-    end: int,
+    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
 ) -> tuple[Nodes, int, int, int]:
     """Offer what follows states with empty hands, numbers `first` to `last`.
 
     Returns:
-        As for those with one in hand, and the index of the end of the shortest complete tour so far.
+        As for those with one in hand, and the index of the end of the shortest complete tour, -1 if there is none.
     """
     n, m = inst.to_bin.shape
-    smallest, expanded = INFINITE, 0
+    smallest, expanded, end = INFINITE, 0, -1
     for k in range(first, last):
         place = here.key[k] & ((1 << PLACE_BITS) - 1)
         b = place // m
@@ -218,5 +200,6 @@ def expand_empty(
             smallest = min(smallest, dropped)
         for i in range(n):
             if (left >> i) & 1:
-                offer_only(inst, table, after, left, row, i, here.cost[k] + inst.from_bin[b, i], limit, 2 * k)
+                step = Step(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
+                offer_only(inst, table, after, step, i, limit)
     return after, smallest, expanded, end

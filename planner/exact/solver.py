@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from planner.certificate import Certificate, Proof
 from planner.exact.deadline import Deadline
-from planner.exact.full_table import SMALL_TABLE, Found, by_table, full_table_bytes
+from planner.exact.full_table import SMALL_TABLE, Solution, by_table, full_table_bytes
 from planner.exact.general import best_first
 from planner.exact.groups import BIN_ROWS
 from planner.exact.instance import Instance, make_instance, to_visits
@@ -25,7 +25,7 @@ TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
 DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables, for what is planned again and again
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
 PROVABLE = 14  # objects; with more of them that search has no hope
-LONGEST = 1 << 27  # units; tours beyond this would overflow 32 bits
+MAX_LENGTH = 1 << 27  # units; tours beyond this would overflow 32 bits
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class ExactSolver:
     def applies(self, problem: RoutingProblem, metric: NDArray[np.int64]) -> bool:
         """Whether table and search apply: capacity two, up to 40 objects, true distances; `metric` is their closure."""
         n = len(problem.shipments)
-        small = n <= 40 and int(metric.max()) * (2 * n + 2) <= LONGEST
+        small = n <= 40 and int(metric.max()) * (2 * n + 2) <= MAX_LENGTH
         return problem.capacity == 2 and small and is_metric(problem.distances, metric)
 
     def table_fits(self, instance: Instance) -> bool:
@@ -123,7 +123,7 @@ class ExactSolver:
         size = full_table_bytes(instance)
         tabled = size <= min(self.table_bytes, seconds * TABLE_RATE)
         if tabled and (table_at_once or size <= SMALL_TABLE):
-            found: Iterable[Found] = [by_table(instance)]
+            found: Iterable[Solution] = [by_table(instance)]
         else:
             start = None if warm is None else warm.numbered(problem.names[: len(problem.shipments)])
             found = self._search(instance, seed, limit, started, tabled=tabled, start=start)
@@ -165,7 +165,7 @@ class ExactSolver:
         *,
         tabled: bool,
         start: Start | None,
-    ) -> Iterator[Found]:
+    ) -> Iterator[Solution]:
         """Ever better tours and bounds: annealed, then by the full table or by passes of the search."""
         from planner.exact.widening import widening  # brings the compiled kernels, which take 0.5 s to load
 

@@ -8,10 +8,10 @@ from planner.certificate import Certificate, Proof
 from planner.exact.annealing import anneal, anneal_from, tour_actions, warm_order
 from planner.exact.beam import beam_pass
 from planner.exact.deadline import NEVER, Deadline
-from planner.exact.full_table import Found
+from planner.exact.full_table import Solution
 from planner.exact.groups import BIN_ROWS
 from planner.exact.instance import Instance
-from planner.exact.multipliers import Bound, first_bound, grown, told_apart, warm_bound
+from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
 from planner.exact.warm_start import Start
 
 ANNEALING_MOVES = 20_000
@@ -27,7 +27,7 @@ def widening(
     deadline: Deadline,
     passes: tuple[tuple[int, int], ...],
     start: Start | None,
-) -> Iterator[Found]:
+) -> Iterator[Solution]:
     """Yield a first tour and bound, then what each pass of the search makes of them.
 
     Args:
@@ -53,7 +53,7 @@ def widening(
         lower = max(lower, narrow.lower)
         if narrow.actions is not None:
             upper, actions = narrow.upper, narrow.actions
-    yield Found(actions, min(lower, upper), _certificate(bound))
+    yield Solution(actions, min(lower, upper), _certificate(bound))
     done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
     for rows, wanted in passes:
         # A pass given up proves nothing, and one hardly wider than the last one little.
@@ -61,7 +61,7 @@ def widening(
         if lower >= upper or width < min(wanted, done + 1) or deadline.over():
             break
         if rows >= BIN_ROWS and not by_bin:  # once: later, the bound has outgrown so few rows
-            bound, by_bin = told_apart(bound, upper, BIN_ROWS, deadline), True
+            bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)
         work -= result.expanded
@@ -69,7 +69,7 @@ def widening(
         lower = max(lower, bound.root, result.lower)
         if result.actions is not None:
             upper, actions = result.upper, result.actions
-        yield Found(actions, min(lower, upper), _certificate(bound))
+        yield Solution(actions, min(lower, upper), _certificate(bound))
 
 
 def _certificate(bound: Bound) -> Certificate:
