@@ -30,7 +30,7 @@ def benchmark(name: str, folder: Path = FOLDER) -> ModuleType:
     """Load the benchmark called `name`.
 
     Raises:
-        ConfigError: There is no source checkout, no such benchmark, or the module is none.
+        ConfigError: There is no source checkout, no such benchmark, or the module is not a benchmark.
     """
     names = benchmark_names(folder)
     if not names:
@@ -47,10 +47,10 @@ def benchmark(name: str, folder: Path = FOLDER) -> ModuleType:
 
 
 def load(path: Path) -> ModuleType:
-    """Load a module of a folder that is no package.
+    """Load a module from a file outside of any package.
 
     Raises:
-        ConfigError: That is no file of a module.
+        ConfigError: The file is not a Python module.
     """
     spec = importlib.util.spec_from_file_location(f"{path.parent.name}.{path.stem}", path)
     if spec is None or spec.loader is None:

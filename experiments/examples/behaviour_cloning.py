@@ -85,13 +85,8 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
     house = House.load()
     sensors = (breadcrumb_sensor(house),) if settings.breadcrumbs else ()
     environment = make_environment(settings.episodes, 30.0, sensors)
-    model = PPO(
-        "MultiInputPolicy",
-        environment,
-        policy_kwargs={"net_arch": [256, 256], "activation_fn": torch.nn.ReLU},
-        seed=settings.seed,
-        device="cpu",
-    )
+    network = {"net_arch": [256, 256], "activation_fn": torch.nn.ReLU}
+    model = PPO("MultiInputPolicy", environment, policy_kwargs=network, seed=settings.seed, device="cpu")
 
     def driver(observation: ObservationDict) -> NDArray[np.float32]:
         action, _ = model.predict(observation, deterministic=True)
@@ -106,20 +101,15 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
     gathered: list[Demonstrations] = []
     for number in range(settings.rounds + 1):
         started = time.perf_counter()
-        shown = demonstrate(
-            environment.core,
-            house,
-            seeds=range(settings.episodes),
-            rng=rng,
-            driver=driver if number else None,
-            noise=0.0 if number else 0.15,
-        )
+        who, acts, noise = ("policy", driver, 0.0) if number else ("expert", None, 0.15)
+        seeds = range(settings.episodes)
+        shown = demonstrate(environment.core, house, seeds=seeds, rng=rng, driver=acts, noise=noise)
         gathered.append(shown)
         loss = fit(model, gathered, epochs=settings.epochs, rng=rng)
-        who = "learner" if number else "demonstrator"
+        samples, seconds = sum(len(d.actions) for d in gathered), time.perf_counter() - started
         console.print(
-            f"round {number}: the {who} delivered {shown.delivered:.0%}; {sum(len(d.actions) for d in gathered)} rows, "
-            f"loss {loss:.4f}, {time.perf_counter() - started:.0f} s"
+            f"round {number}: the {who} delivered {shown.delivered:.0%}; "
+            f"{samples} samples, loss {loss:.4f}, {seconds:.0f} s"
         )
     after = evaluated("after")
     environment.close()

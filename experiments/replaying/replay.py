@@ -127,9 +127,9 @@ def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[
     path = stack.enter_context(replacing(film.path))
     config, scene, house = film.config, replayer.scene, replayer.house
     if film.camera == FIRST_PERSON:
-        glasses = stack.enter_context(FirstPersonRenderer(scene, house, config))
+        renderer = stack.enter_context(FirstPersonRenderer(scene, house, config))
         video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))
-        return Filming(glasses, video), video
+        return Filming(renderer, video), video
     camera = camera_path(film.camera, house.bounds, config.width / config.height, film.eye, film.target)
     video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))
     return stack.enter_context(ExternalViewer(scene, config, camera, video)), video
