@@ -1,4 +1,4 @@
-"""A body that walks without physics, as one array: what is at which index."""
+"""Layout of the array that holds a body without physics."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from mjsim.model import avatar
 X, Y, HEADING, PITCH = 0, 1, 2, 3  # m, m, rad (unwrapped), rad
 VX, VY, TURN_RATE, PITCH_RATE = 4, 5, 6, 7  # in the house frame, m/s, rad/s
 FORWARD, LEFT, TURN, LOOK = 8, 9, 10, 11  # commanded: m/s and rad/s in the body frame; pitch of the head, rad
-SERVO = 12  # first of four: what x, y, yaw and pitch were told last, in the house frame
+SERVO = 12  # first of four: the latest commands of x, y, yaw and pitch, in the house frame
 BODY_SIZE = 16
 
 

@@ -1,12 +1,18 @@
 """Hands, statuses and events of an episode, in whatever tier it runs."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mjsim.actions import EventKind, WorldEvent
 from mjsim.errors import StateError
 from mjsim.health.monitor import HealthState
 from mjsim.inventory import Inventory
+from mjsim.model import avatar
 from mjsim.model.scene import Scene
-from mjsim.observation import ObjectStatus
+from mjsim.observation import ObjectStatus, Observation
 from mjsim.world_state import PersonState, StateDetails
+
+Floats = NDArray[np.float64]
 
 
 class EpisodeState:
@@ -57,6 +63,34 @@ class EpisodeState:
         """A delivered object has left its receptacle."""
         self.status[item] = ObjectStatus.LOOSE
         self.report(time, EventKind.DISLODGED, item, self._targets[self._index.names[item]])
+
+    def observation(
+        self, time: float, person: Floats, velocity: Floats, objects: tuple[Floats, Floats], *, busy: bool
+    ) -> Observation:
+        """The present state.
+
+        Args:
+            time: Simulated time, s.
+            person: x, y, yaw and pitch of the head, m and rad, shape (4,).
+            velocity: Planar velocity in the house frame, m/s, shape (2,).
+            objects: Origins, m, shape (n, 3), and orientations wxyz, shape (n, 4).
+            busy: Whether a pick or place is under way.
+        """
+        x, y, heading, pitch = person.tolist()
+        return Observation(
+            time=time,
+            position=np.array([x, y]),
+            heading=heading,
+            pitch=pitch,
+            eye=np.array(avatar.eye_position(x, y, heading, pitch)),
+            velocity=velocity.copy(),
+            object_names=self._index.names,
+            object_positions=objects[0],
+            object_quaternions=objects[1],
+            object_status=tuple(self.status),
+            hands=self.inventory.hands,
+            busy=busy,
+        )
 
     def details(self, health: HealthState, person: PersonState | None = None) -> StateDetails:
         """Hands and statuses as part of a world's state."""

@@ -177,22 +177,8 @@ class Full(Tier):
 
     def observation(self) -> Observation:
         """The present state."""
-        rig, index = self.person.rig, self.scene.index
-        positions, quaternions = index.poses(self.data.qpos)
-        return Observation(
-            time=self.time,
-            position=rig.position,
-            heading=rig.heading,
-            pitch=rig.pitch,
-            eye=rig.eye,
-            velocity=rig.planar_velocity,
-            object_names=index.names,
-            object_positions=positions,
-            object_quaternions=quaternions,
-            object_status=tuple(self.episode_state.status),
-            hands=self.episode_state.inventory.hands,
-            busy=self.busy,
-        )
+        rig, objects = self.person.rig, self.scene.index.poses(self.data.qpos)
+        return self.episode_state.observation(self.time, rig.pose[:4], rig.rates[:2], objects, busy=self.busy)
 
     def state_hash(self) -> int:
         """64 bits that differ whenever the state of the physics differs (up to chance)."""

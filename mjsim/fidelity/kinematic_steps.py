@@ -54,7 +54,7 @@ class KinematicModel(NamedTuple):
         loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
         postures: Where an empty left hand belongs (`REST`), and one that holds something while walking (`CARRY`),
             turning (`TUCKED`) or when the other hand reaches (`ASIDE`), m, shape (4, 3).
-        clearance: Clearance at the heights of what is carried.
+        clearance: Clearance at the heights of carried objects.
         timestep: Of the physics, s.
         compliance: Compliance offsets of the hands, which touch nothing: all 0, m, shape (2, 2).
         goals: Scratch space for the goals of the hands, m, shape (2, 3).
@@ -86,10 +86,10 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
     """One control step with the present commands.
 
     Args:
-        state: Changed.
+        state: Changed in place.
         posture: Row of `KinematicModel.postures` for hands that hold something.
         moving: Hand that stays where it was put, or -1.
-        model: What does not change.
+        model: Everything that stays the same.
     """
     vector = state.vector
     body = vector[BODY:HANDS]

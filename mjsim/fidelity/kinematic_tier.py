@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.actions import IDLE, Action, ActionResult, Move, WorldEvent
-from mjsim.fidelity.body_state import HEADING, PITCH, VX, VY, X, Y
+from mjsim.fidelity.body_state import PITCH, VX, VY, X
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_world import KinematicWorld
 from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.fidelity.motion_planner import MotionPlanner, PlannedMotion
 from mjsim.fidelity.tier import Tier
 from mjsim.health.values import Health, HealthSample
-from mjsim.model import avatar
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
@@ -150,21 +149,8 @@ class KinematicTier(Tier):
     def observation(self) -> Observation:
         """The present state."""
         body, poses = self._kinematic.body, self._kinematic.state.poses.copy()
-        x, y, heading, pitch = body[[X, Y, HEADING, PITCH]].tolist()
-        return Observation(
-            time=self.time,
-            position=np.array([x, y]),
-            heading=heading,
-            pitch=pitch,
-            eye=np.array(avatar.eye_position(x, y, heading, pitch)),
-            velocity=body[[VX, VY]],
-            object_names=self._full.scene.index.names,
-            object_positions=poses[:, :3],
-            object_quaternions=poses[:, 3:],
-            object_status=tuple(self.episode_state.status),
-            hands=self.episode_state.inventory.hands,
-            busy=self.busy,
-        )
+        person, velocity, objects = body[X : PITCH + 1], body[VX : VY + 1], (poses[:, :3], poses[:, 3:])
+        return self.episode_state.observation(self.time, person, velocity, objects, busy=self.busy)
 
     def state_hash(self) -> int:
         """64 bits that differ whenever the state differs (up to chance)."""

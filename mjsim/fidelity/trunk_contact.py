@@ -22,12 +22,12 @@ _TOUCHING = 1e-7  # m
 
 
 class Floor(NamedTuple):
-    """Outlines of what the trunk meets, with a grid that says which are near; for kernels.
+    """Outlines of the obstacles of the trunk, with a grid to look up the near ones; for kernels.
 
     Attributes:
         edges: Edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, shape (e, 5).
         first: Polygon p has the edges `first[p]` to `first[p + 1]`, shape (p + 1,).
-        boxes: Each polygon's least and largest x, and least and largest y, m, shape (p, 4).
+        boxes: Each polygon's smallest and largest x, and smallest and largest y, m, shape (p, 4).
         near: Polygons that may touch the trunk, cell by cell.
         near_first: Cell i, j has the entries of `near` from `near_first[i * columns + j]`, shape (cells + 1,).
         origin_x, origin_y: Corner of cell 0, 0, m.
@@ -106,7 +106,7 @@ def is_free(x: float, y: float, reach_x: float, reach_y: float, radius: float, f
 
 @kernel
 def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
-    """Which entries of `Floor.near` are those of a point's cell."""
+    """First and last entry of `Floor.near` for the cell of a point."""
     i, j = math.floor((x - floor.origin_x) / _CELL), math.floor((y - floor.origin_y) / _CELL)
     if not (0 <= i < floor.rows and 0 <= j < floor.columns):
         return 0, 0
