@@ -122,11 +122,6 @@ class Rig:
         return float(self.pose[3])
 
     @property
-    def planar_velocity(self) -> Vector:
-        """Velocity in the house frame, m/s, shape (2,)."""
-        return self.rates[:2].copy()
-
-    @property
     def speed(self) -> float:
         """How fast the body walks, m/s."""
         return math.hypot(self.rates[0], self.rates[1])
