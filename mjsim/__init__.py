@@ -2,7 +2,7 @@
 
 The names below are the public surface: semantic versioning covers them, what their docstrings and `docs/` say of them,
 the command line, and the files that it writes. Each is loaded at its first use; `import mjsim` loads none of the
-simulator. It only makes `gymnasium.make("mjsim/Rearrange-v0")` known to Gymnasium.
+simulator. The Gymnasium environment is `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0")`.
 
     catalogue = mjsim.Catalogue.load("apartment")
     episode = mjsim.sample_episode(catalogue, objects=12, seed=3)
@@ -11,8 +11,6 @@ simulator. It only makes `gymnasium.make("mjsim/Rearrange-v0")` known to Gymnasi
 """
 
 from typing import TYPE_CHECKING
-
-from mjsim.environments.registration import register_when_gymnasium_loads
 
 __all__ = [
     "IDLE",
@@ -72,6 +70,3 @@ else:  # hidden from type checkers, which would otherwise accept any name
 
     def __dir__():
         return sorted({*globals(), *__all__})
-
-
-register_when_gymnasium_loads()

@@ -22,7 +22,7 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.world import World
 
 FORWARD, PICK, PLACE = MOVES.index("forward"), MOVES.index("pick"), MOVES.index("place")
-ID = "mjsim/Rearrange-v0"
+ID = "mjsim.environments:mjsim/Rearrange-v0"
 
 
 def within_reach(catalogue: Catalogue, seed: int = 0) -> Episode:

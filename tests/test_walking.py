@@ -200,11 +200,11 @@ def follow_in_numpy(path, position, heading, things, is_free):
 
 
 def is_no_tie(path, position):
-    """Rounding decides between two ways back to a path that are equally near."""
+    """Rounding decides between two points of a path that are equally near."""
     arc, gap = nearest_in_numpy(path, position)
-    dense = np.linspace(0, polyline(path)[1][-1], 500)
+    dense, spacing = np.linspace(0, polyline(path)[1][-1], 500, retstep=True)
     gaps = [np.linalg.norm(along_in_numpy(path, a) - position) for a in dense]
-    return all(g > gap + 1e-4 or abs(a - arc) < 0.1 for a, g in zip(dense, gaps, strict=True))
+    return all(g > gap + spacing + 1e-4 or abs(a - arc) < 0.1 for a, g in zip(dense, gaps, strict=True))
 
 
 @PATIENT

@@ -12,7 +12,7 @@ from rich.table import Table
 
 import mjsim  # noqa: F401 - registers the environment
 
-ID = "mjsim/Rearrange-v0"
+ID = "mjsim.environments:mjsim/Rearrange-v0"
 SECONDS = 3.0
 SETTINGS: dict[str, dict[str, Any]] = {
     "one number": {"observations": ("remaining",)},

@@ -59,7 +59,7 @@ class Settings:
 def make_environment(episodes: int | None, time_limit: float, sensors: Sequence[Sensor] = ()) -> RearrangeEnv:
     """An environment with one object and 8 actions per second; `sensors` are added to the state."""
     made = gymnasium.make(
-        "mjsim/Rearrange-v0",
+        "mjsim.environments:mjsim/Rearrange-v0",
         objects=1,
         observations=("state", *sensors),
         actions=Continuous(repeat=3),

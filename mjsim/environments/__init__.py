@@ -2,7 +2,13 @@
 
     sensors ─┐
     control ─┼─> Rearrangement (core) ─> RearrangeDmEnvironment   mjsim.make(...)
-    reward  ─┘                        └> RearrangeEnv             gymnasium.make("mjsim/Rearrange-v0", ...)
+    reward  ─┘                        └> RearrangeEnv             gymnasium.make("mjsim.environments:mjsim/Rearrange-v0")
 
-This package itself imports nothing; import the modules that you need.
+Importing it registers the Gymnasium environment, as Gymnasium expects of packages with environments.
 """
+
+from gymnasium.envs.registration import register
+
+ENVIRONMENT_ID = "mjsim/Rearrange-v0"
+
+register(ENVIRONMENT_ID, entry_point="mjsim.environments.gymnasium_environment:RearrangeEnv")

@@ -18,7 +18,7 @@ RENDER_SIZE = (640, 480)  # px
 
 
 class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
-    """The task behind Gymnasium's interface; `gymnasium.make("mjsim/Rearrange-v0", objects=6, ...)`.
+    """The task behind Gymnasium's interface; `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0", objects=6)`.
 
     `reset(seed=s)` begins the episode of seed s, the house that `mjsim house --seed s` writes, and seeds the
     generator of later episodes.
