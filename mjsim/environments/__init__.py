@@ -2,7 +2,7 @@
 
     sensors ─┐
     control ─┼─> Rearrangement (core) ─> RearrangeDmEnvironment   mjsim.make(...)
-    reward  ─┘                        └> RearrangeEnv             gymnasium.make("mjsim.environments:mjsim/Rearrange-v0")
+    reward  ─┘                        └> RearrangeEnv             gymnasium.make(...)
 
 Importing it registers the Gymnasium environment, as Gymnasium expects of packages with environments.
 """
