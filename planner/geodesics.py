@@ -4,7 +4,6 @@ The path is the shortest among the inflated obstacle polygons, to the 0.1 mm of 
 grid cells: a grid overestimates distances by several percent.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -78,19 +77,19 @@ class Geodesics:
         straight = float(direct_distances(points[:1], points[1:], self._graph.walls)[0, 0])
         if np.isfinite(straight) and islands[0] == islands[1]:
             return ShortestPath(points, straight)
-        query, (first, last) = self._query(points, islands), points
+        query = self._query(points, islands)
         from_a, before = dijkstra(
             self._with_sources(query, 1), indices=[self._size], return_predecessors=True
         )
         total, corner = join(from_a[:, : self._size], query.starts[1:], query.seen, query.lengths)
         if not np.isfinite(total[0, 0]):
-            raise _unreachable(first, last)
-        corners = [last]
-        vertex = int(corner[0, 0])
+            raise _unreachable(points[0], points[1])
+        corners, vertex = [], int(corner[0, 0])
         while vertex != self._size:
-            corners.append(self._graph.vertices[vertex, :2])
+            corners.append(vertex)
             vertex = int(before[0, vertex])
-        return ShortestPath(_without_repeats(np.array([*corners, first])[::-1]), float(total[0, 0]))
+        path = np.concatenate([points[:1], self._graph.vertices[corners[::-1], :2], points[1:]])
+        return ShortestPath(_without_repeats(path), float(total[0, 0]))
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
         """Geodesic distances between all pairs of points (m, 2), m; (m, m), symmetric, zero diagonal, m.
@@ -187,12 +186,6 @@ class Geodesics:
         if lost.size:
             raise _unreachable(sources.points[lost[0][0]], targets.points[lost[0][1]])
         return result
-
-
-def path_length(points: ArrayLike | Sequence[ArrayLike]) -> float:
-    """Length of a polyline (k, 2), m."""
-    steps = np.diff(np.asarray(points, dtype=np.float64), axis=0)
-    return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
 def _unreachable(a: NDArray[np.float64], b: NDArray[np.float64]) -> UnreachableError:

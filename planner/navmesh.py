@@ -189,7 +189,7 @@ class NavMesh:
         """Entry of `cells` for a point, m; that of the nearest cell outside the grid."""
         x_min, y_min, size, rows, columns = self.frame
         row, column = int((y - y_min) / size), int((x - x_min) / size)
-        return int(self.cells[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)])
+        return int(self.cells.item(min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)))
 
 
 def _cells(frame: Frame, islands: NDArray[np.object_], outer: NDArray[np.object_]) -> NDArray[np.int32]:
@@ -225,9 +225,11 @@ def _polygons(geometry: shapely.Geometry) -> list[Polygon]:
 
 def _point(point: ArrayLike) -> tuple[float, float]:
     array = np.asarray(point, dtype=np.float64)
-    if array.shape != (2,) or not np.isfinite(array).all():
-        raise NotNavigableError(f"a position must be two finite numbers, got {point!r}")
-    return float(array[0]), float(array[1])
+    if array.shape == (2,):
+        x, y = array.tolist()
+        if math.isfinite(x) and math.isfinite(y):
+            return x, y
+    raise NotNavigableError(f"a position must be two finite numbers, got {point!r}")
 
 
 def _box(bounds: Sequence[float]) -> Polygon:

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra, floyd_warshall
 
+import planner.geodesics
 from planner.errors import NotNavigableError, UnreachableError
-from planner.geodesics import Geodesics, path_length
+from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
+from planner.polyline import path_length
 
 BOUNDS = (0.0, 0.0, 4.0, 4.0)
 seeds = st.integers(0, 2**32 - 1)
@@ -163,6 +165,16 @@ def test_distances_are_a_metric_and_paths_have_their_length(seed):
         assert not shapely.LineString(path.points).intersects(mesh.solid)
         back = geodesics.shortest_path(points[j], points[i])
         assert back.geodesic_distance == pytest.approx(d[i, j], abs=1e-9)
+
+
+def test_what_is_remembered_changes_no_distance(monkeypatch):
+    mesh = NavMesh.build(random_field(3), BOUNDS, agent_radius=0.2)
+    points = mesh.sample(np.random.default_rng(3), 12)
+    expected = Geodesics(mesh).distances(points)
+    monkeypatch.setattr(planner.geodesics, "MAX_REMEMBERED", 5)
+    geodesics = Geodesics(mesh)
+    for _ in range(2):
+        np.testing.assert_array_equal(geodesics.distances(points), expected)
 
 
 def test_a_blocked_way_is_a_typed_answer_that_names_both_ends():
