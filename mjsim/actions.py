@@ -99,7 +99,7 @@ class ActionResult:
 
 
 class EventKind(enum.Enum):
-    """What happened in the physics: the outcome of a begun motion, bad luck, or an escape (docs/health.md)."""
+    """What happened in the physics: outcome of a motion, object lost or dislodged, or an anomaly (docs/health.md)."""
 
     PICKED = "picked"
     PICK_FAILED = "pick_failed"

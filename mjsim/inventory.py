@@ -1,4 +1,4 @@
-"""The knapsack of capacity two, as what it is here: two hands (PAPER section 3.3)."""
+"""The contents of the two hands: the knapsack of capacity two of PAPER section 3.3."""
 
 from dataclasses import dataclass, replace
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 class ObjectStatus(enum.Enum):
-    """Where an object is in its life."""
+    """Whether an object is on the floor, in a hand or in its receptacle."""
 
     LOOSE = "loose"
     CARRIED = "carried"
@@ -17,7 +17,7 @@ class ObjectStatus(enum.Enum):
 
 @dataclass(frozen=True)
 class Observation:
-    """Live poses of the person and of every object.
+    """Current poses of the person and of every object.
 
     Attributes:
         time: Simulated time since reset, s.

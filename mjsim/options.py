@@ -12,7 +12,7 @@ REST_STEPS = 4  # control steps in a row below `settle_speed`, after which an ob
 
 @dataclass(frozen=True)
 class WorldOptions:
-    """Limits of walking, reach and grip, and how much of it all is physics.
+    """Limits of walking, reach and grip, and the tier of fidelity.
 
     Attributes:
         control_timestep: Duration of one `World.step`, s; a multiple of the model's timestep.
@@ -30,7 +30,7 @@ class WorldOptions:
         settle_speed: Slower than this is at rest, m/s.
         volume_margin: How far outside of a receptacle's volume a centre still counts as inside, m.
         fidelity: `full`, everything in physics; `windows`, physics while something is picked or placed, and
-            kinematic walking in between; `event`, kinematic throughout, but for the fall of what is let go
+            kinematic walking in between; `event`, kinematic except for the fall of released objects
             (docs/fidelity.md).
 
     Raises:

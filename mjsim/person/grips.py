@@ -12,7 +12,7 @@ from mjsim.model import avatar
 from mjsim.model.scene import Scene
 from mjsim.person.rig import Rig, find_id
 
-AWAKE = -11  # in `MjData.tree_asleep`: for ten steps of the physics at least
+AWAKE = -11  # value of `MjData.tree_asleep` that keeps a tree awake for ten physics steps or more
 
 
 GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and grip, per hand
@@ -45,7 +45,7 @@ class Grips:
         self.reset()
 
     def nearest_grip(self, hand: int, item: int) -> int:
-        """Grip of object `item` that has to be turned least to align with a hand: 0 or 1."""
+        """Grip of object `item` that a hand reaches with the smaller turn: 0 or 1."""
         return self.grip_along(item, self._data.site_xmat[self._hand_sites[hand], 0::3])
 
     def grip_along(self, item: int, forward: NDArray[np.float64]) -> int:
@@ -68,7 +68,7 @@ class Grips:
         self._update()
 
     def open(self, hand: int) -> None:
-        """Let go of what a hand holds, if anything."""
+        """Release what a hand holds, if anything."""
         held = self._held[hand]
         if held is not None:
             self._data.eq_active[self._welds[hand, held[0], held[1]]] = 0

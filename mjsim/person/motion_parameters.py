@@ -23,7 +23,7 @@ class MotionParameters(NamedTuple):
         least_travel: A hand does not travel over less than this, m.
         travel_speed: Speed of a hand that carries a load over a receptacle, m/s.
         descent_speed: Speed of a hand that lowers a load, m/s.
-        hover_gap: From a load on its way to what it passes over, m.
+        hover_gap: From a travelling load to whatever it passes over, m.
         hover_time: Above the slot before the descent, s.
         release_gap: From a load to what is below it when the hand opens, m.
         withdraw_steps: Control steps in which the opened hand goes straight up.

@@ -42,7 +42,7 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
 
 
 def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
-    """Heading along a side of the receptacle that is nearest to looking at it: held things fit in squarely."""
+    """Heading along a side of the receptacle that is nearest to looking at it: held objects fit in squarely."""
     rig = person.rig
     towards = rig.heading + rig.bearing(receptacle.center)
     side = math.atan2(receptacle.rotation[1, 0], receptacle.rotation[0, 0])

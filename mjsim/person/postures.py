@@ -56,7 +56,7 @@ _ARRIVED = 0.0005  # m
 
 
 class BodyMotion(NamedTuple):
-    """Where the body is, how it is told to move, and what is around it.
+    """Where the body is, its command, and what is around it.
 
     Attributes:
         pose: x, y, heading and more, m and rad, shape (10,) or longer.
@@ -73,7 +73,7 @@ class Hands(NamedTuple):
     """Control of both hands; left before right, in the body frame.
 
     Attributes:
-        targets: Where the servos are told to be, m, shape (2, 3).
+        targets: Commanded positions, m, shape (2, 3).
         velocities: How fast the targets move, m/s, shape (2, 3).
         compliance: Offsets by which the hands give way to contacts, m, shape (2, 2).
         goals: Room for where the hands belong, m, shape (2, 3).
@@ -206,7 +206,7 @@ def drawn_in(forward: float, left: float, radius: float, body: BodyMotion) -> tu
 
 @kernel
 def _clear_throughout(forward: float, left: float, needed: float, body: BodyMotion) -> bool:
-    """Whether the ends alone tell that a load is clear all the way: clearance changes by no more than the distance."""
+    """Whether a load is clear between axis and posture, as the clearance at both ends and their distance tell."""
     length = math.sqrt(forward * forward + left * left)
     for horizon in (0.0, NEAR, FAR):
         axis, _, _ = _room(0.0, 0.0, horizon, body)
@@ -234,7 +234,7 @@ def _sideways(forward: float, left: float, needed: float, body: BodyMotion) -> t
 
 @kernel
 def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tuple[float, float, float]:
-    """Clearance in `horizon` seconds at a place of the body frame, and the way out, in that frame."""
+    """Clearance, m, in `horizon` seconds at a point of the body frame, and the direction of more clearance."""
     pose, command = body.pose, body.command
     forward += command[FORWARD] * horizon
     left += command[LEFT] * horizon
@@ -247,7 +247,7 @@ def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tupl
 
 @kernel
 def _raise_right(goals: Floats, radii: float, height: float) -> None:
-    """Where two held things would meet, pass the right one over the left one."""
+    """Where two held objects would meet, pass the right one over the left one."""
     apart = math.hypot(goals[1, 0] - goals[0, 0], goals[1, 1] - goals[0, 1])
     near = (radii + PASSING - apart) / PASSING
     over = goals[0, 2] + height + OVER_GAP - goals[1, 2]

@@ -1,4 +1,4 @@
-"""The person as servos: where the body is, where it is told to go, and the physics steps in between."""
+"""The person as servos: poses, commands, and the physics steps of one control step."""
 
 import math
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class RigState:
         motion: See `Rig.motion`, shape (4,).
         hand_targets: See `Rig.hand_targets`, m, shape (2, 3).
         previous_hand_targets: Those of the control step before, m, shape (2, 3).
-        command: What the servos were told last: velocities of x, y and yaw, pitch, hand positions, shape (10,).
+        command: Previous commands of the servos: velocities of x, y and yaw, pitch, hand positions, shape (10,).
     """
 
     motion: Vector
@@ -58,14 +58,14 @@ class Rig:
         joints += [f"{avatar.PREFIX}{hand}/{axis}" for hand in avatar.HANDS for axis in "xyz"]
         ids = [find_id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
         actuators = np.array([find_id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in joints])
-        self.pose = _run(data.qpos, model.jnt_qposadr[ids])
-        self.rates = _run(data.qvel, model.jnt_dofadr[ids])
-        self._commands = _run(data.act, model.actuator_actadr[actuators])
-        self._ramps = _run(data.ctrl, actuators)
+        self.pose = _view(data.qpos, model.jnt_qposadr[ids])
+        self.rates = _view(data.qvel, model.jnt_dofadr[ids])
+        self._activations = _view(data.act, model.actuator_actadr[actuators])
+        self._controls = _view(data.ctrl, actuators)
         self.motion = np.zeros(4)
         self.hand_targets = np.zeros((2, 3))
-        self._hand_targets_before = np.zeros((2, 3))
-        self._command = np.zeros(_SERVOS)
+        self._last_hand_targets = np.zeros((2, 3))
+        self._last_command = np.zeros(_SERVOS)
         self.grip_sites = tuple(
             find_id(model, mujoco.mjtObj.mjOBJ_SITE, f"{avatar.PREFIX}{hand}_grip") for hand in avatar.HANDS
         )
@@ -78,23 +78,23 @@ class Rig:
         """Take the commands from the present state: standing still."""
         self.motion[:] = 0.0, 0.0, 0.0, self.pose[3]
         self.hand_targets[:] = self.pose[4:].reshape(2, 3)
-        self._hand_targets_before[:] = self.hand_targets
-        self._command[:3] = 0.0
-        self._command[3:] = self.pose[3:]
-        self._commands[:] = self._command
-        self._ramps[:] = 0.0
+        self._last_hand_targets[:] = self.hand_targets
+        self._last_command[:3] = 0.0
+        self._last_command[3:] = self.pose[3:]
+        self._activations[:] = self._last_command
+        self._controls[:] = 0.0
 
     def get_state(self) -> RigState:
         """The commands as a value."""
-        arrays = (self.motion, self.hand_targets, self._hand_targets_before, self._command)
+        arrays = (self.motion, self.hand_targets, self._last_hand_targets, self._last_command)
         return RigState(*(array.copy() for array in arrays))
 
     def set_state(self, state: RigState) -> None:
         """Go on from commands of `get_state`."""
         self.motion[:] = state.motion
         self.hand_targets[:] = state.hand_targets
-        self._hand_targets_before[:] = state.previous_hand_targets
-        self._command[:] = state.command
+        self._last_hand_targets[:] = state.previous_hand_targets
+        self._last_command[:] = state.command
 
     @property
     def turn(self) -> float:
@@ -158,29 +158,29 @@ class Rig:
     def advance(self) -> None:
         """Step the physics by one control step, ramping the servos from the last commands to the new ones."""
         ramp_servos(
-            self.pose, self.motion, self.hand_targets, self._hand_targets_before, self._command,
-            self._commands, self._ramps, self._dt,
+            self.pose, self.motion, self.hand_targets, self._last_hand_targets, self._last_command,
+            self._activations, self._controls, self._dt,
         )  # fmt: skip
         mujoco.mj_step(self.model, self.data, self._substeps)
 
 
 @kernel
 def ramp_servos(
-    pose: Vector, motion: Vector, targets: Vector, targets_before: Vector, command: Vector,
-    commands: Vector, ramps: Vector, dt: float,
+    pose: Vector, motion: Vector, targets: Vector, last_targets: Vector, last_command: Vector,
+    activations: Vector, controls: Vector, dt: float,
 ) -> None:  # fmt: skip
-    """Set where the servos' commands start and how fast they change, so that they arrive after one control step.
+    """Set where the servos' activations start and how fast they change, so that they arrive after one control step.
 
-    Hands are ramped from where they were told to be, with the lead in force from the first step on.
+    The hands ramp from their previous targets, with the lead applied from the first step on.
 
     Args:
         pose: `Rig.pose`.
         motion: `Rig.motion`.
         targets: `Rig.hand_targets`.
-        targets_before: What they were a control step ago, (2, 3); overwritten.
-        command: What the servos were told last, in the house frame, (10,); overwritten.
-        commands: What they are told now: the actuators' activations, (10,); overwritten.
-        ramps: How fast that changes: the actuators' controls, (10,); overwritten.
+        last_targets: The targets a control step ago, (2, 3); overwritten.
+        last_command: Where the activations ended a control step ago, in the house frame, (10,); overwritten.
+        activations: `MjData.act` of the servos, which position and velocity follow, (10,); overwritten.
+        controls: `MjData.ctrl` of the servos, the rates of change of the activations, (10,); overwritten.
         dt: Control step, s.
     """
     heading = pose[2] + 0.5 * motion[2] * dt
@@ -191,18 +191,18 @@ def ramp_servos(
     end[2], end[3] = motion[2], motion[3]
     for hand in range(2):
         for axis in range(3):
-            lead = (targets[hand, axis] - targets_before[hand, axis]) * (_LEAD / dt)
+            lead = (targets[hand, axis] - last_targets[hand, axis]) * (_LEAD / dt)
             servo = 4 + 3 * hand + axis
             end[servo] = targets[hand, axis] + lead
-            command[servo] = targets_before[hand, axis] + lead
-            targets_before[hand, axis] = targets[hand, axis]
+            last_command[servo] = last_targets[hand, axis] + lead
+            last_targets[hand, axis] = targets[hand, axis]
     for servo in range(_SERVOS):
-        commands[servo] = command[servo]
-        ramps[servo] = (end[servo] - command[servo]) / dt
-        command[servo] = end[servo]
+        activations[servo] = last_command[servo]
+        controls[servo] = (end[servo] - last_command[servo]) / dt
+        last_command[servo] = end[servo]
 
 
-def _run(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
+def _view(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
     """A view of the values at consecutive addresses."""
     first, count = int(addresses[0]), len(addresses)
     if not np.array_equal(addresses, np.arange(first, first + count)):
