@@ -16,19 +16,27 @@ from mjsim.files import replacing, write_text_atomically
 _LEVEL = 3  # of compression
 
 
-def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
+def read_arrays(path: Path, dimensions: Mapping[str, int] | None = None) -> dict[str, NDArray[Any]]:
     """Read every array of an NPZ.
 
+    Args:
+        path: The file.
+        dimensions: Number of dimensions of each array that must be there; None for no check.
+
     Raises:
-        RecordError: The file is missing, cut short or damaged; the message names it.
+        RecordError: The file is missing, cut short, damaged or incomplete; the message names it.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
+            arrays = {name: archive[name] for name in archive.files}
     except FileNotFoundError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise RecordError(f"{path} is cut short or damaged: {error}") from error
+    bad = sorted(n for n, d in (dimensions or {}).items() if n not in arrays or arrays[n].ndim != d)
+    if bad:
+        raise RecordError(f"{path} lacks {', '.join(bad)}, or has them in another shape")
+    return arrays
 
 
 def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:

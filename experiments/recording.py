@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.errors import RecordError
 from experiments.files import read_arrays, save_arrays
 from experiments.records import EventLog
 from mjsim.observation import Observation
@@ -143,12 +142,8 @@ class Recorded:
         Raises:
             RecordError: It is missing, damaged or incomplete; the message names the file.
         """
-        arrays = read_arrays(path)
         names = [field.name for field in dataclasses.fields(cls)]
-        dimensions = {name: 2 if name == "checkpoint_physics" else 1 for name in names}
-        bad = sorted(n for n, d in dimensions.items() if n not in arrays or arrays[n].ndim != d)
-        if bad:
-            raise RecordError(f"{path} lacks {', '.join(bad)}, or has them in another shape")
+        arrays = read_arrays(path, {n: 2 if n == "checkpoint_physics" else 1 for n in names})
         return cls(**{name: arrays[name] for name in names})
 
     def checkpoint(self, number: int) -> WorldState:
