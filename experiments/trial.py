@@ -204,8 +204,8 @@ def _simulate_once(
         video = viewer = None
         if film is not None:
             renderer = stack.enter_context(FirstPersonRenderer(scene, house, film))
-            target = folder / records.VIDEO
-            video = stack.enter_context(VideoWriter(target, width=film.width, height=film.height))
+            writer = VideoWriter(folder / records.VIDEO, width=film.width, height=film.height)
+            video = stack.enter_context(writer)
             viewer = Filming(renderer, video)
         replanner = None
         if config.live:
@@ -241,39 +241,15 @@ def prepare_session(
         rollouts: See `Session`.
         world: A new world of the scene in the trial's fidelity; None to make one.
     """
-    episode = scene.episode
     order_rng, user_rng = (
         np.random.default_rng(s) for s in np.random.SeedSequence([config.seed, _SESSION]).spawn(2)
     )
-    names = [o.name for o in episode.objects]
-    order = [names[i] for i in order_rng.permutation(len(names))]
+    order = [scene.index.names[i] for i in order_rng.permutation(len(scene.index.names))]
     world = world or World(scene, WorldOptions(fidelity=config.fidelity))
-    log.append(
-        0.0,
-        "start",
-        format=records.LOG_FORMAT,
-        **provenance(world),
-        **_settings(config),
-        episode_sha256=hashlib.sha256(episode.to_json().encode()).hexdigest(),
-        order=order,
-    )
-    replanner = replanner or Replanner(house.geodesics, solver(config.planner))
-    regrets: Regrets = (LiveRegrets if config.live else Regrets)(house.geodesics)
-    assistant = Assistant(
-        TaskBoard(house, episode, order),
-        assistance=config.assistance,
-        planner=replanner,
-        log=log,
-        regrets=regrets,
-        log_regrets=config.regret,
-    )
-    if config.live:  # what takes long is done before the clock starts
-        state = assistant.task_state(world.observation())
-        route = replanner.prepare(state, seconds=FAMILIARISATION)
-        regrets.prepare(state, route.plan)
+    _log_start(config, world, order, log)
     session = Session(
         world,
-        assistant,
+        _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
         participant(config.user_name)(house, user_rng),
         Recording(world, log),
         walls=house.navmesh.outline,
@@ -282,6 +258,41 @@ def prepare_session(
         rollouts=rollouts,
     )
     return session, world
+
+
+def _log_start(config: TrialConfig, world: World, order: list[str], log: EventLog) -> None:
+    episode = world.scene.episode.to_json().encode()
+    log.append(
+        0.0,
+        "start",
+        format=records.LOG_FORMAT,
+        **provenance(world),
+        **_settings(config),
+        episode_sha256=hashlib.sha256(episode).hexdigest(),
+        order=order,
+    )
+
+
+def _make_assistant(
+    config: TrialConfig, board: TaskBoard, world: World, log: EventLog, replanner: Replanner | None
+) -> Assistant:
+    """The assistant of a trial; for a live one, all that takes long is done before the clock starts."""
+    geodesics = board.house.geodesics
+    replanner = replanner or Replanner(geodesics, solver(config.planner))
+    regrets = LiveRegrets(geodesics) if config.live else Regrets(geodesics)
+    assistant = Assistant(
+        board,
+        assistance=config.assistance,
+        planner=replanner,
+        log=log,
+        regrets=regrets,
+        log_regrets=config.regret,
+    )
+    if config.live:
+        state = assistant.task_state(world.observation())
+        route = replanner.prepare(state, seconds=FAMILIARISATION)
+        regrets.prepare(state, route.plan)
+    return assistant
 
 
 def _settings(config: TrialConfig) -> dict[str, Any]:
