@@ -98,7 +98,7 @@ class Assistant:
         """Plan for the start of the task."""
         self._last_visit_at = observation.position.copy()
         self._plan(observation)
-        self.say("started", observation.time)
+        self.show_message("started", observation.time)
         self.shown_roles = frozenset(marker.role for marker in self.hud_state(observation).markers)
 
     def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
@@ -106,6 +106,7 @@ class Assistant:
         for event in events:
             if event.kind in VISIT_KIND:
                 self._note_visit(observation, event)
+            self.show_message(event.kind.value, observation.time, event.object)
         if events:
             self._plan(observation)
             return
@@ -131,9 +132,9 @@ class Assistant:
         if visit is not None:
             self._path.follow_walk(positions, *self._places(observation, visit))
 
-    def say(self, key: str, time: float, object_name: str | None = None) -> None:
+    def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
         """Put a message about an event or a refusal into the message bar."""
-        self._board.say(key, time, object_name)
+        self._board.show_message(key, time, object_name)
 
     def hud_state(self, observation: Observation, camera: CameraView | None = None) -> HudState:
         """What the HUD shows now; a condition needs the eye camera to point to a goal out of view."""

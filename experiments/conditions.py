@@ -66,7 +66,7 @@ class TaskBoard:
         """Note a successful pick or place."""
         self._done.append(task_step(visit))
 
-    def say(self, key: str, time: float, object_name: str | None = None) -> None:
+    def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
         """Show a message about an event or refusal from `time` s on; it replaces the one before."""
         shown = self._shown(time)
         if shown.key == REPLANNED and time >= shown.since + READING_TIME:

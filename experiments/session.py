@@ -253,7 +253,7 @@ class Session:
     def _end(self, reason: str) -> None:
         """Record the last state; let the viewer see for a moment that all is done. That is not measured."""
         if reason == ALL_DELIVERED:
-            self._assistant.say("finished", self._now.time)
+            self._assistant.show_message("finished", self._now.time)
         self._record(IDLE)
         end = self._now
         while reason == ALL_DELIVERED and self._viewer is not None and self._now.time < end.time + FINAL_HOLD:
@@ -266,8 +266,6 @@ class Session:
         for event in events:
             self._log.append(event.time, event.kind.value, object=event.object, receptacle=event.receptacle)
         self._assistant.observe(self._now, events)
-        for event in events:
-            self._assistant.say(event.kind.value, self._now.time, event.object)
         if events:
             self._delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
 
@@ -279,7 +277,7 @@ class Session:
             time, "attempt", action=kind, object=result.object, applied=result.applied, refusal=refusal
         )
         if refusal is not None:
-            self._assistant.say(refusal, time, result.object)
+            self._assistant.show_message(refusal, time, result.object)
 
     def _hud_state(self) -> HudState:
         """What the HUD shows now; composed once per state, and only when asked for."""

@@ -145,11 +145,9 @@ class Replayer:
             self._replanner.clock = _constant(observation.time)
             for event in events_of_step.get(step, []):
                 if event["event"] == "attempt" and event["refusal"] is not None:
-                    assistant.say(event["refusal"], observation.time, event["object"])
+                    assistant.show_message(event["refusal"], observation.time, event["object"])
             events = [_world_event(e) for e in events_of_step.get(step, []) if e["event"] in WORLD_EVENTS]
             assistant.observe(observation, events)
-            for seen in events:
-                assistant.say(seen.kind.value, observation.time, seen.object)
 
 
 def mismatch_error(directory: Path, start: Event, mismatch: Mismatch, reasons: str = "") -> ReplayError:
