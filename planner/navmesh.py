@@ -75,31 +75,21 @@ class NavMesh:
             raise NavMeshError(f"agent_radius must be >= 0 m, got {agent_radius}")
         if not (math.isfinite(resolution) and resolution > 0):
             raise NavMeshError(f"resolution must be > 0 m, got {resolution}")
-        inflated = shapely.unary_union(
-            shapely.buffer(_hulls(obstacles), agent_radius, quad_segs=ARC_SEGMENTS)
-        )
-        islands = np.array(sorted(_polygons(box.difference(inflated)), key=lambda p: -p.area), dtype=object)
-        inner = shapely.buffer(islands, -SNAP_CLEARANCE, join_style="mitre")
-        islands, inner = (polygons[shapely.area(inner) > 0] for polygons in (islands, inner))
+        hulls = _hulls(obstacles)
+        inflated = shapely.unary_union(shapely.buffer(hulls, agent_radius, quad_segs=ARC_SEGMENTS))
+        islands, inner = _islands(box.difference(inflated))
         if not len(islands):
             raise NotNavigableError(
-                f"{len(obstacles)} obstacles inflated by {agent_radius} m leave nothing navigable in "
+                f"{len(hulls)} obstacles inflated by {agent_radius} m leave nothing navigable in "
                 f"{box.bounds}; give wider bounds or a smaller agent_radius"
             )
         outer = shapely.buffer(islands, 0.5 * TOLERANCE, join_style="mitre")
         shapely.prepare(islands)
         shapely.prepare(outer)
         frame = Frame.covering(box.bounds, resolution)
-        return cls(
-            bounds=box.bounds,
-            agent_radius=float(agent_radius),
-            frame=frame,
-            islands=tuple(islands),
-            solid=MultiPolygon(_polygons(shapely.buffer(inflated, -TOLERANCE, join_style="mitre"))),
-            cells=_cells(frame, islands, outer),
-            _inner=inner,
-            _outer=outer,
-        )
+        solid = MultiPolygon(_polygons(shapely.buffer(inflated, -TOLERANCE, join_style="mitre")))
+        cells = _cells(frame, islands, outer)
+        return cls(box.bounds, float(agent_radius), frame, tuple(islands), solid, cells, inner, outer)
 
     @property
     def area(self) -> float:
@@ -190,6 +180,14 @@ class NavMesh:
         x_min, y_min, size, rows, columns = self.frame
         row, column = int((y - y_min) / size), int((x - x_min) / size)
         return int(self.cells.item(min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)))
+
+
+def _islands(free: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.object_]]:
+    """Polygons of free space, the largest first, as they are and less `SNAP_CLEARANCE`."""
+    islands = np.array(sorted(_polygons(free), key=lambda p: -p.area), dtype=object)
+    inner = shapely.buffer(islands, -SNAP_CLEARANCE, join_style="mitre")
+    kept = shapely.area(inner) > 0
+    return islands[kept], inner[kept]
 
 
 def _cells(frame: Frame, islands: NDArray[np.object_], outer: NDArray[np.object_]) -> NDArray[np.int32]:
