@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from experiments.commands.options import add_house
+from experiments.commands.options import add_command, add_house
 from experiments.house import House
 from mjsim.model.export import export_house
 from mjsim.model.scene import compose
@@ -16,19 +16,13 @@ beside it, and the episode as JSON. Stock MuJoCo loads it:  python -m mujoco.vie
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        "house",
-        help="write a disorganized house as MJCF",
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = add_command(
+        commands, "house", run, summary="write a disorganized house as MJCF", description=DESCRIPTION
     )
-    parser.add_argument(
-        "--objects", type=int, default=12, metavar="N", help="misplaced objects, 1 to 40 (12)"
-    )
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed (0)")
+    parser.add_argument("--objects", type=int, default=12, metavar="N", help="misplaced objects, 1 to 40")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the house")
     add_house(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.xml", help="MJCF file to write")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
