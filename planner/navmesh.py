@@ -98,7 +98,7 @@ class NavMesh:
 
     @cached_property
     def topdown_map(self) -> NDArray[np.int32]:
-        """The floor from above: island of each cell's centre, 0 for the largest, -1 where nobody can stand.
+        """The floor from above: island of each cell's centre, 0 for the largest, -1 off all islands.
 
         Shape (rows, columns), read-only. Row r, column c is about the point (x_min + (c + 0.5) resolution,
         y_min + (r + 0.5) resolution), so row 0 is at the smallest y: draw it with the origin at the lower left.
@@ -191,7 +191,7 @@ def _islands(free: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.ob
 
 
 def _cells(frame: Frame, islands: NDArray[np.object_], outer: NDArray[np.object_]) -> NDArray[np.int32]:
-    """`NavMesh.cells`: cells next to each other that no outline crosses are all alike."""
+    """`NavMesh.cells`: neighbouring cells that no outline crosses lie on the same island, or on none."""
     crossed, _ = crossed_cells(frame, np.concatenate([_outline(islands), _outline(outer)]))
     mixed = np.zeros((frame.rows, frame.columns), dtype=np.bool_)
     mixed.ravel()[crossed] = True

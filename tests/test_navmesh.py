@@ -1,4 +1,4 @@
-"""The navmesh answers exactly: navigability, islands, snapping and sampling against geometry worked out apart."""
+"""The navmesh answers exactly: navigability, islands, snapping and sampling against independent geometry."""
 
 import math
 

@@ -30,7 +30,7 @@ SEEDS = (0, 1, 2, 3)
 
 @dataclass(frozen=True)
 class Floor:
-    """Floor of the small house, with a round pillar that nobody can stand in and a ledge that leads nowhere."""
+    """Floor of the small house, with a round pillar and a ledge that is an island."""
 
     low: tuple[float, float] = (0.25, 0.25)
     high: tuple[float, float] = (5.75, 3.75)

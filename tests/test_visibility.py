@@ -1,4 +1,4 @@
-"""Seeing by rays: walls and things block, the field of view has edges, and a dense oracle agrees."""
+"""Seeing by rays: walls and objects block, the field of view has edges, and a dense oracle agrees."""
 
 import math
 
@@ -27,7 +27,7 @@ def _stand(
     *,
     avatar: bool = False,
 ) -> tuple[Scene, mujoco.MjData]:
-    """The small house with (model, x, y) on the floor, named by model and number, and somebody below the eye."""
+    """The small house with (model, x, y) on the floor, named by model and number, and a person below the eye."""
     objects = tuple(
         PlacedObject(f"{m}_{i}", catalogue.objects[m].category, m, (x, y), (x, y, 0.0), (1.0, 0.0, 0.0, 0.0))
         for i, (m, x, y) in enumerate(placed)

@@ -157,7 +157,7 @@ def _point_categories(catalogue: Catalogue, count: int, rng: np.random.Generator
 
 
 def _point_models(catalogue: Catalogue, categories: Sequence[str], rng: np.random.Generator) -> list[str]:
-    """Object model per point; a category's models are dealt like cards, reshuffled when all are out."""
+    """Object model per point; a category's models are drawn without replacement, and again when all are used."""
     decks: dict[str, list[str]] = {key: [] for key in catalogue.categories}
     models = []
     for category in categories:

@@ -1,4 +1,4 @@
-"""Letting dropped objects come to rest under physics, before anyone enters the house."""
+"""Dropped objects come to rest under physics, in a house without a person."""
 
 from dataclasses import dataclass, replace
 
