@@ -19,7 +19,7 @@ Matrix = NDArray[np.float64]
 
 
 def proven_bound(problem: RoutingProblem, plan: Plan) -> float:
-    """A length that no tour falls short of, m, derived from the certificate's claim alone.
+    """A lower bound of all tours, m, derived from the certificate alone.
 
     Up to seven objects every order of visits is tried, whatever the certificate. Beyond, a spanning tree is grown
     anew, and a table (full, or relaxed with the certificate's groups and prices) is filled anew from the recurrences

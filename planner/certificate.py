@@ -1,4 +1,4 @@
-"""What proves the lower bound of a plan, as a value that anybody can check."""
+"""What proves the lower bound of a plan, in a form that can be checked independently."""
 
 import enum
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ class Certificate:
     Attributes:
         proof: How the bound was found.
         root: What the proof gives without any search, units: the relaxation at the start of the tour, the length of
-            the spanning tree, the optimum by the table or by trying all. Up to here a checker can follow. Where a
-            plan's lower bound is higher, the rest is the word of the solver that its search was complete.
+            the spanning tree, the optimum by the table or by trying all. Up to here it takes no search to check. Where
+            a plan's lower bound is higher, it rests on the solver's search being complete.
         groups: Shipments that the relaxation counts together, each in one group.
         multipliers: Price of picking each shipment in the relaxation, units.
     """

@@ -1,4 +1,4 @@
-"""The nearest possible visit first: a baseline, and the answer when there is no time to think."""
+"""The nearest possible visit first: a baseline, and the first answer where no other is quick enough."""
 
 import time
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from planner.tour import integer_metric, make_plan, possible_next, spanning_boun
 
 @dataclass(frozen=True)
 class GreedySolver:
-    """Walks to the nearest feasible pickup or drop-off, the first of equals."""
+    """Goes to the nearest possible visit, the first of equals."""
 
     name: str = "greedy"
 

@@ -62,7 +62,7 @@ class OrToolsSolver:
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
     ) -> Iterator[Plan]:
-        """Yield the nearest-first tour at once, then what the searches find that end after 1 solution, 10, and all.
+        """Yield the nearest-first tour at once, then the tours of searches of 1 solution, 10, and all.
 
         The search starts anew each time; the short ones cost little beside the long one.
 
@@ -86,7 +86,7 @@ class OrToolsSolver:
 
 
 def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> tuple[list[Visit], int]:
-    """The best of all tours and its integer length, by trying them; for very few objects."""
+    """The best tour and its integer length, by trying all; for very few objects."""
     best: list[Visit] = []
     best_length = math.inf
 

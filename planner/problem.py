@@ -21,7 +21,7 @@ class Shipment:
 
 @dataclass(frozen=True, eq=False)
 class RoutingProblem:
-    """What is left to do from any state of the task (PAPER section 2, with the history folded in).
+    """What is left to do from any state of the task (PAPER section 2).
 
     Objects are numbered: first the shipments, then what is onboard.
 

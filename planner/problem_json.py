@@ -100,7 +100,7 @@ def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
 
 
 def claim_from_json(text: str, problem: RoutingProblem) -> Plan:
-    """Read what `claim_to_json` wrote about a plan of this problem; nothing of it is believed yet.
+    """Read what `claim_to_json` wrote about a plan of this problem; nothing of it is checked yet.
 
     Raises:
         ProblemError: Not JSON, a field is missing, unknown or ill-typed, or a visit is of no object of the problem; one

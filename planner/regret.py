@@ -50,13 +50,13 @@ def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
     if visit not in possible_next(problem):
         raise ProblemError(f"{visit} is not possible now; choose one of possible_next")
     shipments, onboard = list(problem.shipments), list(problem.onboard)
-    names, n = list(problem.names), len(shipments)
-    name, number = names.pop(problem.number[visit.object]), problem.number[visit.object]
+    names, number = list(problem.names), problem.number[visit.object]
+    name = names.pop(number)
     if visit.kind is VisitKind.PICK:
         onboard.append(shipments.pop(number).delivery)
         names.append(name)
     else:
-        onboard.pop(number - n)
+        onboard.pop(number - len(shipments))
     start = problem.location(visit)
     return RoutingProblem(
         problem.distances, start, tuple(shipments), tuple(onboard), problem.capacity, tuple(names)

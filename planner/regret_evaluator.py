@@ -1,4 +1,4 @@
-"""What visits cost compared with the best ones, for one state of a task after the other."""
+"""Regrets of visits for the successive states of one task."""
 
 from planner.exact.solver import ExactSolver
 from planner.exact.task_table import TaskTable
@@ -96,14 +96,14 @@ class RegretEvaluator:
         return self._solver.solve(problem, limit=self._limit)
 
     def _after(self, problem: RoutingProblem, visit: Visit, before: Plan) -> Plan:
-        """The best plan after a visit; what the plan before it tells halves the work."""
+        """The best plan after a visit; starting from the plan before it halves the work."""
         warm = NOTHING_KNOWN.updated(problem, before)
         *_, best = self._solver.improve(after(problem, visit), limit=self._limit, warm=warm)
         return best
 
 
 def _is_best(plan: Plan, problem: RoutingProblem) -> bool:
-    """Whether it is a proven plan of this very problem, and not of an earlier state of the task."""
+    """Whether a plan is proven and of this problem, not of an earlier state of the task."""
     visits = {problem.place(k) for k in range(len(problem.names))}
     visits |= {problem.pick(k) for k in range(len(problem.shipments))}
     if plan.status is not Status.OPTIMAL or set(plan.visits) != visits:
@@ -112,7 +112,7 @@ def _is_best(plan: Plan, problem: RoutingProblem) -> bool:
 
 
 def same_state(one: TaskState, other: TaskState) -> bool:
-    """Whether person and objects are where they were; where objects belong does not change."""
+    """Whether the person and all objects are at the same place in both states."""
     return one is other or (one.position, one.carried, one.loose) == (
         other.position,
         other.carried,

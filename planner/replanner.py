@@ -81,7 +81,7 @@ class Replanner:
 
     @property
     def pending(self) -> bool:
-        """Whether `poll` has something to look at; it never has for this replanner."""
+        """Whether `poll` would find something new; never for this replanner."""
         return False
 
     def poll(self, state: TaskState) -> Route | None:  # noqa: ARG002 - nothing goes on in the background
@@ -116,7 +116,7 @@ class Replanner:
         return None if self._moved(state, state.loose) else remaining(self.route.visits, state)
 
     def _moved(self, state: TaskState, names: Iterable[str]) -> list[str]:
-        """Those of some loose objects that lie far from where they lay when they were planned for, or are new."""
+        """Those of some loose objects that were pushed farther than `MOVED` since the plan was made, or are new."""
         return [
             name
             for name in names

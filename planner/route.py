@@ -11,7 +11,7 @@ XY = tuple[float, float]
 
 @dataclass(frozen=True)
 class TaskState:
-    """What matters of a task in progress.
+    """The state of a task in progress.
 
     Attributes:
         position: Where the person is, m.

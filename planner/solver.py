@@ -1,4 +1,4 @@
-"""What every planner of the tour looks like from outside, and finding one by name."""
+"""The interface of all solvers, and their names."""
 
 import importlib
 import threading
@@ -41,7 +41,7 @@ class SolveLimit:
 
     @property
     def stopped(self) -> bool:
-        """Whether somebody asked to stop."""
+        """Whether `stop` is set."""
         return self.stop is not None and self.stop.is_set()
 
 

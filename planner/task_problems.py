@@ -1,4 +1,4 @@
-"""From the state of a task to a routing problem; every position stands for the nearest navigable point."""
+"""Routing problems from states of a task; each position is replaced by the nearest navigable point."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from planner.route import XY, TaskState
 
 
 class TaskProblems:
-    """Makes the routing problems of one state of a task after the other; distances are remembered between them.
+    """Makes the routing problems of the successive states of a task; keeps distances between them.
 
     Args:
         geodesics: Distances on the navmesh; positions are snapped to its largest island.

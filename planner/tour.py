@@ -1,4 +1,4 @@
-"""What solvers share: integer metrics, visits that are possible next, plans made of an order of visits."""
+"""What solvers share: integer metrics, possible next visits, and plans from an order of visits."""
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -91,7 +91,7 @@ def make_plan(
     started: float,
     certificate: Certificate,
 ) -> Plan:
-    """A plan with an honest lower bound.
+    """A plan with a lower bound that also holds for the given distances, which are not whole units.
 
     Args:
         problem: What was solved.

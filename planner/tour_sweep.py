@@ -1,14 +1,14 @@
-"""Whether a shorter tour exists, for any capacity and any distances: every state that may lead to one is visited."""
+"""Whether a shorter tour exists, for any capacity and distances, by visiting every state that may lead to one."""
 
 from planner.problem import RoutingProblem
 from planner.relaxation_checker import closed
 
-# Where one is, objects left (bits), and the bins of what is carried.
+# Location, objects left (bits), and the bins of what is carried.
 State = tuple[int, int, tuple[int, ...]]
 
 
 def sweep_orders(problem: RoutingProblem, limit: float, max_states: int) -> tuple[bool, int] | None:
-    """Look for a tour shorter than a limit, m, by visits made; no state farther than that from its end is followed.
+    """Look for a tour shorter than a limit, m, by number of visits made; states that cannot lead to one are left out.
 
     Returns:
         Whether there is one, and how many states were looked at; None if they were too many.

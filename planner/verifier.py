@@ -1,4 +1,4 @@
-"""Whether a plan is optimal, seen by this module alone: it shares no code with the solvers, and may take seconds.
+"""Whether a plan is optimal, by code that it does not share with the solvers; this may take seconds.
 
 A certificate says how to bound the rest of the task from every state. With that bound, a tour shorter than claimed
 could only run through states whose cost so far plus bound stays below the claim. All of these are looked at, layer by
@@ -26,7 +26,7 @@ MAX_ROWS = 1 << 20  # of the certificate's table: some 30 s
 
 @dataclass(frozen=True)
 class Verified:
-    """What was found out about a plan without trusting its solver.
+    """What is true of a plan, found without trusting its solver.
 
     Attributes:
         cost: Length of its tour, m, which is feasible.
@@ -111,7 +111,7 @@ def sweep(problem: RoutingProblem, table: Relaxed, limit: int, max_states: int) 
     here, after = _begin(problem, table)
     states = 0
     for _ in range(n + 1):
-        here = _shortest([here, _dropped(table, _kept(table, here, limit))], table, limit)
+        here = _shortest([here, _dropped(table, _promising(table, here, limit))], table, limit)
         states += len(here[0])
         if states > max_states:
             return None
@@ -122,7 +122,7 @@ def sweep(problem: RoutingProblem, table: Relaxed, limit: int, max_states: int) 
         for j in range(n):
             there = (left >> j & 1).astype(bool)
             parts += [
-                _kept(table, part, limit)
+                _promising(table, part, limit)
                 for part in _picked(table, j, left[there], place[there], cost[there])
             ]
         here, after = _shortest(parts, table, limit), _none()
@@ -206,7 +206,7 @@ def _picked(
     ]
 
 
-def _kept(table: Relaxed, states: States, limit: int) -> States:
+def _promising(table: Relaxed, states: States, limit: int) -> States:
     """Those from which a tour shorter than the limit may exist."""
     left, place, cost = states
     m = len(table.bins)
@@ -222,9 +222,9 @@ def _kept(table: Relaxed, states: States, limit: int) -> States:
 
 
 def _shortest(parts: list[States], table: Relaxed, limit: int) -> States:
-    """The shortest way to each state, of those that may lead to a shorter tour."""
+    """The shortest path to each state, of those that may lead to a shorter tour."""
     left, place, cost = (np.concatenate([part[k] for part in parts]) for k in range(3))
-    left, place, cost = _kept(table, (left, place, cost), limit)
+    left, place, cost = _promising(table, (left, place, cost), limit)
     order = np.lexsort((cost, place, left))
     left, place, cost = left[order], place[order], cost[order]
     first = np.ones(len(left), bool)

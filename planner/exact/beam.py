@@ -16,7 +16,7 @@ FIRST_ROOM = 1 << 12
 
 @dataclass(frozen=True)
 class Pass:
-    """What one pass found.
+    """The result of one pass.
 
     Attributes:
         upper: Length of the best tour known, units.
@@ -73,7 +73,7 @@ def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadlin
 def _actions(
     bound: Bound, history: list[tuple[NDArray[np.int64], NDArray[np.int64]]], layer: int, end: int
 ) -> list[int]:
-    """Follow the parents back from the end of a tour."""
+    """The actions of a tour, found by following the parents back from its end."""
     keys = []
     k = end
     while True:

@@ -1,6 +1,6 @@
 """Proven tours from the full table: by compiled kernels, or in plain numpy where their compiler is not loaded.
 
-Both fill in the same numbers and choose the same of equals, so that what comes out never depends on which it was.
+Both fill in the same numbers and break ties alike, so the plan does not depend on which of them was used.
 """
 
 import sys
@@ -20,7 +20,7 @@ SMALL_TABLE = 1 << 22  # bytes, 14 objects and 6 bins: filled in 10 ms by kernel
 
 @dataclass(frozen=True)
 class Solution:
-    """What is known of an instance.
+    """A tour and a bound.
 
     Attributes:
         actions: A tour: k >= 0 picks object k, -1 - b goes to bin b and leaves all that belongs there.

@@ -11,7 +11,7 @@ from planner.exact.deadline import NEVER, Deadline
 from planner.plan import Visit
 from planner.problem import RoutingProblem
 
-# Where one is, which shipments are not yet picked (bits), and where each carried object goes (sorted).
+# Location, which shipments are not yet picked (bits), and where each carried object goes (sorted).
 State = tuple[int, int, tuple[int, ...]]
 Matrix = NDArray[np.int64]
 
@@ -34,8 +34,8 @@ def best_first(
 ) -> Ending:
     """Search states by cost so far plus the farthest trip left (A*).
 
-    In a metric, what belongs where one is, is dropped at once: that is free and never wrong. Otherwise a detour over
-    the same place may pay later, so each drop is a move of its own.
+    In a metric it is free and never wrong to drop on arrival what belongs there. Otherwise a later visit to the same
+    place may be cheaper, so each drop is a move of its own.
 
     Args:
         problem: What is left to do.
@@ -80,7 +80,7 @@ class _Search:
         self._trip = [metric[s.pickup][s.delivery] for s in problem.shipments]
 
     def arrive(self, here: int, left: int, carried: tuple[int, ...]) -> State:
-        """State on arrival, after what is dropped at once."""
+        """State on arrival, with what belongs here dropped."""
         return here, left, tuple(sorted(j for j in carried if not (self._at_once and j == here)))
 
     def moves(self, state: State) -> list[tuple[int, State]]:
@@ -132,7 +132,7 @@ class _Search:
 
 
 def _difference(held: list[int], still: tuple[int, ...]) -> list[int]:
-    """What is in `held` but no longer in `still`, counted."""
+    """The entries of `held` without those of `still`, as multisets."""
     rest = list(held)
     for j in still:
         rest.remove(j)

@@ -19,7 +19,7 @@ def alone(n: int) -> NDArray[np.int64]:
 
 
 def numbered(labels: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The same groups, numbered from 0."""
+    """The same groups with numbers 0, 1, 2 and so on, (n,)."""
     return np.unique(labels, return_inverse=True)[1].astype(np.int64)
 
 

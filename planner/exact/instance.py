@@ -35,17 +35,6 @@ class Instance(NamedTuple):
     root_bin: NDArray[np.int32]
     carried: NDArray[np.int64]
 
-    def permuted(self, order: Sequence[int]) -> "Instance":
-        """The same instance with object `order[k]` renamed k."""
-        o = np.asarray(order, dtype=np.int64)
-        return self._replace(
-            between=np.ascontiguousarray(self.between[np.ix_(o, o)]),
-            to_bin=np.ascontiguousarray(self.to_bin[o]),
-            from_bin=np.ascontiguousarray(self.from_bin[:, o]),
-            home=np.ascontiguousarray(self.home[o]),
-            root=np.ascontiguousarray(self.root[o]),
-        )
-
 
 def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instance:
     """Flatten a problem; objects are its shipments, bins its delivery locations in ascending order."""

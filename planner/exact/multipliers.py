@@ -188,7 +188,7 @@ def step(
     direction: NDArray[np.float64],
     miscount: NDArray[np.float64],
 ) -> bool:
-    """Make what a relaxed tour picks too often dearer; False if it picks each object once."""
+    """Raise the price of objects that a relaxed tour picks too often; False if it picks each once."""
     n = current.size
     surplus = np.full(n, -1.0)
     for action in actions:

@@ -1,4 +1,4 @@
-"""States of one layer of the search: offered one by one, the most promising kept."""
+"""The states of one layer of the search: added one by one, then reduced to the most promising."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ class Nodes(NamedTuple):
     Attributes:
         size: Number of states, (1,) int64.
         key: Code of each state, int64.
-        cost: Length of the shortest known way, int32.
+        cost: Length of the shortest known path to it, int32.
         total: Cost plus bound of the cost-to-go, int32.
         parent: 2 x index of the state before + (1 if that is in the same layer), or `NO_PARENT`, int64.
         slots: Hash table of indices, -1 where empty, a power of two long, int32.
@@ -77,7 +77,7 @@ def with_room(nodes: Nodes, more: int) -> Nodes:
 
 @kernel
 def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
-    """Add a state, or shorten the way to it; there must be room."""
+    """Add a state, or a shorter path to it; there must be room."""
     slot = slot_of(nodes, key)
     k = nodes.slots[slot]
     if k < 0:
@@ -142,7 +142,7 @@ def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
 def with_room_among(nodes: Nodes, more: int, width: int) -> tuple[Nodes, int]:
     """Make room by dropping states that are not among the best 2 `width` when there are twice as many.
 
-    They would not be among the best `width` later either.
+    They could not be among the best `width` later either.
     """
     smallest = INFINITE
     if nodes.size[0] + more > nodes.key.size and nodes.size[0] > 4 * width:

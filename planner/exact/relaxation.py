@@ -21,7 +21,7 @@ def add(a: Any, b: Any) -> Any:
 
 @kernel
 def row_without(table: Table, row: int, j: int) -> int:
-    """Row after picking j, or -1 where none of its group is there to be picked."""
+    """Row after picking j, or -1 where none of its group is left."""
     left = row // table.stride[j] % (table.size[table.group[j]] + 1)
     return int(row - table.stride[j]) if left else -1
 
@@ -57,7 +57,7 @@ def left_of(table: Table, row: int) -> NDArray[np.int64]:
 
 @kernel
 def count_on(table: Table, left: NDArray[np.int64]) -> None:
-    """From one row to the next."""
+    """Update the numbers left of each group from a row to the next."""
     for g in range(left.size):
         left[g] += 1
         if left[g] <= table.size[g]:

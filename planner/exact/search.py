@@ -1,9 +1,9 @@
 """Layered beam search: states by number of picks, pruned by a lower bound of the cost-to-go.
 
-A node is a state (U, place, carried) with the length of the shortest known way to it; layer k holds states with
+A node is a state (U, place, carried) with the length of the shortest known path to it; layer k holds states with
 k objects picked. A state is coded as U 2^12 + place, where place b m + d means at bin b with an object for d,
 b m + b at bin b with empty hands, and m m + i at object i with only that in hand. Arriving at a second object
-is no state of its own: from there the way leads to one of two bins.
+is no state of its own: the next stop is one of two bins.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ SLICE = 1 << 12  # states that are expanded between looks at the clock: some 5 m
 
 
 class Expanded(NamedTuple):
-    """What comes of expanding a layer.
+    """The result of expanding a layer.
 
     Attributes:
         here: The layer, with states reached by dropping.
@@ -46,8 +46,8 @@ def row_of(table: Table, left: int) -> int:
     return row
 
 
-class Step(NamedTuple):
-    """Where a leg of a tour begins, or ends.
+class Arrival(NamedTuple):
+    """The end of a leg of a tour.
 
     Attributes:
         left: Set of objects left, as bits.
@@ -63,35 +63,39 @@ class Step(NamedTuple):
 
 
 @kernel
-def offer_bin(inst: Instance, table: Table, nodes: Nodes, step: Step, b: int, d: int, limit: int) -> None:
+def offer_bin(
+    inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, b: int, d: int, limit: int
+) -> None:
     """Offer the state at bin b carrying one for d (d = b: nothing), unless its total reaches the limit."""
-    total = step.cost + table.bin[step.row, b, d]
+    total = arrival.cost + table.bin[arrival.row, b, d]
     if total < limit:
         place = b * inst.bins.shape[0] + d
-        offer(nodes, (step.left << PLACE_BITS) | place, step.cost, total, step.parent)
+        offer(nodes, (arrival.left << PLACE_BITS) | place, arrival.cost, total, arrival.parent)
 
 
 @kernel
-def offer_second(inst: Instance, table: Table, nodes: Nodes, step: Step, j: int, d: int, limit: int) -> None:
-    """Pick j with one for d in hand, and offer the state at either bin; the step ends at j, before the pick."""
+def offer_second(
+    inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, j: int, d: int, limit: int
+) -> None:
+    """Pick j with one for d in hand, and offer the state at either bin; the arrival is at j, before the pick."""
     c = inst.home[j]
-    left, row = step.left ^ (1 << j), step.row - table.stride[j]
-    cost = step.cost + table.multipliers[j]
-    first = Step(left, row, cost + inst.to_bin[j, d], step.parent)
+    left, row = arrival.left ^ (1 << j), arrival.row - table.stride[j]
+    cost = arrival.cost + table.multipliers[j]
+    first = Arrival(left, row, cost + inst.to_bin[j, d], arrival.parent)
     offer_bin(inst, table, nodes, first, d, c, limit)
     if c != d:
-        second = Step(left, row, cost + inst.to_bin[j, c], step.parent)
+        second = Arrival(left, row, cost + inst.to_bin[j, c], arrival.parent)
         offer_bin(inst, table, nodes, second, c, d, limit)
 
 
 @kernel
-def offer_only(inst: Instance, table: Table, nodes: Nodes, step: Step, i: int, limit: int) -> None:
-    """Pick i with empty hands, and offer the state there; the step ends at i, before the pick."""
-    cost = step.cost + table.multipliers[i]
-    total = cost + table.object[step.row - table.stride[i], i]
+def offer_only(inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, i: int, limit: int) -> None:
+    """Pick i with empty hands, and offer the state there; the arrival is at i, before the pick."""
+    cost = arrival.cost + table.multipliers[i]
+    total = cost + table.object[arrival.row - table.stride[i], i]
     if total < limit:
         place = inst.bins.shape[0] ** 2 + i
-        offer(nodes, ((step.left ^ (1 << i)) << PLACE_BITS) | place, cost, total, step.parent)
+        offer(nodes, ((arrival.left ^ (1 << i)) << PLACE_BITS) | place, cost, total, arrival.parent)
 
 
 @kernel
@@ -101,16 +105,18 @@ def offer_roots(inst: Instance, table: Table, here: Nodes, after: Nodes, limit: 
     left, row = (1 << n) - 1, table.bin.shape[0] - 1
     if inst.carried.size == 0:
         for i in range(n):
-            step = Step(left, row, int(inst.root[i]), NO_PARENT)
-            offer_only(inst, table, after, step, i, limit)
+            arrival = Arrival(left, row, int(inst.root[i]), NO_PARENT)
+            offer_only(inst, table, after, arrival, i, limit)
         return
     d, other = inst.carried[0], inst.carried[inst.carried.size - 1]
-    offer_bin(inst, table, here, Step(left, row, int(inst.root_bin[d]), NO_PARENT), d, other, limit)
+    offer_bin(inst, table, here, Arrival(left, row, int(inst.root_bin[d]), NO_PARENT), d, other, limit)
     if inst.carried.size == 2:
-        offer_bin(inst, table, here, Step(left, row, int(inst.root_bin[other]), NO_PARENT), other, d, limit)
+        offer_bin(
+            inst, table, here, Arrival(left, row, int(inst.root_bin[other]), NO_PARENT), other, d, limit
+        )
         return
     for j in range(n):
-        offer_second(inst, table, after, Step(left, row, int(inst.root[j]), NO_PARENT), j, d, limit)
+        offer_second(inst, table, after, Arrival(left, row, int(inst.root[j]), NO_PARENT), j, d, limit)
 
 
 def expand(
@@ -161,16 +167,16 @@ def expand_carrying(
             home_leg = inst.bins[b, d]
         left = here.key[k] >> PLACE_BITS
         row = row_of(table, left)
-        step = Step(left, row, int(here.cost[k] + home_leg), 2 * k + 1)
-        offer_bin(inst, table, here, step, d, d, limit)
+        arrival = Arrival(left, row, int(here.cost[k] + home_leg), 2 * k + 1)
+        offer_bin(inst, table, here, arrival, d, d, limit)
         if after.size[0] + 2 * n > after.key.size:
             after, dropped = with_room_among(after, 2 * n, width)
             smallest = min(smallest, dropped)
         for j in range(n):
             if (left >> j) & 1:
                 leg = inst.between[i, j] if i >= 0 else inst.from_bin[b, j]
-                step = Step(left, row, int(here.cost[k] + leg), 2 * k)
-                offer_second(inst, table, after, step, j, d, limit)
+                arrival = Arrival(left, row, int(here.cost[k] + leg), 2 * k)
+                offer_second(inst, table, after, arrival, j, d, limit)
     return after, smallest, expanded
 
 
@@ -200,6 +206,6 @@ def expand_empty(
             smallest = min(smallest, dropped)
         for i in range(n):
             if (left >> i) & 1:
-                step = Step(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
-                offer_only(inst, table, after, step, i, limit)
+                arrival = Arrival(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
+                offer_only(inst, table, after, arrival, i, limit)
     return after, smallest, expanded, end

@@ -1,4 +1,4 @@
-"""The exact planner: for capacity two up to 40 objects; for other capacities while they are few."""
+"""The exact planner: for capacity two up to 40 objects, for other capacities a few."""
 
 import math
 import time
@@ -22,9 +22,9 @@ from planner.solver import SolveLimit
 from planner.tour import integer_distances, integer_metric, is_metric, make_plan
 
 TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
-DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables, for what is planned again and again
+DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables; for sessions, which plan often
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
-PROVABLE = 14  # objects; with more of them that search has no hope
+PROVABLE = 14  # objects; that search proves no more of them
 MAX_LENGTH = 1 << 27  # units; tours beyond this would overflow 32 bits
 
 
@@ -59,7 +59,7 @@ class ExactSolver:
             problem: What is left to do.
             seed: Of the annealing.
             limit: States or seconds; by default 4 million states. OR-Tools counts other things, so only the
-                seconds are handed on to it.
+                seconds are passed on to it.
 
         Returns:
             OPTIMAL where proven, else FEASIBLE with the best bound so far.
@@ -110,7 +110,7 @@ class ExactSolver:
         table_at_once: bool,
         warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
-        """Ever better plans; only one where a table is filled at once."""
+        """Better and better plans; only one where a table is filled at once."""
         started = time.perf_counter()
         metric = integer_metric(problem.distances)
         if not self.applies(problem, metric):
@@ -128,16 +128,16 @@ class ExactSolver:
             start = None if warm is None else warm.numbered(problem.names[: len(problem.shipments)])
             found = self._search(instance, seed, limit, started, tabled=tabled, start=start)
         n = len(problem.shipments)
-        for known in found:
-            visits = to_visits(instance, known.actions, problem.names[:n], problem.names[n:])
-            yield make_plan(problem, metric, visits, known.bound, started, known.certificate)
+        for solution in found:
+            visits = to_visits(instance, solution.actions, problem.names[:n], problem.names[n:])
+            yield make_plan(problem, metric, visits, solution.bound, started, solution.certificate)
 
     def _general(
         self, problem: RoutingProblem, metric: NDArray[np.int64], seed: int, limit: SolveLimit, started: float
     ) -> Plan:
         """Any capacity and any distances: proven for a few objects, else OR-Tools with the bound reached."""
         legs = metric if is_metric(problem.distances, metric) else integer_distances(problem.distances)
-        # Time for a proof where there is hope of one; the rest for a tour.
+        # Half of the time for a proof where one is likely; the rest for a tour.
         share = 0.5 if len(problem.shipments) <= PROVABLE else 0.05
         at = None if limit.seconds is None else started + limit.seconds * share
         found = best_first(problem, legs, metric, GENERAL_STATES, Deadline(at, limit.stop))
@@ -166,7 +166,7 @@ class ExactSolver:
         tabled: bool,
         start: Start | None,
     ) -> Iterator[Solution]:
-        """Ever better tours and bounds: annealed, then by the full table or by passes of the search."""
+        """Better and better tours and bounds: annealed, then by the full table or by passes of the search."""
         from planner.exact.widening import widening  # brings the compiled kernels, which take 0.5 s to load
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)

@@ -55,7 +55,8 @@ def costs_by_pass(
 ) -> Costs | None:
     """Costs of all next visits, exact where at most `longest`, else some number greater than it.
 
-    Every state on a tour of at most that length is visited, layer by layer; a sweep back finds the way on from each.
+    Every state on a tour of at most that length is visited, layer by layer; a sweep back finds the shortest rest of
+    the task from each.
 
     Args:
         bound: Bound of the cost-to-go.

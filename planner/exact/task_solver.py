@@ -1,4 +1,4 @@
-"""The exact planner for one state of a task after the other: what it has found once serves later states."""
+"""The exact planner for the successive states of one task: later plans start from earlier ones."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING

@@ -1,7 +1,7 @@
-"""A full table of costs-to-go that serves one state of a task after the other.
+"""A full table of costs-to-go for the successive states of one task.
 
-It holds for every later state in which nothing was moved, wherever the person is and whatever is carried. So it is
-filled once for a task (from 18 objects left on), and all later questions are looked up.
+A table holds for every later state in which nothing was moved, for any position and anything carried. So it is filled
+once for a task, when 18 objects are left, and looked up from then on.
 """
 
 import time
@@ -50,7 +50,7 @@ class _Filled:
 
 
 class TaskTable:
-    """Fills a full table where one is small enough, and keeps it as long as it serves.
+    """Fills a full table where it is small enough, and keeps it until an object was moved.
 
     Args:
         solver: Says how large a table may be.

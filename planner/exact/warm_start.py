@@ -1,4 +1,4 @@
-"""Starting from what plans of similar problems have found.
+"""Warm starts: what plans of similar problems tell about the next one.
 
 Any multipliers give a lower bound, for any objects left, wherever they lie. So those of one state of a task serve all
 later ones; only the table has to be filled anew, with the objects that are left.
@@ -35,7 +35,7 @@ class Start(NamedTuple):
 
 @dataclass(frozen=True)
 class WarmStart:
-    """What earlier plans tell of objects, by name.
+    """What earlier plans tell about objects, by name.
 
     Attributes:
         multipliers: Price of picking an object in the relaxation, units.
@@ -48,7 +48,7 @@ class WarmStart:
     order: tuple[str, ...] = ()
 
     def updated(self, problem: RoutingProblem, plan: Plan) -> "WarmStart":
-        """The same with what a plan of a problem tells; multipliers of other objects stay."""
+        """With the results of one more plan; multipliers of objects that it is not about stay."""
         order = tuple(name for kind, name in plan.visits if kind is VisitKind.PICK)
         certificate = plan.certificate
         if certificate is None or certificate.proof is not Proof.RELAXATION:
@@ -59,7 +59,7 @@ class WarmStart:
         return WarmStart({**self.multipliers, **new}, groups, order)
 
     def numbered(self, names: Sequence[str]) -> Start | None:
-        """For an instance of the objects of these names; None where no multiplier of them is known.
+        """Renumbered for an instance of the objects of these names; None where no multiplier of them is known.
 
         An object that is new costs the average and joins the first group.
         """

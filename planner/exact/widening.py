@@ -15,7 +15,7 @@ from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown,
 from planner.exact.warm_start import Start
 
 ANNEALING_MOVES = 20_000
-# A first plan with something known: some 20 ms.
+# A first plan from a warm start: some 20 ms.
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
 WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
 
@@ -34,10 +34,34 @@ def widening(
         instance: What is left to do.
         seed: Of the annealing.
         work: States that may be expanded.
-        deadline: No pass begins when it is over; there is a first tour nevertheless.
+        deadline: No pass begins after it; there is always a first tour.
         passes: Rows of the bound's table and states kept of each layer, at most, from pass to pass.
-        start: What is known from similar problems.
+        start: A warm start, or None.
     """
+    bound, upper, lower, actions = _first_tour(instance, seed, work, start)
+    yield Solution(actions, min(lower, upper), _certificate(bound))
+    done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
+    for rows, wanted in passes:
+        # A pass that is given up proves nothing, and one hardly wider than the last proves little more.
+        width = min(wanted, work // rate)
+        if lower >= upper or width < min(wanted, done + 1) or deadline.over():
+            break
+        if rows >= BIN_ROWS and not by_bin:  # once: later, the bound has outgrown so few rows
+            bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
+        bound = grown(bound, upper, rows, deadline)
+        result = beam_pass(bound, upper, width, work, deadline)
+        work -= result.expanded
+        done, rate = width, max(1, -(-result.expanded // width))  # a wider pass expands fewer per width
+        lower = max(lower, bound.root, result.lower)
+        if result.actions is not None:
+            upper, actions = result.upper, result.actions
+        yield Solution(actions, min(lower, upper), _certificate(bound))
+
+
+def _first_tour(
+    instance: Instance, seed: int, work: int, start: Start | None
+) -> tuple[Bound, int, int, list[int]]:
+    """A bound, the length of a first tour, a lower bound of all tours, and the actions of the first."""
     if start is None:
         length, order = anneal(instance, seed, ANNEALING_MOVES)
         bound = first_bound(instance, int(length))
@@ -53,23 +77,7 @@ def widening(
         lower = max(lower, narrow.lower)
         if narrow.actions is not None:
             upper, actions = narrow.upper, narrow.actions
-    yield Solution(actions, min(lower, upper), _certificate(bound))
-    done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
-    for rows, wanted in passes:
-        # A pass given up proves nothing, and one hardly wider than the last one little.
-        width = min(wanted, work // rate)
-        if lower >= upper or width < min(wanted, done + 1) or deadline.over():
-            break
-        if rows >= BIN_ROWS and not by_bin:  # once: later, the bound has outgrown so few rows
-            bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
-        bound = grown(bound, upper, rows, deadline)
-        result = beam_pass(bound, upper, width, work, deadline)
-        work -= result.expanded
-        done, rate = width, max(1, -(-result.expanded // width))  # a wider pass expands fewer per width
-        lower = max(lower, bound.root, result.lower)
-        if result.actions is not None:
-            upper, actions = result.upper, result.actions
-        yield Solution(actions, min(lower, upper), _certificate(bound))
+    return bound, upper, lower, actions
 
 
 def _certificate(bound: Bound) -> Certificate:
