@@ -122,7 +122,10 @@ class World:
         Raises:
             StateError: The state does not fit the scene, or is of another fidelity.
         """
-        self._tier.restore(state)
+        try:
+            self._tier.restore(state)
+        except (ValueError, IndexError) as error:  # of arrays that have other shapes
+            raise StateError(f"the state's details do not fit this version's worlds: {error}") from error
         return self._tier.observation()
 
     def step(self, action: Action) -> StepResult:

@@ -113,6 +113,18 @@ def test_details_of_something_else_are_refused(details):
         WorldState.from_json(np.zeros(1), details)
 
 
+def test_details_of_another_shape_are_refused(world):
+    world.reset()
+    state = world.state()
+    rig = dataclasses.replace(state.details.person.rig, motion=np.zeros(3))
+    changes = {"rig": rig}, {"grips": ((99, 0), None)}
+    for change in changes:
+        person = dataclasses.replace(state.details.person, **change)
+        with pytest.raises(StateError, match="details do not fit"):
+            world.restore(WorldState(state.physics, dataclasses.replace(state.details, person=person)))
+    world.reset()
+
+
 def test_a_state_of_other_objects_is_refused(world):
     world.reset()
     state = world.state()
