@@ -10,8 +10,6 @@ import gymnasium
 from rich.console import Console
 from rich.table import Table
 
-import mjsim  # noqa: F401 - registers the environment
-
 ID = "mjsim.environments:mjsim/Rearrange-v0"
 SECONDS = 3.0
 SETTINGS: dict[str, dict[str, Any]] = {
