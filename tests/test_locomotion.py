@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from experiments.locomotion import BACK_OFF, BACK_OFF_TIME, PROGRESS_TIMEOUT, LocomotionController
-from experiments.participants.base import Percept, WalkAlong
+from experiments.participants.base import Moves, Percept, WalkAlong
 from experiments.participants.visit_executor import CLOSER, MIN_STOP_DISTANCE, STOP_DISTANCE, VisitExecutor
 from mjsim.actions import ActionResult, Move, Pick, Refusal
+from mjsim.errors import ActionError
 from mjsim.observation import ObjectStatus, Observation
 from planner.plan import Visit, VisitKind
 
@@ -116,3 +117,11 @@ def test_a_path_is_kept_until_the_person_leaves_it_or_is_blocked():
 
     assert [asked((0.0, 0.0)), asked((1.0, 0.1)), asked((1.0, 0.5)), asked((1.5, 0.4))] == [1, 1, 2, 2]
     assert asked((1.5, 0.4), blocked=True) == 3
+
+
+@pytest.mark.parametrize("shape", [(2,), (0, 2), (3, 3)])
+def test_walks_and_moves_of_another_shape_are_refused(shape):
+    with pytest.raises(ActionError, match="path of a walk must be an array of shape"):
+        WalkAlong(np.zeros(shape), np.zeros(2), 0.5)
+    with pytest.raises(ActionError, match="moves must be an array of shape"):
+        Moves(np.zeros(shape))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from experiments.house import House
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult, Pick, Place
+from mjsim.errors import ActionError
 from mjsim.observation import ObjectStatus, Observation
 from planner.plan import Visit
 
@@ -138,8 +139,8 @@ def positions_of(seen: Observation, names: Iterable[str]) -> dict[str, Point]:
 class WalkAlong:
     """Walk along a path, sidestep objects on the way, face the goal at its end, and pick or place there.
 
-    The session walks; where every control step is simulated or watched it asks the participant again after each one.
-    So as long as nothing happens, the answer must stay the same.
+    The session walks. In the fidelity `full`, and while somebody films, it asks the participant again after every
+    control step, else at the end of the walk. So as long as nothing happens, the answer must stay the same.
 
     Attributes:
         path: Floor points, m, shape (k, 2), k >= 1.
@@ -149,6 +150,9 @@ class WalkAlong:
         until: Simulated time at which the participant wants to be asked again, s; None for the end of the walk.
         shown: Whether the path is shown by the HUD, which cuts off what lies behind the person.
         tolerance: How far the person may leave the path before the participant is asked again, m.
+
+    Raises:
+        ActionError: The path has another shape.
     """
 
     path: NDArray[np.float64]
@@ -159,6 +163,9 @@ class WalkAlong:
     shown: bool = False
     tolerance: float = 0.4
 
+    def __post_init__(self) -> None:
+        _check_rows("the path of a walk", self.path, 2)
+
 
 @dataclass(frozen=True, eq=False)
 class Moves:
@@ -166,9 +173,21 @@ class Moves:
 
     Attributes:
         rows: Forward, left (m/s), turn and look (rad/s), shape (n, 4), n >= 1.
+
+    Raises:
+        ActionError: The rows have another shape.
     """
 
     rows: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        _check_rows("moves", self.rows, 4)
+
+
+def _check_rows(what: str, rows: NDArray[np.float64], width: int) -> None:
+    shape = np.shape(rows)
+    if len(shape) != 2 or shape[1] != width or shape[0] < 1:
+        raise ActionError(f"{what} must be an array of shape (n, {width}) with n >= 1, got shape {shape}")
 
 
 class Wait:
