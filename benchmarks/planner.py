@@ -48,7 +48,7 @@ solver("exact").solve(problem)
 
 
 @dataclass(frozen=True)
-class Entrant:
+class Candidate:
     """A planner with a limit of seconds (0: its own budget); `module` is the optional package that it needs."""
 
     name: str
@@ -63,18 +63,18 @@ class Entrant:
 
     @property
     def installed(self) -> bool:
-        """Whether its package is."""
+        """Whether its package is installed."""
         return self.module is None or importlib.util.find_spec(self.module) is not None
 
 
-ENTRANTS = (
-    Entrant("exact"),
-    Entrant("ortools", 0.05),
-    Entrant("ortools", 0.2),
-    Entrant("ortools", 1.0),
-    Entrant("ortools", 5.0),
-    Entrant("pyvrp", 1.0, "pyvrp", start_only=True),
-    Entrant("vroom", 0.0, "vroom", start_only=True),
+CANDIDATES = (
+    Candidate("exact"),
+    Candidate("ortools", 0.05),
+    Candidate("ortools", 0.2),
+    Candidate("ortools", 1.0),
+    Candidate("ortools", 5.0),
+    Candidate("pyvrp", 1.0, "pyvrp", start_only=True),
+    Candidate("vroom", 0.0, "vroom", start_only=True),
 )
 
 
@@ -97,18 +97,18 @@ def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
     """
     sizes = SIZES[:2] if quick else SIZES
     houses = min(houses, 3) if quick else houses
-    entrants = [e for e in ENTRANTS if not quick or e.seconds <= 0.2]
+    candidates = [e for e in CANDIDATES if not quick or e.seconds <= 0.2]
     with Progress(console=Console(stderr=True), transient=True) as progress:
         cases = list(make_cases(progress, sizes, houses))
         records: list[dict[str, Any]] = []
-        for entrant in entrants:
-            if entrant.installed:
-                records += solve_all(progress, entrant, chosen(entrant, cases))
+        for candidate in candidates:
+            if candidate.installed:
+                records += solve_all(progress, candidate, chosen(candidate, cases))
     return {
         "benchmark": "planner",
         "cores": os.cpu_count(),
         "houses": houses,
-        "not_installed": [e.label for e in entrants if not e.installed],
+        "not_installed": [e.label for e in candidates if not e.installed],
         "first_call": {
             str(n): first_call(next(c.problem for c in cases if c.objects == n))
             for n in FIRST_OBJECTS
@@ -155,24 +155,26 @@ def mid_task(house: House, begin: TaskState, rng: np.random.Generator) -> TaskSt
     )
 
 
-def chosen(entrant: Entrant, cases: Sequence[Case]) -> list[Case]:
+def chosen(candidate: Candidate, cases: Sequence[Case]) -> list[Case]:
     """The cases that a planner gets."""
-    if entrant.name == "exact":
+    if candidate.name == "exact":
         return list(cases)
-    return [c for c in cases if c.seed % OTHERS_SHARE == 0 and (c.state == "start" or not entrant.start_only)]
+    return [
+        c for c in cases if c.seed % OTHERS_SHARE == 0 and (c.state == "start" or not candidate.start_only)
+    ]
 
 
-def solve_all(progress: Progress, entrant: Entrant, cases: Sequence[Case]) -> list[dict[str, Any]]:
+def solve_all(progress: Progress, candidate: Candidate, cases: Sequence[Case]) -> list[dict[str, Any]]:
     """One record per case, from a process of its own."""
-    bar = progress.add_task(entrant.label, total=len(cases))
+    bar = progress.add_task(candidate.label, total=len(cases))
     records = []
     with tempfile.NamedTemporaryFile(suffix=".pickle") as file:
         pickle.dump([c.problem for c in cases], file)
         file.flush()
-        command = [sys.executable, "-P", str(WORKER), entrant.name, str(entrant.seconds), file.name]
+        command = [sys.executable, "-P", str(WORKER), candidate.name, str(candidate.seconds), file.name]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as worker:
             for case, line in zip(cases, worker.stdout or (), strict=False):
-                where = {"planner": entrant.label, "objects": case.objects, "seed": case.seed}
+                where = {"planner": candidate.label, "objects": case.objects, "seed": case.seed}
                 left = {"state": case.state, "left": len(case.problem.shipments)}
                 records.append(where | left | json.loads(line))
                 progress.advance(bar)
