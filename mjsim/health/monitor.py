@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjsim.actions import EventKind
 from mjsim.errors import PhysicsError
@@ -32,14 +33,14 @@ class HealthState:
     """What a `HealthMonitor` has accumulated, as a value.
 
     Attributes:
-        extremes: Deepest overlap of an object and of the trunk, m; largest weld error, m and rad.
+        extremes: Deepest overlap of an object and of the trunk, m; largest weld error, m and rad; shape (4,).
         settle_times: See `Health.settle_times`.
         sample: The latest control step.
         anomalies: Objects that flew off or passed through something.
         settling: Objects between release and rest.
     """
 
-    extremes: tuple[float, float, float, float]
+    extremes: NDArray[np.float64]
     settle_times: tuple[float, ...]
     sample: HealthSample
     anomalies: AnomalyState
@@ -59,6 +60,7 @@ class HealthMonitor:
         self._anomalies = AnomalyDetector(scene)
         self._settling = SettleTimer(scene)
         self._flags, self._sample = np.zeros(len(index.names), np.uint8), np.zeros(6)
+        self._extremes = np.zeros(4)
         limits = np.array([CHECK_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
         arrays = ScanArrays(
             qpos=data.qpos,
@@ -79,13 +81,14 @@ class HealthMonitor:
             anchors=self._anomalies.anchors,
             flags=self._flags,
             sample=self._sample,
+            extremes=self._extremes,
         )
         self._arrays = tuple(arrays)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything; the state is that of the episode's beginning."""
-        self._deepest = self._deepest_trunk = self._stretched = self._twisted = 0.0
+        self._extremes[:] = 0.0
         self._settle_times: list[float] = []
         self.sample = QUIET
         self._anomalies.reset(self._rig.data)
@@ -106,10 +109,6 @@ class HealthMonitor:
         data = self._rig.data
         suspect = self._scan(data, held)
         deepest, trunk, left, right, left_angle, right_angle = self._sample.tolist()
-        self._deepest, self._deepest_trunk = max(self._deepest, deepest), max(self._deepest_trunk, trunk)
-        # NaN loses every comparison, and so the second place in a maximum.
-        self._stretched = max(self._stretched, left, right)
-        self._twisted = max(self._twisted, left_angle, right_angle)
         gripped, settling = self._grips.gripped, self._settling
         settled = settling.update(data, gripped, self._flags)
         self._settle_times += settled
@@ -126,7 +125,7 @@ class HealthMonitor:
     def get_state(self) -> HealthState:
         """Everything accumulated, as a value."""
         return HealthState(
-            extremes=(self._deepest, self._deepest_trunk, self._stretched, self._twisted),
+            extremes=self._extremes.copy(),
             settle_times=tuple(self._settle_times),
             sample=self.sample,
             anomalies=self._anomalies.get_state(),
@@ -135,7 +134,7 @@ class HealthMonitor:
 
     def set_state(self, state: HealthState) -> None:
         """Go on from what `get_state` gave."""
-        self._deepest, self._deepest_trunk, self._stretched, self._twisted = state.extremes
+        self._extremes[:] = state.extremes
         self._settle_times = list(state.settle_times)
         self.sample = state.sample
         self._anomalies.set_state(state.anomalies)
@@ -143,11 +142,12 @@ class HealthMonitor:
 
     def snapshot(self) -> Health:
         """Extremes and counts since the last reset."""
+        deepest, deepest_trunk, stretched, twisted = self._extremes.tolist()
         return Health(
-            max_penetration_m=self._deepest,
-            max_trunk_penetration_m=self._deepest_trunk,
-            max_weld_error_m=self._stretched,
-            max_weld_error_rad=self._twisted,
+            max_penetration_m=deepest,
+            max_trunk_penetration_m=deepest_trunk,
+            max_weld_error_m=stretched,
+            max_weld_error_rad=twisted,
             settle_times=tuple(self._settle_times),
             ejections=self._anomalies.ejections,
             tunnellings=self._anomalies.tunnellings,

@@ -68,6 +68,7 @@ class ScanArrays(NamedTuple):
         sample: The deepest overlap of an object with anything but the person, and that of the trunk with the house,
             both in m and not negative; how far the weld of either hand is stretched, m, and twisted, rad, NaN for a
             hand that carries nothing; shape (6,), overwritten.
+        extremes: Largest sample so far: overlaps, m, weld error of either hand, m and rad, shape (4,); changed.
     """
 
     qpos: Floats
@@ -88,6 +89,7 @@ class ScanArrays(NamedTuple):
     anchors: Floats
     flags: NDArray[np.uint8]
     sample: Floats
+    extremes: Floats
 
 
 @kernel
@@ -123,6 +125,10 @@ def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -
         if (left if hand == 0 else right) and sites[hand, 0] >= 0:
             sample[2 + hand] = site_gap(arrays.site_xpos, sites[hand, 0], sites[hand, 1])
             sample[4 + hand] = site_angle(arrays.site_xmat, sites[hand, 0], sites[hand, 1])
+    for k in range(6):
+        extreme = k if k < 2 else k // 2 + 1
+        if sample[k] > arrays.extremes[extreme]:  # not if it is NaN
+            arrays.extremes[extreme] = sample[k]
     return state
 
 
