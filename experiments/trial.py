@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments import records
-from experiments.analysis.topdown import draw_topdown
 from experiments.assistant import Assistant
 from experiments.conditions import TaskBoard
 from experiments.errors import ConfigError
@@ -130,6 +129,8 @@ def run_trial(
             kept = keep_failed(folder, out)
             raise PhysicsError(f"{result.ended} (kept for `mjsim replay {kept}`)") from result.ended
         if topdown:
+            from experiments.analysis.topdown import draw_topdown  # loads matplotlib, which batches do not need
+
             draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], arrays)
         metrics = {
             **_settings(config),
