@@ -129,7 +129,8 @@ def run_trial(
             kept = keep_failed(folder, out)
             raise PhysicsError(f"{result.ended} (kept for `mjsim replay {kept}`)") from result.ended
         if topdown:
-            from experiments.analysis.topdown import draw_topdown  # loads matplotlib, which batches do not need
+            # Batches draw no floor plan, and matplotlib takes long to load.
+            from experiments.analysis.topdown import draw_topdown
 
             draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], arrays)
         metrics = {
