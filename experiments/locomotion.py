@@ -199,11 +199,12 @@ class LocomotionController:
 
     def _obstacles(self, seen: Observation) -> Obstacles:
         """What lies on the floor, but for the object that the present or last visit is about."""
-        if seen.object_status is not self._status and seen.object_status != self._status:
+        if seen.object_status != self._status:
             self._status = seen.object_status
             target = None if self._visit is None else self._visit.object
             pairs = zip(seen.object_names, seen.object_status, strict=True)
-            self._is_obstacle = np.array([s is ObjectStatus.LOOSE and n != target for n, s in pairs])
+            flags = [status is ObjectStatus.LOOSE and name != target for name, status in pairs]
+            self._is_obstacle = np.array(flags, np.bool_)
         return Obstacles(np.ascontiguousarray(seen.object_positions), self._is_obstacle, self._walls)
 
 
