@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.support.carrying_sessions import CarryResult, run_session
 from benchmarks.support.parallel_sessions import run_sessions
-from experiments.requirements import Requirement, requirement_lines
+from benchmarks.support.requirements import Requirement, requirement_lines
 
 COUNT, QUICK = 200, 20
 STRAIGHT, CORNER = (1.35, 0.2), (1.2, 1.0)  # m/s at least; rad/s at most, at least

@@ -75,7 +75,7 @@ def compare(full: Sequence[TierResult], tier: Sequence[TierResult]) -> dict[str,
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result as text: a table in Markdown, then the verdicts."""
+    """The result as text: a table in Markdown, then the requirements."""
     yield f"{result['seeds']} houses of each difficulty; differences from `full`: of the mean (largest of any trial)"
     yield ""
     yield "| participant | objects | fidelity | same deliveries | time | distance | IPL | deviations |"
@@ -90,8 +90,8 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     others = [row for row in result["rows"] if row["fidelity"] != "full"]
     same = min(row["same_deliveries"] for row in others)
     worst = max(abs(row["completion_time_s"]["difference"]) for row in others)
-    yield _verdict("same deliveries, worst cell", f"{same:.1%}", same >= SAME_DELIVERIES, "= 100 %")
-    yield _verdict("mean completion time, worst cell", f"{worst:.2%}", worst <= TIME_DIFFERENCE, "<= 1 %")
+    yield _requirement("same deliveries, worst cell", f"{same:.1%}", same >= SAME_DELIVERIES, "= 100 %")
+    yield _requirement("mean completion time, worst cell", f"{worst:.2%}", worst <= TIME_DIFFERENCE, "<= 1 %")
 
 
 def _cells(row: dict[str, Any]) -> Iterator[str]:
@@ -108,5 +108,5 @@ def _cells(row: dict[str, Any]) -> Iterator[str]:
             yield f"{row[name]['difference']:+.2%} ({row[name]['largest']:+.1%})"
 
 
-def _verdict(what: str, value: str, holds: bool, target: str) -> str:
-    return f"{what}: {value} ({target}: {'holds' if holds else 'MISSED'})"
+def _requirement(what: str, value: str, met: bool, target: str) -> str:
+    return f"{what}: {value} ({target}: {'pass' if met else 'FAIL'})"

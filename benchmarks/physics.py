@@ -63,7 +63,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     for row in result["tiers"]:
         speed, target = row["speed"], targets[row["fidelity"]]
         ratio = speed / full["speed"]
-        yield f"  {row['fidelity']:9}{speed:9.0f}{ratio:7.1f} x full  (>= {target:g}: {verdict(speed >= target)})"
+        yield f"  {row['fidelity']:9}{speed:9.0f}{ratio:7.1f} x full  (>= {target:g}: {outcome(speed >= target)})"
     yield "tier full, us per control step:"
     yield f"{'objects':>9}{'World.step':>12}{'mj_step':>9}{'ratio':>8}{'awake':>7}{'contacts':>10}"
     for row in result["overhead"]:
@@ -72,7 +72,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
             f"{row['contacts']:10.1f}"
         )
     ratio = next(row["ratio"] for row in result["overhead"] if row["objects"] == result["objects"])
-    yield f"World.step over mj_step: {ratio:.2f} (<= {MAX_OVERHEAD:g}: {verdict(ratio <= MAX_OVERHEAD)})"
+    yield f"World.step over mj_step: {ratio:.2f} (<= {MAX_OVERHEAD:g}: {outcome(ratio <= MAX_OVERHEAD)})"
     memory = result["memory"]
     yield f"memory: {memory['world_mb']:.2f} MB per world, {memory['model_mb']:.1f} MB per scene"
     set_up = result["set_up"]
@@ -85,9 +85,9 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
         yield f"  {name:28}{100 * share:5.1f} %"
 
 
-def verdict(holds: bool) -> str:
+def outcome(met: bool) -> str:
     """For people."""
-    return "holds" if holds else "MISSED"
+    return "pass" if met else "FAIL"
 
 
 def measure_tier(house: House, fidelity: str, seeds: Sequence[int], repeats: int) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.support.parallel_sessions import run_sessions
 from benchmarks.support.placement_sessions import LEVELS, NOT_TRIED, Placement, run_session
-from experiments.requirements import Requirement, requirement_lines
+from benchmarks.support.requirements import Requirement, requirement_lines
 
 COUNT, QUICK = 10_000, 300
 REQUIREMENTS = (

@@ -18,6 +18,7 @@ import numpy as np
 
 from benchmarks.support.environment_speed import SETTINGS, steps_per_second
 from benchmarks.support.hud_speed import hud_milliseconds, session_states, summary
+from benchmarks.support.requirements import outcome
 from experiments.conditions import TaskBoard
 from experiments.house import House
 from experiments.trial import TrialConfig
@@ -123,8 +124,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     for name, rate in result["environment"].items():
         yield f"  {name}: {rate:.0f}"
     for label, key, relation, bound in TARGETS:
-        holds = result[key] <= bound if relation == "<=" else result[key] >= bound
-        yield f"{label}: {result[key]:.2f} ({relation} {bound:g}: {'holds' if holds else 'MISSED'})"
+        yield f"{label}: {result[key]:.2f} ({relation} {bound:g}: {outcome(result[key], relation, bound)})"
 
 
 def make_subject(clock: Callable[[], float]) -> Subject:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from benchmarks.support.requirements import outcome
 from experiments.batch import BatchConfig, run_batch
 from experiments.warmup import compile_kernels
 
@@ -110,11 +111,10 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     yield ""
     for row in rows:
         what = f"{row['fidelity']}, {row['user']}"
-        yield _verdict(what, row["simulated_per_s"], row["wanted"], ">=", " simulated s per s")
+        yield _requirement(what, row["simulated_per_s"], row["wanted"], ">=", " simulated s per s")
     worst = max(row["house_s"] for row in rows)
-    yield _verdict("house loaded in a new process, slowest", worst, HOUSE_WANTED, "<=", " s")
+    yield _requirement("house loaded in a new process, slowest", worst, HOUSE_WANTED, "<=", " s")
 
 
-def _verdict(what: str, value: float, wanted: float, sign: str, unit: str) -> str:
-    holds = value >= wanted if sign == ">=" else value <= wanted
-    return f"{what}: {value:.4g}{unit} ({sign} {wanted:g}: {'holds' if holds else 'MISSED'})"
+def _requirement(what: str, value: float, wanted: float, sign: str, unit: str) -> str:
+    return f"{what}: {value:.4g}{unit} ({sign} {wanted:g}: {outcome(value, sign, wanted)})"

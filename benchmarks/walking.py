@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support.parallel_sessions import run_sessions
+from benchmarks.support.requirements import Requirement, requirement_lines
 from benchmarks.support.walking_sessions import SECONDS, WalkResult, run_session
-from experiments.requirements import Requirement, requirement_lines
 
 HOURS, QUICK = 1.0, 0.05
 SLOW = 2.0  # m/s: sessions up to this speed are reported apart

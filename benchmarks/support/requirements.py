@@ -26,5 +26,9 @@ class Requirement(NamedTuple):
 def requirement_lines(result: Mapping[str, Any], requirements: Sequence[Requirement]) -> Iterator[str]:
     """One line per requirement, which ends in `pass` or `FAIL`."""
     for label, key, relation, bound in requirements:
-        met = _RELATIONS[relation](result[key], bound)
-        yield f"{label}: {result[key]:.4g} ({relation} {bound:g}: {'pass' if met else 'FAIL'})"
+        yield f"{label}: {result[key]:.4g} ({relation} {bound:g}: {outcome(result[key], relation, bound)})"
+
+
+def outcome(value: float, relation: str, bound: float) -> str:
+    """`pass` if a value keeps its bound, else `FAIL`."""
+    return "pass" if _RELATIONS[relation](value, bound) else "FAIL"
