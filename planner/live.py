@@ -87,7 +87,6 @@ class LiveReplanner(Replanner):
         limit: SolveLimit | None = None,
     ) -> None:
         super().__init__(geodesics, solver, capacity=capacity, seed=seed, limit=limit or PROOF_LIMIT)
-        self.solver = solver
         self._proof: _Proof | None = None
         self._thread: threading.Thread | None = None
         self._warm = NOTHING_KNOWN
@@ -193,8 +192,8 @@ class LiveReplanner(Replanner):
 
     def _plans(self, problem: RoutingProblem, state: TaskState, stop: threading.Event) -> Iterator[Plan]:
         limit = replace(self._limit or PROOF_LIMIT, stop=stop)
-        if not isinstance(self.solver, ExactSolver):
-            return self.solver.improve(problem, seed=self._seed, limit=limit)
+        if not isinstance(self._solver, ExactSolver):
+            return self._solver.improve(problem, seed=self._seed, limit=limit)
         warm = self._warm
         if self._route is not None:
             picks = [
@@ -202,7 +201,7 @@ class LiveReplanner(Replanner):
             ]
             moved = set(self._moved(state, picks))
             warm = replace(warm, order=tuple(name for name in picks if name not in moved))
-        return self.solver.improve(problem, seed=self._seed, limit=limit, warm=warm)
+        return self._solver.improve(problem, seed=self._seed, limit=limit, warm=warm)
 
 
 def _with_bound(proof: _Proof, other: Plan) -> Plan:

@@ -43,7 +43,8 @@ class Replanner:
     ) -> None:
         self.problems = TaskProblems(geodesics, capacity)
         self.replans = 0
-        self._solver = TaskSolver(solver) if isinstance(solver, ExactSolver) else solver
+        self._solver = solver
+        self._task_solver = TaskSolver(solver) if isinstance(solver, ExactSolver) else solver
         self._seed = seed
         self._limit = limit
         self._route: Route | None = None
@@ -67,7 +68,7 @@ class Replanner:
             UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
             ProblemError: More is carried than the capacity allows.
         """
-        plan = self._solver.solve(self.problems.problem(state), seed=self._seed, limit=self._limit)
+        plan = self._task_solver.solve(self.problems.problem(state), seed=self._seed, limit=self._limit)
         return self._follow(Route(plan.visits, plan.cost, plan), state)
 
     def prepare(self, state: TaskState, *, seconds: float | None = None) -> Route:  # noqa: ARG002 - it never waits
