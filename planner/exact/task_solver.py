@@ -1,6 +1,5 @@
 """The exact planner for the successive states of one task: later plans start from earlier ones."""
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from planner.exact.task_table import TaskTable
@@ -41,9 +40,3 @@ class TaskSolver:
             plan = self._solver.solve(problem, seed=seed, limit=limit)
         self._warm = self._warm.updated(problem, plan)
         return plan
-
-    def improve(
-        self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
-    ) -> Iterator[Plan]:
-        """Yield the one plan of `solve`."""
-        yield self.solve(problem, seed=seed, limit=limit)
