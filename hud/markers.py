@@ -1,5 +1,7 @@
 """World-locked digital objects of the conditions: flagpoles, breadcrumbs, the goal (PAPER section 5)."""
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,6 +58,7 @@ def rims(crumbs: tuple[Marker, ...]) -> tuple[Marker, ...]:
     )
 
 
+@functools.lru_cache(maxsize=1024)  # most objects stay where they are from one state to the next
 def flagpole(
     position: Vec3, *, object: str | None = None, low: bool = False, x_ray: bool = False
 ) -> tuple[Marker, ...]:
