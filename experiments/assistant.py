@@ -40,8 +40,8 @@ class RoutePlanner(Protocol):
         """Whether `poll` may have a better route."""
         ...
 
-    def update(self, state: TaskState) -> Route:
-        """The route for the task as it is now."""
+    def update(self, state: TaskState, *, shown: bool = True) -> Route:
+        """The route for the task as it is now; `shown` tells whether somebody sees it."""
         ...
 
     def poll(self, state: TaskState) -> Route | None:
@@ -229,7 +229,7 @@ class Assistant:
         """Follow the plan on, or make a new one where the task is no longer as planned."""
         replans, first = self._planner.replans, self._route is None
         state = self.task_state(observation)
-        self._route = self._planner.update(state)
+        self._route = self._planner.update(state, shown=GOAL in self.shown_roles)
         self._regrets.begin(state, self._route.plan)
         self._begin_path(observation)
         replanned = self._planner.replans > replans

@@ -124,6 +124,10 @@ class LiveReplanner(Replanner):
         self.wait(seconds)
         return self.poll(state) or route
 
+    def update(self, state: TaskState, *, shown: bool = True) -> Route:  # noqa: ARG002 - nobody waits for it
+        """See :class:`planner.replanner.Replanner`; a new plan starts from earlier ones, shown or not."""
+        return super().update(state)
+
     def plan(self, state: TaskState) -> Route:
         """Follow the first plan from now on, and look for a better one in the background.
 

@@ -22,7 +22,7 @@ class Replanner:
 
     Args:
         geodesics: Distances and paths.
-        solver: Finds the tours; with the exact one, a new plan starts from what the last ones have found.
+        solver: Finds the tours.
         capacity: How many objects can be carried.
         seed: Handed to the solver.
         limit: Handed to the solver.
@@ -68,7 +68,10 @@ class Replanner:
             UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
             ProblemError: More is carried than the capacity allows.
         """
-        plan = self._task_solver.solve(self.problems.problem(state), seed=self._seed, limit=self._limit)
+        return self._plan(state, self._solver)
+
+    def _plan(self, state: TaskState, solver: "Solver | TaskSolver") -> Route:
+        plan = solver.solve(self.problems.problem(state), seed=self._seed, limit=self._limit)
         return self._follow(Route(plan.visits, plan.cost, plan), state)
 
     def prepare(self, state: TaskState, *, seconds: float | None = None) -> Route:  # noqa: ARG002 - it never waits
@@ -89,22 +92,25 @@ class Replanner:
         """A better route than the present one, if one was found meanwhile; this replanner finds none."""
         return None
 
-    def update(self, state: TaskState) -> Route:
+    def update(self, state: TaskState, *, shown: bool = True) -> Route:
         """The route for the task as it is now.
 
         If what was done since is the beginning of the route, the rest of it stays; otherwise (or if an object was
         pushed far) the task is planned anew and `replans` goes up by one.
 
+        Args:
+            state: The task as it is now.
+            shown: Whether somebody sees the plan. It then depends on this state alone. One that nobody sees starts from
+                what earlier ones have found: several times quicker, but of equally short tours it may be another.
+
         Raises:
             UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
             ProblemError: More is carried than the capacity allows.
         """
-        if self._route is None:
-            return self.plan(state)
-        rest = self._rest(state)
-        if rest is None:
-            self.replans += 1
-            return self.plan(state)
+        rest = None if self._route is None else self._rest(state)
+        if self._route is None or rest is None:
+            self.replans += self._route is not None
+            return self.plan(state) if shown else self._plan(state, self._task_solver)
         self._route = Route(rest, self.problems.length(state, rest), self._route.plan)
         return self._route
 

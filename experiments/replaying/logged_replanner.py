@@ -39,7 +39,7 @@ class LoggedReplanner:
         """
         return self.update(state) if self.pending else None
 
-    def update(self, state: TaskState) -> Route:
+    def update(self, state: TaskState, *, shown: bool = True) -> Route:  # noqa: ARG002 - both are logged
         """The plan that was logged now, or the rest of the plan before.
 
         Raises:
