@@ -30,6 +30,7 @@ from mjsim.model.scene import Scene, compose
 from mjsim.render import CameraPose, Renderer, render_house_map, render_pictures
 from mjsim.testing import FrameMismatchError, compare_frame, fixtures, psnr
 from mjsim.world import World
+from planner.plan import Visit, VisitKind
 
 Image = NDArray[np.uint8]
 Compare = fixtures.GoldenFrame
@@ -80,7 +81,7 @@ def studio():
     pose = CameraPose.looking_at(seen.eye, seen.eye + direction, FOVY)
     view = TaskBoard(house, scene.episode, names[::-1]).view(
         dataclasses.replace(seen, heading=heading),
-        plan=[(k, n) for n in ("object_09", *names[:3]) for k in ("pick", "place")],
+        visits=[Visit(k, n) for n in ("object_09", *names[:3]) for k in (VisitKind.PICK, VisitKind.PLACE)],
         path=path,
         camera=CameraView(pose.position, pose.rotation, pose.fovy, 640, 480),
     )

@@ -213,6 +213,7 @@ from mjsim.episode import Episode
 from mjsim.render import Renderer, render_pictures
 from mjsim.model.scene import compose
 from mjsim.world import World
+from planner.plan import Visit, VisitKind
 import pathlib
 house = House.load("apartment")
 scene = compose(Episode.load(pathlib.Path(sys.argv[1])), house.catalogue)
@@ -220,7 +221,7 @@ world = World(scene)
 seen = world.reset()
 names = list(seen.object_names)
 path = house.geodesics.shortest_path(seen.position, seen.object_positions[9, :2]).points
-view = TaskBoard(house, scene.episode, names).view(seen, plan=[("pick", names[9])], path=path)
+view = TaskBoard(house, scene.episode, names).view(seen, visits=[Visit(VisitKind.PICK, names[9])], path=path)
 compositor = Compositor(render_pictures(house.catalogue, 48))
 with Renderer(scene.model, width=320, height=240) as renderer:
     for name in ("none", "highlight-xray", "optimal"):

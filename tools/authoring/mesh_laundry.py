@@ -15,7 +15,7 @@ def meshes() -> dict[str, Surface]:
 
 
 def _socks() -> dict[str, Surface]:
-    """Two socks side by side, one half on the other; locomotion along y."""
+    """Two socks side by side, one half on the other; legs along y."""
     leg = Polygon(mm("-28 -20, -28 110, 28 110, 28 -50, 0 -85"))
     foot = Polygon(mm("-28 -20, 0 -85, 28 -50, -30 0, -100 -30, -100 -85"))
     sock = leg.union(foot.buffer(0.002)).union(Point(-0.085, -0.058).buffer(0.03, quad_segs=4))
