@@ -55,9 +55,8 @@ class TrialConfig:
         house: House name, or path of a catalogue.
         planner: Solver of the routing problem.
         time_limit: Simulated time after which the trial ends, s; None for a generous one.
-        live: Plan against the clock, with proofs in the background, as for a person; what takes long is done before
-            the clock starts. Such a run depends on how fast the machine is; a replay of it shows the plans that were
-            shown.
+        live: Plan in real time, with proofs in the background, as for a person. Such a run depends on the machine's
+            speed; a replay shows the plans that were shown.
         fidelity: How much of the world is physics: `full`, `windows` or `event` (docs/fidelity.md).
         regret: Log for every visit by how much it makes the rest of the task longer than the best one would.
     """
@@ -129,8 +128,7 @@ def run_trial(
             kept = keep_failed(folder, out)
             raise PhysicsError(f"{result.ended} (kept for `mjsim replay {kept}`)") from result.ended
         if topdown:
-            # Batches draw no floor plan, and matplotlib takes long to load.
-            from experiments.analysis.topdown import draw_topdown
+            from experiments.analysis.topdown import draw_topdown  # matplotlib: batches do without
 
             draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], arrays)
         metrics = {

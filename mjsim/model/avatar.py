@@ -54,8 +54,7 @@ REST = (0.34, 0.27, 1.00)
 CARRY = (0.50, 0.24, 1.25)
 TUCKED = (0.27, 0.19, 1.22)
 ASIDE = (0.30, 0.42, 1.26)
-HAND_KP = 2000.0
-HAND_KV = 130.0
+HAND_KP, HAND_KV = 2000.0, 130.0
 HAND_FORCE = 80.0
 
 # Kind of weld -> time constant, s, torque scale, minimum and maximum impedance. A gentle weld turns a fallen object

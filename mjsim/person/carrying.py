@@ -21,11 +21,11 @@ from mjsim.person.postures import (
     Contacts,
     Hands,
     Holding,
-    count_strain,
     drawn_in,
     update_hands,
 )
 from mjsim.person.slots import object_corners
+from mjsim.person.strain import count_strain
 
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 _HOUSE, _PERSON = -1, -2  # owners of geoms that belong to no object

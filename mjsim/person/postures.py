@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
 from mjsim.model.clearance import ClearanceField, clearance_at
-from mjsim.person.grips import site_gap
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -29,25 +28,14 @@ MARGIN = 0.03  # m
 NEAR, FAR = 0.15, 0.3  # s, how far ahead a hand looks
 ROUNDS = 3
 MAX_SHIFT = 0.2  # m
-EXTENSIONS = (
-    0.0,
-    0.15,
-    0.3,
-    0.45,
-    0.6,
-    0.7,
-    0.8,
-    0.9,
-    1.0,
-)  # of the line from the body's axis to the posture
+# Of the line from the body's axis to the posture.
+EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 OVER_GAP = 0.04  # m, between two held objects one above the other
 PASSING = 0.10  # m of approach over which one is raised above the other
 PUSH_BACK = 0.25  # m/s beyond the speed of approach
 RELAX = 0.9  # 1/s
 MAX_COMPLIANCE = 0.15  # m
 UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
-
-MAX_SERVO_LAG = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
 
 POSTURE_GAIN = 7.0  # 1/s
 POSTURE_SPEED = 1.5  # m/s
@@ -293,40 +281,3 @@ def _give_way(hand: int, nx: float, ny: float, body: BodyMotion, hands: Hands, d
         if into < 0.0:
             command[FORWARD] -= into * away_f
             command[LEFT] -= into * away_l
-
-
-@kernel
-def count_strain(
-    pose: Floats, targets: Floats, site_xpos: Floats, sites: NDArray[np.intp], held: tuple[bool, bool],
-    max_error: float, patience: float, strained: NDArray[np.int64],
-) -> int:  # fmt: skip
-    """Count for how many control steps each hand has been strained.
-
-    Args:
-        pose: `Rig.pose`.
-        targets: `Rig.hand_targets`.
-        site_xpos: Positions of all sites, m, (nsite, 3).
-        sites: `Grips.sites`.
-        held: Whether the left and the right hand carry something.
-        max_error: A weld stretched farther than this is strained, m.
-        patience: Control steps after which a load slips.
-        strained: Steps per hand, (2,); changed.
-
-    Returns:
-        Hands whose load slips: 1 for the left one, 2 for the right one, or their sum.
-    """
-    slipping = 0
-    for hand in range(2):
-        if not held[hand]:
-            strained[hand] = 0
-            continue
-        lag = 0.0
-        for axis in range(3):
-            lag += (pose[4 + 3 * hand + axis] - targets[hand, axis]) ** 2
-        first, second = sites[hand, 0], sites[hand, 1]
-        error = site_gap(site_xpos, first, second) if first >= 0 else 0.0
-        tense = error > max_error or math.sqrt(lag) > MAX_SERVO_LAG
-        strained[hand] = strained[hand] + 1 if tense else 0
-        if strained[hand] > patience:
-            slipping += 1 << hand
-    return slipping
