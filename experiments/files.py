@@ -23,6 +23,9 @@ def read_arrays(path: Path, dimensions: Mapping[str, int] | None = None) -> dict
         path: The file.
         dimensions: Number of dimensions of each array that must be there; None for no check.
 
+    Returns:
+        The arrays by name, of any shape.
+
     Raises:
         RecordError: The file is missing, cut short, damaged or incomplete; the message names it.
     """
@@ -40,7 +43,7 @@ def read_arrays(path: Path, dimensions: Mapping[str, int] | None = None) -> dict
 
 
 def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write a compressed NPZ, whole or not at all.
+    """Write arrays of any shape to a compressed NPZ, whole or not at all.
 
     As `np.savez_compressed`, whose level takes twice the time for files smaller by a tenth.
     """

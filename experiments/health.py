@@ -25,7 +25,7 @@ def summarise_health(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]
 
     Args:
         events: The event log.
-        arrays: The trajectory.
+        arrays: The trajectory, names and shapes as in `Trajectory`.
 
     Returns:
         Rows of `metrics.json`, such as `max_weld_error_m`.

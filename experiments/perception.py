@@ -41,7 +41,7 @@ class SessionPercept(Percept):
         self._world, self._assistant, self._hud = world, assistant, hud
 
     def look(self) -> Mapping[str, Point]:
-        """What has been put away stays in view, in its bin, but is not misplaced."""
+        """Misplaced objects in view -> floor position, m, shape (2,); what lies in its bin is not misplaced."""
         return self._in_view
 
     @cached_property
@@ -62,7 +62,7 @@ class SessionPercept(Percept):
 
     @cached_property
     def flagpoles(self) -> Mapping[str, Point]:
-        """What the picture shows, and no more."""
+        """What the picture shows, and no more: object -> floor position, m, shape (2,)."""
         if FLAGPOLE not in self._assistant.shown_roles:
             return {}
         return {name: np.array(place) for name, place in flagpoles(self._hud()).items()}

@@ -102,7 +102,7 @@ class Recording:
         save_arrays(path, arrays)
 
     def state_hashes(self) -> NDArray[np.uint64]:
-        """Hashes of the states since `first`, in order."""
+        """Hashes of the states since `first`, in order, shape (steps,)."""
         return np.array(self._state_hash, np.uint64)
 
     def _due(self, busy: bool) -> bool:

@@ -154,7 +154,7 @@ class Trajectory:
         columns.action[first : self._length, 2:] = moves
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Everything so far, as arrays by name; views that further steps leave unchanged."""
+        """Everything so far, as arrays by name, shapes as above; views that further steps leave unchanged."""
         arrays = {name: column[: self._length] for name, column in self._columns._asdict().items()}
         health, first = arrays.pop("health"), 0
         for name, width in HEALTH.items():

@@ -54,7 +54,7 @@ class ShownPath:
         return np.asarray(rest_of(self.points, position[0], position[1]))
 
     def follow(self, position: Point, target: Point, goal: Point) -> None:
-        """Show a new path if the person has left this one or its goal has moved; arguments as in `begin`."""
+        """Show a new path if the person has left this one or its goal has moved; all m, shape (2,), as in `begin`."""
         if self._points is None:
             return
         gap = project(self._points, position[0], position[1])[1]

@@ -107,7 +107,7 @@ class WorldState:
 
     @classmethod
     def from_json(cls, physics: NDArray[np.float64], details: str) -> "WorldState":
-        """The state of an array and of what `details_json` gave.
+        """The state of `physics`, shape (n,), and of what `details_json` gave.
 
         Raises:
             StateError: `details` is something else.
@@ -145,7 +145,7 @@ def take_physics(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float
 
 
 def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.float64]) -> None:
-    """Reset the data and set it to a state of `take_physics`, independently of what it was before.
+    """Reset the data and set it to a state of `take_physics`, shape (n,), whatever it was before.
 
     Raises:
         StateError: The state is of another model, or not finite.

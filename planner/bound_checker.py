@@ -63,7 +63,11 @@ def _refuse(claimed: float, derived: float, rounding: float, what: str) -> None:
 
 
 def claim(problem: RoutingProblem, certificate: Certificate) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Group of each shipment in a table, and the price of picking it, units of 1e-5 m."""
+    """Group of each shipment in a table, (n,), and the price of picking it, (n,), units of 1e-5 m.
+
+    Raises:
+        ProblemError: The certificate is not about these shipments.
+    """
     n = len(problem.shipments)
     if certificate.proof is Proof.FULL_TABLE:
         return np.arange(n), np.zeros(n, np.int64)

@@ -86,7 +86,7 @@ class OrToolsSolver:
 
 
 def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> tuple[list[Visit], int]:
-    """The best tour and its integer length, by trying all; for very few objects."""
+    """The best tour and its length in an integer metric (k, k), by trying all; for very few objects."""
     best: list[Visit] = []
     best_length = math.inf
 

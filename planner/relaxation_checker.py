@@ -48,7 +48,7 @@ class Relaxed:
 
 
 def closed(distances: NDArray[Any]) -> NDArray[Any]:
-    """Shortest connections; no tour of the given distances is shorter than in these."""
+    """Shortest connections, (k, k) as the distances; no tour of the given distances is shorter than in these."""
     shortest: NDArray[Any] = np.minimum(distances, distances.T)
     for k in range(len(shortest)):
         shortest = np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :])

@@ -32,7 +32,7 @@ def integer_metric(distances: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def is_metric(distances: NDArray[np.float64], metric: NDArray[np.int64]) -> bool:
-    """Whether distances keep the triangle inequality, to rounding; `metric` is their closure."""
+    """Whether distances, m, (k, k), keep the triangle inequality, to rounding; `metric` is their closure, (k, k)."""
     return bool((integer_distances(distances) - metric).max(initial=0) <= 2 * len(metric))
 
 
@@ -68,7 +68,12 @@ def tour_length(
 
 
 def spanning_bound(problem: RoutingProblem, metric: NDArray[np.int64]) -> int:
-    """A tour connects all its locations, so it is no shorter than their minimum spanning tree; in units."""
+    """Lower bound of a tour: as it connects all its locations, the length of their minimum spanning tree, units.
+
+    Args:
+        problem: What is left to do.
+        metric: Its integer metric, units, (k, k).
+    """
     from scipy.sparse.csgraph import minimum_spanning_tree  # takes longer to load than most tours to plan
 
     used = sorted(
@@ -95,7 +100,7 @@ def make_plan(
 
     Args:
         problem: What was solved.
-        metric: Its integer metric.
+        metric: Its integer metric, units of 0.1 mm, (k, k).
         visits: The tour.
         bound: Lower bound in the integer metric, units of 0.1 mm.
         started: `time.perf_counter()` when solving began.

@@ -84,7 +84,7 @@ def _edges(geometry: shapely.Geometry) -> NDArray[np.float64]:
 
 @kernel
 def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) -> bool:
-    """Whether a line from (x, y) passes a vertex with both of the vertex's neighbours on one side."""
+    """Whether a line from (x, y) passes a vertex, (6,), with both of its neighbours on one side; all m."""
     ux, uy = vertex[0] - x, vertex[1] - y
     before = ux * (vertex[3] - vertex[1]) - uy * (vertex[2] - vertex[0])
     after = ux * (vertex[5] - vertex[1]) - uy * (vertex[4] - vertex[0])
@@ -97,7 +97,17 @@ def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) ->
 def vertex_pairs(
     vertices: NDArray[np.float64], island: NDArray[np.int64], walls: SegmentGrid, slack: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs i < j of vertices that see each other along a line tangent at both."""
+    """Pairs i < j of vertices that see each other along a line tangent at both.
+
+    Args:
+        vertices: As in `VisibilityGraph`, m, (v, 6).
+        island: Island of each vertex, (v,).
+        walls: Edges of the solid obstacles.
+        slack: Tolerance of the tangents, m.
+
+    Returns:
+        i and j, each of shape (pairs,).
+    """
     rows, columns = [0], [0]
     for i in range(vertices.shape[0]):
         for j in range(i + 1, vertices.shape[0]):
@@ -121,7 +131,19 @@ def visible_vertices(
     walls: SegmentGrid,
     slack: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Usable vertices that a point sees along tangents, and the distances to them, m."""
+    """Usable vertices that a point sees along tangents, and the distances to them.
+
+    Args:
+        x: Of the point, m.
+        y: Of the point, m.
+        vertices: As in `VisibilityGraph`, m, (v, 6).
+        usable: Which vertices count, (v,).
+        walls: Edges of the solid obstacles.
+        slack: Tolerance of the tangents, m.
+
+    Returns:
+        Indices of the vertices, and the distances, m, each of shape (seen,).
+    """
     found, lengths = [0], [0.0]
     for j in range(vertices.shape[0]):
         q = vertices[j]
@@ -135,7 +157,7 @@ def visible_vertices(
 def direct_distances(
     a: NDArray[np.float64], b: NDArray[np.float64], walls: SegmentGrid
 ) -> NDArray[np.float64]:
-    """Straight distance from each a to each b, infinite where a wall is between, (len(a), len(b)), m."""
+    """Straight distances from points a (s, 2) to points b (t, 2), infinite where a wall is between, (s, t); all m."""
     result = np.full((a.shape[0], b.shape[0]), np.inf)
     for i in range(a.shape[0]):
         for j in range(b.shape[0]):

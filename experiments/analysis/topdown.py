@@ -34,7 +34,7 @@ def draw_topdown(
         house: The house.
         scene: The composed episode.
         plan: The first `plan` event of the log.
-        arrays: The trajectory, as `Trajectory.arrays` gives it.
+        arrays: The trajectory, as `Trajectory.arrays` gives it; only `position` is drawn, m, shape (T, 2).
     """
     x_min, y_min, x_max, y_max = house.bounds
     figure = Figure(

@@ -76,21 +76,33 @@ def add_parser(commands: Any) -> None:
 
 
 def positive(text: str) -> int:
-    """Parse a whole number above 0."""
+    """Parse a whole number above 0.
+
+    Raises:
+        argparse.ArgumentTypeError: The text is something else.
+    """
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
     return int(text)
 
 
 def natural(text: str) -> int:
-    """Parse a whole number, 0 included."""
+    """Parse a whole number, 0 included.
+
+    Raises:
+        argparse.ArgumentTypeError: The text is something else.
+    """
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
     return int(text)
 
 
 def positive_number(text: str) -> float:
-    """Parse a finite number above 0."""
+    """Parse a finite number above 0.
+
+    Raises:
+        argparse.ArgumentTypeError: The text is something else.
+    """
     try:
         value = float(text)
     except ValueError:

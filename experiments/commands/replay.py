@@ -75,7 +75,11 @@ def point(text: str) -> tuple[float, float, float]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Replay with a progress bar; 1 if something differs from the record."""
+    """Replay with a progress bar; 1 if something differs from the record.
+
+    Raises:
+        ConfigError: A camera is given, but no film.
+    """
     film = None
     if arguments.video is not None:
         film = ReplayFilm(

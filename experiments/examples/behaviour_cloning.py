@@ -57,7 +57,11 @@ class Settings:
 
 
 def make_environment(episodes: int | None, time_limit: float, sensors: Sequence[Sensor] = ()) -> RearrangeEnv:
-    """An environment with one object and 8 actions per second; `sensors` are added to the state."""
+    """An environment with one object and 8 actions per second; `sensors` are added to the state.
+
+    Raises:
+        TypeError: Gymnasium made another environment.
+    """
     made = gymnasium.make(
         "mjsim.environments:mjsim/Rearrange-v0",
         objects=1,

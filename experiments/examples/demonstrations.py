@@ -77,7 +77,7 @@ def _without_objects(observation: Observation) -> Observation:
 
 
 def encode(action: Action, options: WorldOptions) -> NDArray[np.float32]:
-    """An action of the world as an action of continuous control: (forward, left, turn, trigger)."""
+    """An action of the world as one of continuous control: (forward, left, turn, trigger), -1 to 1, shape (4,)."""
     if isinstance(action, Move):
         speed, turn = options.max_speed, options.max_turn
         values = [action.forward / speed, action.left / speed, action.turn / turn, 0.0]

@@ -67,7 +67,7 @@ class VisitExecutor:
     def walk_to(
         self, percept: Percept, goal: Point, stop_distance: float, *, until: float | None = None
     ) -> Decision:
-        """Walk the shortest known path to a place, up to `stop_distance` m from it."""
+        """Walk the shortest known path to a place, m, shape (2,), up to `stop_distance` m from it."""
         return WalkAlong(self._path_to(percept, goal), goal, stop_distance, until=until)
 
     def _take_up(self, percept: Percept, visit: Visit) -> None:
@@ -119,7 +119,7 @@ def nearest_visit(
 
 
 def estimated_distance(house: House, start: Point, goal: Point) -> float:
-    """Walking distance in m as a person estimates it; very far when there is no path."""
+    """Walking distance, m, between two points (2,), m, as a person estimates it; `FAR` when there is no path."""
     try:
         return house.geodesics.shortest_path(start, goal).geodesic_distance
     except PlannerError:
@@ -127,7 +127,7 @@ def estimated_distance(house: House, start: Point, goal: Point) -> float:
 
 
 def estimated_distances(house: House, start: Point, goals: Sequence[Point]) -> list[float]:
-    """Walking distances in m from one point to several, as `estimated_distance`."""
+    """Walking distances, m, from one point to several, each m, shape (2,), as `estimated_distance`."""
     try:
         return [float(gap) for gap in house.geodesics.distances_from(start, np.array(goals))]
     except PlannerError:  # one of them cannot be reached

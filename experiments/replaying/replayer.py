@@ -74,7 +74,11 @@ class Replayer:
         self._participant = RecordedParticipant(record, self._world, self.recording)
 
     def run(self, viewer: Viewer | None, on_progress: Callable[[int, int], None]) -> None:
-        """Replay to the end or to the first mismatch."""
+        """Replay to the end or to the first mismatch.
+
+        Raises:
+            KeyboardInterrupt: The user interrupted the replay.
+        """
         record, recording = self.record, self.recording
         session = Session(
             self._world,
@@ -107,7 +111,7 @@ class Replayer:
 
     @property
     def arrays(self) -> Mapping[str, NDArray[Any]]:
-        """Trajectory of the replay, from `first` on."""
+        """Trajectory of the replay, from `first` on; names and shapes as in `Trajectory`."""
         return self._trajectory.arrays()
 
     @property

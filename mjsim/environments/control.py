@@ -68,7 +68,11 @@ class Continuous:
         return specs.BoundedArray((4,), np.float32, -1.0, 1.0, name="action")
 
     def steps(self, action: Any, observation: Observation, options: WorldOptions) -> Steps:  # noqa: ARG002
-        """Yield `repeat` actions of the world."""
+        """Yield `repeat` actions of the world.
+
+        Raises:
+            ActionError: The action is not four finite numbers.
+        """
         values = np.asarray(action, dtype=np.float64)
         if values.shape != (4,) or not np.isfinite(values).all():
             raise ActionError(
@@ -110,7 +114,11 @@ class Discrete:
         return specs.DiscreteArray(len(MOVES), dtype=np.int64, name="action")
 
     def steps(self, action: Any, observation: Observation, options: WorldOptions) -> Steps:
-        """Yield as many actions of the world as the action takes."""
+        """Yield as many actions of the world as the action takes.
+
+        Raises:
+            ActionError: The action is no index of `MOVES`.
+        """
         index = np.asarray(action)
         if index.ndim or not np.issubdtype(index.dtype, np.integer) or not 0 <= index < len(MOVES):
             raise ActionError(f"an action is a whole number below {len(MOVES)}, got {action!r}")

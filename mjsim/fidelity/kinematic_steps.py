@@ -109,7 +109,7 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
 
 @kernel
 def held_in(vector: Floats, hand: int) -> int:
-    """Object in a hand, or -1."""
+    """Object in a hand, or -1; the vector is that of a `KinematicState`, shape (STATE_SIZE,)."""
     grasp = int(vector[GRASPS + hand])
     return grasp // 2 if grasp >= 0 else -1
 

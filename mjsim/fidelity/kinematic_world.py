@@ -164,7 +164,7 @@ class KinematicWorld:
         return np.concatenate((self.state.vector, self.state.poses.ravel(), self.asleep))
 
     def unpack(self, values: NDArray[np.float64]) -> None:
-        """Continue from what `pack` gave.
+        """Continue from what `pack` gave, shape (STATE_SIZE + 7 n + trees,).
 
         Raises:
             StateError: It does not fit.

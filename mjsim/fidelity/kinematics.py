@@ -134,7 +134,7 @@ class LocomotionState(NamedTuple):
 def walk(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait, floor: Floor
 ) -> None:
-    """One control step of walking, turning and looking, as `Move(forward, left, turn, look)` asks."""
+    """One control step of a body, shape (BODY_SIZE,), as `Move(forward, left, turn, look)` asks, m/s and rad/s."""
     command(body, forward, left, turn, look, gait)
     advance(body, gait, floor)
 
@@ -143,7 +143,10 @@ def walk(
 def command(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait
 ) -> None:
-    """Slew the commands towards those of `Move(forward, left, turn, look)`; `advance` carries them out."""
+    """Slew the commands towards those of `Move(forward, left, turn, look)`, m/s and rad/s.
+
+    `advance` carries them out. The body has the shape (BODY_SIZE,).
+    """
     motion = body[FORWARD:SERVO]
     rate_limits.change_velocity(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
     rate_limits.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
@@ -152,7 +155,7 @@ def command(
 
 @kernel
 def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
-    """Slew the walk to a stand and the yaw rate towards `turn`, rad/s."""
+    """Slew the walk of a body, shape (BODY_SIZE,), to a stand and its yaw rate towards `turn`, rad/s."""
     motion = body[FORWARD:SERVO]
     rate_limits.change_velocity(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
     rate_limits.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
@@ -160,13 +163,16 @@ def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
 
 @kernel
 def look_at(body: NDArray[np.float64], pitch: float, gait: Gait) -> None:
-    """Command a pitch of the head, rad, kept within what a neck can do."""
+    """Command a pitch of the head, rad, kept within what a neck can do; body of shape (BODY_SIZE,)."""
     body[LOOK] = min(gait.highest, max(gait.lowest, pitch))
 
 
 @kernel
 def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
-    """One control step of the servos, ramped from the last commands to the present ones, and of the trunk."""
+    """One control step of the servos, ramped from the last commands to the present ones, and of the trunk.
+
+    The body has the shape (BODY_SIZE,).
+    """
     heading = body[HEADING] + 0.5 * body[TURN] * gait.dt
     c, s = math.cos(heading), math.sin(heading)
     to_x = c * body[FORWARD] - s * body[LEFT]

@@ -116,7 +116,7 @@ def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
 
 @kernel
 def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> None:
-    """Move the trunk by its velocity for `h` seconds, sliding along what it meets."""
+    """Move the trunk of a body, shape (BODY_SIZE,), by its velocity for `h` s, sliding along what it meets."""
     length = h * math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
     parts = 1 + int(length / _MAX_STEP)
     for _ in range(parts):
@@ -162,7 +162,18 @@ def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int
 def gap_to(
     x: float, y: float, edges: NDArray[np.float64], first: int, last: int
 ) -> tuple[float, float, float]:
-    """Signed distance of a point to a convex polygon, m, and the direction away from it."""
+    """Signed distance of a point to a convex polygon, m, and the direction away from it.
+
+    Args:
+        x: Of the point, m.
+        y: Of the point, m.
+        edges: As in `Floor`, shape (e, 5).
+        first: First edge of the polygon.
+        last: One beyond its last edge.
+
+    Returns:
+        Distance, negative inside, and x and y of the unit vector.
+    """
     nearest, near_x, near_y = math.inf, 0.0, 0.0
     depth, out_x, out_y = -math.inf, 0.0, 0.0
     for edge in range(first, last):

@@ -131,7 +131,11 @@ def compiled_house(catalogue: Catalogue) -> CompiledHouse:
 
 @contextmanager
 def compile_errors(what: str) -> Iterator[None]:
-    """Turn MuJoCo's errors into an `AssetError` that names `what` and says what to do."""
+    """Turn MuJoCo's errors into an `AssetError`.
+
+    Raises:
+        AssetError: `what` does not compile; the message names it and says what to do.
+    """
     try:
         yield
     except (ValueError, mujoco.FatalError) as error:

@@ -76,17 +76,17 @@ class RoomMap:
         return np.asarray(np.hypot(outside[..., 0], outside[..., 1]))
 
     def room_at(self, xy: ArrayLike) -> str:
-        """Key of the room that contains the point (x, y), m, or else of the nearest one."""
+        """Key of the room that contains the point (x, y), m, shape (2,), or else of the nearest one."""
         return self.keys[int(np.argmin(self.distances(xy)))]
 
     def contains(self, xy: ArrayLike, margin: float = 0.0) -> bool:
-        """Whether the point (x, y), m, lies in some room, or within `margin` metres of one."""
+        """Whether the point (x, y), m, shape (2,), lies in some room, or within `margin` metres of one."""
         x, y = np.asarray(xy, dtype=np.float64)[:2].tolist()
         return bool(nearest_rectangle(x, y, *self.rectangles) <= margin)
 
     @property
     def rectangles(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Centres, half sizes and axes, for kernels."""
+        """Centres and half sizes, m, each (k, 2), and axes, (k, 2, 2), for kernels."""
         return self.centers, self.half_sizes, self.axes
 
     def label(self, key: str) -> str:
@@ -115,7 +115,7 @@ def nearest_rectangle(
     half_sizes: NDArray[np.float64],
     axes: NDArray[np.float64],
 ) -> float:
-    """Distance from a point to the nearest of some rectangles, m; 0 inside; arrays as in `RoomMap`."""
+    """Distance from a point to the nearest of k rectangles, m; 0 inside; arrays and shapes as in `RoomMap`."""
     nearest = math.inf
     for k in range(len(centers)):
         dx, dy = x - centers[k, 0], y - centers[k, 1]

@@ -81,7 +81,7 @@ class SceneIndex:
         return int(self.bodies[self.position_of(name)])
 
     def geoms(self, name: str) -> NDArray[np.intp]:
-        """Geom ids of an instance; raises `EpisodeError` for an unknown one."""
+        """Geom ids of an instance, shape (its geoms,); raises `EpisodeError` for an unknown one."""
         return np.flatnonzero(self.geom_owner == self.position_of(name))
 
     def poses(self, qpos: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -105,7 +105,7 @@ class Grips:
 
 @kernel
 def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
-    """Distance between two sites, m."""
+    """Distance between two sites, m; `site_xpos` as in `MjData`, m, shape (nsite, 3)."""
     total = 0.0
     for axis in range(3):
         total += (site_xpos[first, axis] - site_xpos[second, axis]) ** 2
@@ -114,7 +114,7 @@ def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
 
 @kernel
 def site_angle(site_xmat: NDArray[np.float64], first: int, second: int) -> float:
-    """Angle between two sites' frames, rad."""
+    """Angle between two sites' frames, rad; `site_xmat` as in `MjData`, shape (nsite, 9)."""
     trace = 0.0  # of the rotation from one to the other: 1 + 2 cos(angle)
     for k in range(9):
         trace += site_xmat[first, k] * site_xmat[second, k]

@@ -128,7 +128,13 @@ class Person:
         self.rig.motion[3] = min(highest, max(lowest, target))
 
     def face(self, point: NDArray[np.float64], tolerance: float, heading: float | None = None) -> Steps:
-        """Stand still and turn to a point, or to a heading while glancing at the point; the tolerance is in rad."""
+        """Stand still and turn to a point, or to a heading while glancing at the point.
+
+        Args:
+            point: In the house frame, m, shape (3,).
+            tolerance: Remaining error at which the turn is done, rad.
+            heading: Where to turn, rad; None for the direction of the point.
+        """
         motion = self.motion
         for _ in range(self.steps(motion.turn_timeout)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)

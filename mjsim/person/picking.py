@@ -53,7 +53,7 @@ def take(
     carry_position: Callable[[int, int], NDArray[np.float64]],
     pitch: float,
 ) -> Motion:
-    """Lift object `item`, which the hand has reached; the rest is as in `pick`."""
+    """Lift object `item`, which the hand has reached; the rest, `carry_position` (3,) m too, is as in `pick`."""
     grips = person.grips
     person.moving_hand = hand
     grip = grips.nearest_grip(hand, item)

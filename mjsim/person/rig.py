@@ -149,7 +149,7 @@ class Rig:
         return np.array([c * (px - x) + s * (py - y), c * (py - y) - s * (px - x), pz])
 
     def bearing(self, point: Vector) -> float:
-        """Direction of a point relative to the heading, rad in [-pi, pi]."""
+        """Direction of a point, m, shape (2,) or (3,), relative to the heading, rad in [-pi, pi]."""
         x, y, heading = self.pose[:3].tolist()
         dx, dy = float(point[0]) - x, float(point[1]) - y
         c, s = math.cos(heading), math.sin(heading)

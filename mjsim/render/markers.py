@@ -29,26 +29,32 @@ _SIZES = {"sphere": 1, "cylinder": 2, "box": 3}
 
 
 class MarkerLike(Protocol):
-    """What a marker must offer.
-
-    Attributes:
-        shape: `sphere`, `cylinder` (upright) or `box`.
-        position: Centre in the house frame, m.
-        size: Radius; radius and half-length; half-sizes, m.
-        rgba: Colour and opacity, components 0 to 1.
-        x_ray: Whether it also shows, dimmed, through walls.
-    """
+    """What a marker must offer."""
 
     @property
-    def shape(self) -> str: ...  # noqa: D102
+    def shape(self) -> str:
+        """`sphere`, `cylinder` (upright) or `box`."""
+        ...
+
     @property
-    def position(self) -> Sequence[float] | NDArray[np.float64]: ...  # noqa: D102
+    def position(self) -> Sequence[float] | NDArray[np.float64]:
+        """Centre in the house frame, m, shape (3,)."""
+        ...
+
     @property
-    def size(self) -> Sequence[float] | NDArray[np.float64]: ...  # noqa: D102
+    def size(self) -> Sequence[float] | NDArray[np.float64]:
+        """Radius, shape (1,); radius and half-length, (2,); or half-sizes, (3,); m."""
+        ...
+
     @property
-    def rgba(self) -> Sequence[float] | NDArray[np.float64]: ...  # noqa: D102
+    def rgba(self) -> Sequence[float] | NDArray[np.float64]:
+        """Colour and opacity, 0 to 1, shape (4,)."""
+        ...
+
     @property
-    def x_ray(self) -> bool: ...  # noqa: D102
+    def x_ray(self) -> bool:
+        """Whether it also shows, dimmed, through walls."""
+        ...
 
 
 def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False) -> None:

@@ -117,7 +117,10 @@ def _finish(inst: Instance, i: int, before: NDArray[np.int32]) -> int:
 
 @kernel
 def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Actions of a shortest tour that picks in a given order; k >= 0 picks object k, -1 - b goes to bin b."""
+    """Actions of a shortest tour that picks in a given order (n,).
+
+    The result has the shape (actions,): k >= 0 picks object k, -1 - b goes to bin b.
+    """
     n, m = inst.to_bin.shape
     costs = np.empty((n + 1, m + 1), np.int32)
     decode(inst, order, 0, costs)
@@ -155,7 +158,16 @@ def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @kernel
 def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArray[np.uint64]) -> int:
-    """Write a neighbour of an order: two swapped, a stretch reversed or one moved; the first place changed."""
+    """Write a neighbour of an order: two objects swapped, some in a row reversed, or one moved.
+
+    Args:
+        order: Order of picks, (n,).
+        candidate: Receives the neighbour, (n,).
+        state: Of the random numbers, (1,).
+
+    Returns:
+        The first position that may have changed.
+    """
     n = order.size
     i = int(uniform(state) * n)
     j = int(uniform(state) * (n - 1))
@@ -182,7 +194,7 @@ def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArr
 
 
 def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64]]:
-    """Simulated annealing from the order of the indices; see `anneal_from`."""
+    """Simulated annealing from the order of the indices; length and order (n,), see `anneal_from`."""
     return anneal_from(inst, seed, moves, np.arange(inst.home.size), HOT, COLD)
 
 

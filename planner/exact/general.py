@@ -43,6 +43,9 @@ def best_first(
         metric: The same, closed to a metric.
         max_states: How many states may be expanded.
         deadline: Give up when it is over.
+
+    Raises:
+        InfeasibleError: No order of visits keeps to the capacity.
     """
     search = _Search(problem, distances.tolist(), metric.tolist(), at_once=np.array_equal(distances, metric))
     start = search.arrive(problem.start, (1 << len(problem.shipments)) - 1, problem.onboard)

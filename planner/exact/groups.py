@@ -9,12 +9,12 @@ BIN_ROWS = 50_000  # of a table that counts objects by bin: 30 objects and 6 bin
 
 
 def together(n: int) -> NDArray[np.int64]:
-    """All objects in one group."""
+    """Group of each object, all in one, (n,)."""
     return np.zeros(n, np.int64)
 
 
 def alone(n: int) -> NDArray[np.int64]:
-    """Each object in a group of its own."""
+    """Group of each object, each in its own, (n,)."""
     return np.arange(n, dtype=np.int64)
 
 

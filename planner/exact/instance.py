@@ -37,7 +37,12 @@ class Instance(NamedTuple):
 
 
 def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instance:
-    """Flatten a problem; objects are its shipments, bins its delivery locations in ascending order."""
+    """Flatten a problem; objects are its shipments, bins its delivery locations in ascending order.
+
+    Args:
+        problem: Of capacity two.
+        metric: Its distances, units of 0.1 mm, closed to a metric, (k, k).
+    """
     pickups = [s.pickup for s in problem.shipments]
     places = sorted({s.delivery for s in problem.shipments} | set(problem.onboard))
     index = {location: k for k, location in enumerate(places)}

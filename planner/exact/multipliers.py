@@ -188,7 +188,16 @@ def step(
     direction: NDArray[np.float64],
     miscount: NDArray[np.float64],
 ) -> bool:
-    """Raise the price of objects that a relaxed tour picks too often; False if it picks each once."""
+    """Raise the price of objects that a relaxed tour picks too often; False if it picks each once.
+
+    Args:
+        actions: The tour, shape (actions,); k >= 0 picks object k.
+        gap: What the bound lacks, units.
+        step_size: Share of the gap.
+        current: Prices, changed in place, units, (n,).
+        direction: Last change of the prices, changed in place, (n,).
+        miscount: As in `Bound`, changed in place, (n,).
+    """
     n = current.size
     surplus = np.full(n, -1.0)
     for action in actions:

@@ -94,7 +94,7 @@ def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
 
 @kernel
 def smallest_but(values: NDArray[np.int32], size: int, count: int) -> int:
-    """Least number that at least `count` of the first `size` values do not exceed.
+    """Least number that at least `count` of the first `size` values, shape (room,), do not exceed.
 
     By bisection: reading an array 20 times takes no longer than partitioning a copy, and compiles in no time.
     """

@@ -47,7 +47,7 @@ def fill(inst: Instance, table: Table, deadline: Deadline = NEVER) -> bool:
 
 @kernel
 def left_of(table: Table, row: int) -> NDArray[np.int64]:
-    """How many of each group are left in a row."""
+    """How many of each group are left in a row, shape (groups,)."""
     left = np.empty(table.size.size, np.int64)
     for g in range(left.size):
         left[g] = row % (table.size[g] + 1)
@@ -57,7 +57,7 @@ def left_of(table: Table, row: int) -> NDArray[np.int64]:
 
 @kernel
 def count_on(table: Table, left: NDArray[np.int64]) -> None:
-    """Update the numbers left of each group from a row to the next."""
+    """Update the numbers left of each group, shape (groups,), from a row to the next."""
     for g in range(left.size):
         left[g] += 1
         if left[g] <= table.size[g]:
@@ -159,8 +159,8 @@ def choose(
         table: A filled table.
         row: Row of the objects left.
         at: Object that was just picked, -1 if it was not a pick.
-        to_object: Distances from here to objects.
-        to_bin: Distances from here to bins.
+        to_object: Distances from here to objects, units, (n,).
+        to_bin: Distances from here to bins, units, (m,).
         first: Bin of an object in hand, -1 for none.
         second: Bin of another object in hand, -1 for none.
     """

@@ -92,7 +92,12 @@ class ExactSolver:
                 yield plan
 
     def applies(self, problem: RoutingProblem, metric: NDArray[np.int64]) -> bool:
-        """Whether table and search apply: capacity two, up to 40 objects, true distances; `metric` is their closure."""
+        """Whether table and search apply: capacity two, up to 40 objects, true distances.
+
+        Args:
+            problem: What is to be solved.
+            metric: Its distances, units of 0.1 mm, closed to a metric, (k, k).
+        """
         n = len(problem.shipments)
         small = n <= 40 and int(metric.max()) * (2 * n + 2) <= MAX_LENGTH
         return problem.capacity == 2 and small and is_metric(problem.distances, metric)

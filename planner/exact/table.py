@@ -50,7 +50,7 @@ class Table(NamedTuple):
 
 
 def rows_of(group: NDArray[np.int64]) -> int:
-    """How many rows the table of these groups has."""
+    """How many rows the table has, by the group of each object, (n,)."""
     return math.prod(int(k) + 1 for k in np.bincount(group))
 
 

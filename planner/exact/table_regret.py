@@ -97,7 +97,10 @@ def costs_by_pass(
 
 @kernel
 def look_up(nodes: Nodes, rest: NDArray[np.int32], left: int, place: int) -> int:
-    """Length of the rest of the task from a state; `INFINITE` if it is not among the nodes."""
+    """Length of the rest of the task from a state; `INFINITE` if it is not among the nodes.
+
+    `rest` is that length, units, for each of the nodes, shape (states,).
+    """
     k = nodes.slots[slot_of(nodes, (left << PLACE_BITS) | place)]
     return int(rest[k]) if k >= 0 else INFINITE
 
@@ -106,7 +109,10 @@ def look_up(nodes: Nodes, rest: NDArray[np.int32], left: int, place: int) -> int
 def after_second(
     inst: Instance, after: Nodes, after_rest: NDArray[np.int32], left: int, j: int, d: int
 ) -> int:
-    """Length of the rest from object j, just picked, with one for d in hand too; `left` no longer has j."""
+    """Length of the rest from object j, just picked, with one for d in hand too, units.
+
+    `left` no longer has j; `after_rest` is the length of the rest from each state of `after`, shape (states,).
+    """
     m = inst.bins.shape[0]
     c = inst.home[j]
     first = inst.to_bin[j, d] + look_up(after, after_rest, left, d * m + c)
@@ -116,7 +122,10 @@ def after_second(
 
 @kernel
 def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Length of the rest of the task from each state of a layer, given those of the next layer."""
+    """Length of the rest of the task from each state of a layer, given those of the next layer.
+
+    Both are in units, shape (states of the layer,).
+    """
     n, m = inst.to_bin.shape
     size = here.size[0]
     rest = np.full(size, INFINITE, np.int32)
@@ -152,7 +161,11 @@ def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int3
 def root_costs(
     inst: Instance, here: Nodes, rest: NDArray[np.int32], after: Nodes, after_rest: NDArray[np.int32]
 ) -> NDArray[np.int64]:
-    """Length of the task by next action: places of what is carried, then picks if a hand is free."""
+    """Length of the task by next action: places of what is carried, then picks if a hand is free.
+
+    The result has the shape (actions,); `rest` and `after_rest` are those of the states of `here` and `after`, shape
+    (states,). All are in units.
+    """
     n, m = inst.to_bin.shape
     count = inst.carried.size
     everything = (1 << n) - 1

@@ -24,7 +24,7 @@ def occupancy(layout: ObservationLayout, size: int = MAP_SIZE) -> NDArray[np.uin
         size: Number of rows and of columns.
 
     Returns:
-        Shape (size, size): 1 where an obstacle covers or touches the centre of a cell, else 0. Row 0 is at the
+        1 where an obstacle covers or touches the centre of a cell, else 0, shape (size, size). Row 0 is at the
         minimum y of the floor, column 0 at its minimum x; the bounds of the floor fill the grid.
     """
     raster = np.zeros((size, size), np.uint8)
