@@ -145,7 +145,10 @@ def update_hands(body: BodyMotion, hands: Hands, holding: Holding, contacts: Con
 def move_hand(
     targets: Floats, velocities: Floats, hand: int, x: float, y: float, z: float, dt: float
 ) -> None:
-    """Move a hand's target towards a place in the body frame, m, slower as it comes near."""
+    """Move a hand's target, a row of `targets` (2, 3), m, towards x, y, z in the body frame, slower as it comes near.
+
+    `velocities` (2, 3), m/s, change with it.
+    """
     dx, dy, dz = x - targets[hand, 0], y - targets[hand, 1], z - targets[hand, 2]
     gap = math.sqrt(dx * dx + dy * dy + dz * dz)
     if gap < _ARRIVED:
