@@ -144,11 +144,11 @@ class Trajectory:
         self._write_state(first, observation, health)
         # A row of the rollout is the state after its action, one of the trajectory the state before it.
         rest = slice(first + 1, self._length)
-        columns.time[rest], columns.position[rest] = rollout.times[:-1], rollout.positions[:-1]
-        columns.heading[rest], columns.pitch[rest] = rollout.headings[:-1], rollout.pitches[:-1]
-        columns.object_position[rest] = rollout.object_positions[:-1]
-        columns.object_quaternion[rest] = rollout.object_quaternions[:-1]
-        columns.health[rest] = rollout.health[:-1]
+        columns.time[rest], columns.position[rest] = rollout.states.times[:-1], rollout.states.positions[:-1]
+        columns.heading[rest], columns.pitch[rest] = rollout.states.headings[:-1], rollout.states.pitches[:-1]
+        columns.object_position[rest] = rollout.states.object_positions[:-1]
+        columns.object_quaternion[rest] = rollout.states.object_quaternions[:-1]
+        columns.health[rest] = rollout.states.health[:-1]
         columns.hands[rest], columns.object_status[rest] = columns.hands[first], columns.object_status[first]
         columns.action[first : self._length, :2] = 0.0, -1.0
         columns.action[first : self._length, 2:] = moves

@@ -211,7 +211,7 @@ class Session:
         if isinstance(decision, WalkAlong):
             self._controller.commit(len(rollout))
         uneventful = len(rollout) - (1 if rollout.events else 0)
-        self._assistant.observe_walk(rollout.positions[:uneventful], self._now)
+        self._assistant.observe_walk(rollout.states.positions[:uneventful], self._now)
         if rollout.events:
             self._note_events(rollout.events)
         return True
@@ -238,7 +238,7 @@ class Session:
         health = self._world.health_sample
         rollout = self._world.finish() if moves is None else self._world.walk(moves)
         count = len(rollout)
-        self.recording.extend(rollout.state_hashes[:-1])
+        self.recording.extend(rollout.states.state_hashes[:-1])
         self.trajectory.extend(
             self._now, health, rollout, np.zeros((count, 4)) if moves is None else moves[:count]
         )

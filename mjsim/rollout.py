@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,20 @@ _HEALTH = 7  # numbers of a `HealthSample`
 
 
 class RolloutArrays(NamedTuple):
-    """The arrays of a `Rollout`, for kernels that fill them row by row."""
+    """The states that n control steps went through, for kernels to fill row by row.
+
+    Row i is the state after step i, as `World.step` observes it.
+
+    Attributes:
+        times: Simulated time, s, shape (n,).
+        positions: The person's floor positions, m, shape (n, 2).
+        headings: Yaw of the body, rad, shape (n,).
+        pitches: Pitch of the head, rad, shape (n,).
+        object_positions: Object origins, m, shape (n, k, 3).
+        object_quaternions: Orientations wxyz, shape (n, k, 4).
+        state_hashes: `World.state_hash` after each step, shape (n,).
+        health: Rows of `HealthSample` after each step, shape (n, 7).
+    """
 
     times: NDArray[np.float64]
     positions: NDArray[np.float64]
@@ -43,34 +56,20 @@ class RolloutArrays(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """The states that n control steps went through; row i is the state after step i, as `World.step` observes it.
+    """What n control steps brought.
 
     Attributes:
-        times: Simulated time, s, shape (n,).
-        positions: The person's floor positions, m, shape (n, 2).
-        headings: Yaw of the body, rad, shape (n,).
-        pitches: Pitch of the head, rad, shape (n,).
-        object_positions: Object origins, m, shape (n, k, 3).
-        object_quaternions: Orientations wxyz, shape (n, k, 4).
-        state_hashes: `World.state_hash` after each step, shape (n,).
-        health: Rows of `HealthSample` after each step, shape (n, 7).
+        states: The state after every step.
         observation: State after the last step.
         events: What happened; only the last step can have events.
     """
 
-    times: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    headings: NDArray[np.float64]
-    pitches: NDArray[np.float64]
-    object_positions: NDArray[np.float64]
-    object_quaternions: NDArray[np.float64]
-    state_hashes: NDArray[np.uint64]
-    health: NDArray[np.float64]
+    states: RolloutArrays
     observation: Observation
     events: tuple[WorldEvent, ...]
 
     def __len__(self) -> int:
-        return len(self.times)
+        return len(self.states.times)
 
     @classmethod
     def of_steps(
@@ -90,12 +89,9 @@ class Rollout:
             arrays.object_positions[step] = o.object_positions
             arrays.object_quaternions[step] = o.object_quaternions
             arrays.health[step] = health[step]
-        return cls(*arrays, last, events)
+        return cls(arrays, last, events)
 
     def followed_by(self, later: "Rollout") -> "Rollout":
         """This rollout and the one that continues it, as one."""
-        joined: dict[str, Any] = {
-            name: np.concatenate((getattr(self, name), getattr(later, name)))
-            for name in RolloutArrays._fields
-        }
-        return dataclasses.replace(later, **joined)
+        joined = (np.concatenate(pair) for pair in zip(self.states, later.states, strict=True))
+        return dataclasses.replace(later, states=RolloutArrays(*joined))

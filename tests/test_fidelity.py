@@ -138,14 +138,14 @@ def wander(count: int, seed: int) -> np.ndarray:
 def check_rows(
     rollout: Rollout, seen: list[Observation], hashes: list[int], health: list[tuple[float, ...]]
 ) -> None:
-    assert rollout.times.tolist() == [o.time for o in seen]
-    assert np.array_equal(rollout.positions, [o.position for o in seen])
-    assert rollout.headings.tolist() == [o.heading for o in seen]
-    assert rollout.pitches.tolist() == [o.pitch for o in seen]
-    assert np.array_equal(rollout.object_positions, [o.object_positions for o in seen])
-    assert np.array_equal(rollout.object_quaternions, [o.object_quaternions for o in seen])
-    assert rollout.state_hashes.tolist() == hashes
-    assert np.array_equal(rollout.health, health, equal_nan=True)
+    assert rollout.states.times.tolist() == [o.time for o in seen]
+    assert np.array_equal(rollout.states.positions, [o.position for o in seen])
+    assert rollout.states.headings.tolist() == [o.heading for o in seen]
+    assert rollout.states.pitches.tolist() == [o.pitch for o in seen]
+    assert np.array_equal(rollout.states.object_positions, [o.object_positions for o in seen])
+    assert np.array_equal(rollout.states.object_quaternions, [o.object_quaternions for o in seen])
+    assert rollout.states.state_hashes.tolist() == hashes
+    assert np.array_equal(rollout.states.health, health, equal_nan=True)
     assert same(rollout.observation, seen[-1])
 
 
@@ -216,7 +216,7 @@ def test_a_walk_without_physics_goes_where_the_physics_goes(
     rows[:, 0], rows[:, 1] = 1.4, left
     rows[:120, 2] = np.repeat(swings, 10)
     rows[:, 3] = np.sin(np.arange(160.0))
-    walks = {fidelity: world_of(hall, fidelity).walk(rows) for fidelity in ("full", "windows")}
+    walks = {fidelity: world_of(hall, fidelity).walk(rows).states for fidelity in ("full", "windows")}
     full, other = walks["full"], walks["windows"]
     gone = np.cumsum(np.hypot(*np.diff(full.positions, axis=0).T))
     free = int(np.searchsorted(gone, 5.0))
@@ -426,7 +426,7 @@ def story(world: World) -> list[int]:
     for name, seed in (("o0", 1), ("o1", 2)):
         fetch(world, name)
         hashes.append(world.state_hash())
-        hashes += world.walk(wander(40, seed) * 0.3).state_hashes.tolist()
+        hashes += world.walk(wander(40, seed) * 0.3).states.state_hashes.tolist()
     return hashes
 
 
@@ -457,7 +457,7 @@ def test_a_state_can_be_taken_right_after_a_motion(house: Scene, fidelity: str) 
     other.restore(world.state())
     world.restore(world.state())
     moves = wander(50, 5) * 0.3
-    assert np.array_equal(world.walk(moves).state_hashes, other.walk(moves).state_hashes)
+    assert np.array_equal(world.walk(moves).states.state_hashes, other.walk(moves).states.state_hashes)
 
 
 def test_a_state_of_another_fidelity_is_refused(house: Scene) -> None:

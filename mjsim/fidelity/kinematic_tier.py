@@ -144,7 +144,7 @@ class KinematicTier(Tier):
 
     def _rollout(self, rows: RolloutArrays, events: Sequence[WorldEvent] = ()) -> Rollout:
         """Rows that end in the present state."""
-        return Rollout(*rows, self.observation(), tuple(events))
+        return Rollout(rows, self.observation(), tuple(events))
 
     def observation(self) -> Observation:
         """The present state."""
