@@ -50,16 +50,30 @@ def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) ->
     for geom in np.flatnonzero(static & colliding):
         if model.geom_type[geom] == _GEOM.mjGEOM_PLANE:
             continue
-        points = _outline_points(model, data, int(geom))
+        points = outline_points(model, int(geom), data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3))
         if points[:, 2].max() > low and points[:, 2].min() < high:
             obstacles.append(_hull(model, int(geom), points[:, :2]))
     return Footprint(tuple(obstacles), RoomMap.from_model(model).bounds)
 
 
-def _outline_points(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> NDArray[np.float64]:
-    """Points (k, 3) in the house frame whose projection's hull covers the geom's, with its extent in z."""
+def outline_points(
+    model: mujoco.MjModel, geom: int, centre: NDArray[np.float64], rotation: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Points whose projection along z has a hull that covers the geom's, with its extent in z.
+
+    Args:
+        model: Compiled model.
+        geom: Geom id.
+        centre: Where it is, m, shape (3,).
+        rotation: Its axes as columns, shape (3, 3).
+
+    Returns:
+        Points in the frame of `centre`, m, shape (k, 3).
+
+    Raises:
+        AssetError: The geom is a plane or a height field.
+    """
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
-    centre, rotation = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
     if kind == _GEOM.mjGEOM_BOX:
         return np.asarray(_CORNERS * size @ rotation.T + centre)
     if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF):
@@ -78,7 +92,7 @@ def _outline_points(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> ND
         rim = _CIRCLE @ (rotation[:, :2] * size[0]).T
         return np.vstack([centre - axis + rim, centre + axis + rim])
     raise AssetError(
-        f"static geom {_name(model, geom)} is of type {_GEOM(kind).name}, whose outline is not known; "
+        f"geom {_name(model, geom)} is of type {_GEOM(kind).name}, whose outline is not known; "
         "build it from primitives or meshes"
     )
 

@@ -35,6 +35,11 @@ def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
     return spec
 
 
+def elements(path: Path) -> Iterator[ET.Element]:
+    """All elements of an MJCF file and of the files that it includes; of files that are not XML, none."""
+    yield from _elements(str(path), str(path.parent), {})
+
+
 def content_hash(text: str, models: Iterable[Path]) -> str:
     """64 hex digits over a text and the bytes of MJCF files, with every file that they include or refer to.
 

@@ -1,0 +1,43 @@
+"""What is wrong with a model or an episode: findings, one per fault, each with its remedy."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["error", "warning"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault.
+
+    Attributes:
+        rule: Convention that is broken (`mass`), a heading of the rules in docs/models.md.
+        subject: What is at fault (`object mug`, `house`, `object_03`).
+        message: Where, and with which value.
+        remedy: What to change.
+        severity: `error` where it cannot be used, `warning` where it can but people would be surprised.
+        place: Where, m, (x, y) or (x, y, z) in the frame of the house or of the object; None where it has no place.
+    """
+
+    rule: str
+    subject: str
+    message: str
+    remedy: str
+    severity: Severity = "error"
+    place: tuple[float, ...] | None = None
+
+    def __str__(self) -> str:
+        return f"{self.subject}: {self.message}; {self.remedy}"
+
+
+def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Those that make something unusable."""
+    return tuple(f for f in findings if f.severity == "error")
+
+
+def one_line(findings: Iterable[Finding], path: object) -> str:
+    """The first error, and how many more there are, for an exception."""
+    first, *more = errors(findings)
+    rest = f" (and {len(more)} more: mjsim check {path})" if more else ""
+    return f"{' '.join(str(first).split())}{rest}"
