@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from mjsim.episode import Episode
     from mjsim.errors import MjsimError
     from mjsim.model.catalogue import Catalogue
-    from mjsim.model.navigable import navigable_floor
+    from mjsim.model.house import navigable_floor
     from mjsim.model.sampling import sample_episode
     from mjsim.model.scene import Scene, compose
     from mjsim.observation import Observation
@@ -52,7 +52,7 @@ else:  # hidden from type checkers, which would otherwise accept any name
         "episode": ("Episode",),
         "errors": ("MjsimError",),
         "model.catalogue": ("Catalogue",),
-        "model.navigable": ("navigable_floor",),
+        "model.house": ("navigable_floor",),
         "model.sampling": ("sample_episode",),
         "model.scene": ("Scene", "compose"),
         "observation": ("Observation",),

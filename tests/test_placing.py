@@ -13,7 +13,6 @@ from mjsim.model.clearance import ClearanceField, clearance_at
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.scene import Scene, compose
 from mjsim.observation import ObjectStatus
-from mjsim.person.feasibility import receptacle_distance
 from mjsim.person.hand_path import ACROSS_FIRST, UP_FIRST, minimum_jerk, point_between
 from mjsim.person.slots import object_corners
 from mjsim.world import World
@@ -194,7 +193,7 @@ def test_distance_to_a_receptacle_is_that_to_its_outline() -> None:
     outline = grid @ rotation[:2, :2].T + (2.0, 1.0)
     for point in np.array([(2.0, 1.0), (3.0, 1.0), (1.2, 2.2), (2.1, 0.1)]):
         expected = np.linalg.norm(outline - point, axis=1).min()
-        assert receptacle_distance(point, box) == pytest.approx(expected, abs=0.004)
+        assert box.distance(point) == pytest.approx(expected, abs=0.004)
 
 
 def test_clearance_is_the_distance_to_the_walls(small_catalogue: Catalogue) -> None:

@@ -17,7 +17,6 @@ from mjsim.actions import IDLE, EventKind, Pick, Place
 from mjsim.episode import Episode, PlacedObject
 from mjsim.errors import PhysicsError
 from mjsim.model.scene import compose
-from mjsim.person.feasibility import receptacle_distance
 from mjsim.world import World
 
 SEED = 2026
@@ -105,7 +104,7 @@ def _stand(house: House, key: str, rng: np.random.Generator) -> NDArray[np.float
     receptacle = house.receptacles[key]
     while True:
         point = receptacle.approach + rng.uniform(-STRAY, STRAY, 2)
-        if house.navmesh.is_navigable(point) and receptacle_distance(point, receptacle) < REACH:
+        if house.navmesh.is_navigable(point) and receptacle.distance(point) < REACH:
             return np.asarray(point)
 
 

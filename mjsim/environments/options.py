@@ -15,8 +15,8 @@ from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
 from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house
-from mjsim.model.navigable import NavigableBuilder, navigable_floor
+from mjsim.model.house import compiled_house, navigable_floor
+from mjsim.model.navigable import NavigableBuilder
 from mjsim.options import WorldOptions
 
 T = TypeVar("T")

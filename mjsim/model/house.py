@@ -13,6 +13,7 @@ from mjsim.errors import AssetError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import Footprint, footprint
 from mjsim.model.model_files import read_model
+from mjsim.model.navigable import NavigableFloor, installed_builder
 from mjsim.model.object_model import remove_visuals, separate_visuals
 from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
 from mjsim.model.rooms import RoomMap
@@ -58,6 +59,15 @@ class CompiledHouse:
     def floor(self) -> Footprint:
         """Obstacles and bounds of the floor."""
         return footprint(self.model)
+
+    @cached_property
+    def navigable(self) -> NavigableFloor:
+        """Where one can walk, by the installed builder.
+
+        Raises:
+            SamplingError: No builder is installed, or it cannot be loaded.
+        """
+        return installed_builder()(self.floor.obstacles, self.floor.bounds)
 
     def spec(self, *, visuals: bool = True) -> mujoco.MjSpec:
         """An editable copy, with all static bodies fused into one.
@@ -127,6 +137,16 @@ def compiled_house(catalogue: Catalogue) -> CompiledHouse:
     A file that changes on disk changes the content of the next catalogue that is loaded, and so gives a new model.
     """
     return CompiledHouse(catalogue)
+
+
+def navigable_floor(catalogue: Catalogue) -> NavigableFloor:
+    """Where one can walk in a house, computed once per process by the installed builder.
+
+    Raises:
+        SamplingError: No builder is installed, or it cannot be loaded.
+        AssetError: The house does not compile.
+    """
+    return compiled_house(catalogue).navigable
 
 
 @contextmanager

@@ -12,8 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.errors import SamplingError
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house
 
 GROUP = "mjsim.navigable"
 
@@ -50,19 +48,6 @@ class NavigableBuilder(Protocol):
             bounds: (x_min, y_min, x_max, y_max), m.
         """
         ...
-
-
-def navigable_floor(catalogue: Catalogue) -> NavigableFloor:
-    """Where one can walk in a house, computed once per process by the installed builder.
-
-    Raises:
-        SamplingError: No builder is installed, or it cannot be loaded.
-        AssetError: The house does not compile.
-    """
-    house = compiled_house(catalogue)
-    return house.once(
-        "navigable floor", lambda: installed_builder()(house.floor.obstacles, house.floor.bounds)
-    )
 
 
 def installed_builder(group: str = GROUP) -> NavigableBuilder:

@@ -7,9 +7,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjsim.model.receptacles import ReceptacleGeometry
+
 # Structure and furniture (0), ceilings (1), collision guards (3); not decoration (2) and not the person (4).
 SOLID = np.array([1, 1, 0, 1, 0, 0], np.uint8)
 _MAX_SKIPS = 32
+_RIM = 0.06  # m, from a receptacle's volume to the outside of its walls
 
 
 def first_hit(
@@ -61,3 +64,25 @@ def sees(
     """Whether nothing static lies between two points (3,), m."""
     distance, _ = first_hit(model, data, eye, point - eye, static_only=True, reach=1.0)
     return distance >= 1.0
+
+
+def receptacle_in_sight(
+    model: mujoco.MjModel, data: mujoco.MjData, eye: NDArray[np.float64], receptacle: ReceptacleGeometry
+) -> bool:
+    """Whether the top of a receptacle's volume is visible from an eye (3,), m, at its middle or at the nearest point.
+
+    The receptacle's own rim does not hide it: a geom within its outline is taken to be part of it.
+    """
+    half = receptacle.half_size
+    nearest = np.clip(
+        (receptacle.rotation.T @ (eye - receptacle.center))[:2], -0.8 * half[:2], 0.8 * half[:2]
+    )
+    for at in (np.zeros(2), nearest):
+        towards = receptacle.center + receptacle.rotation @ np.array([*at, half[2]]) - eye
+        distance, _ = first_hit(model, data, eye, towards, static_only=True)
+        if distance >= 1.0:
+            return True
+        local = receptacle.rotation.T @ (eye + distance * towards - receptacle.center)
+        if np.all(np.abs(local[:2]) <= half[:2] + _RIM):
+            return True
+    return False

@@ -33,6 +33,12 @@ class ReceptacleGeometry:
         local = self.rotation.T @ (np.asarray(point, dtype=np.float64) - self.center)
         return bool(np.all(np.abs(local) <= self.half_size + margin))
 
+    def distance(self, xy: NDArray[np.float64]) -> float:
+        """Horizontal distance from a floor point (2,) to the nearest point of the volume, m."""
+        local = self.rotation.T @ np.array([*(xy - self.center[:2]), 0.0])
+        outside = np.maximum(np.abs(local) - self.half_size, 0.0)
+        return float(np.hypot(outside[0], outside[1]))
+
 
 def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:
     """Read the sites `<key>/volume` and `<key>/approach` of a compiled model.

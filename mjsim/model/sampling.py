@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import SamplingError
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house
-from mjsim.model.navigable import NavigablePoints, navigable_floor
+from mjsim.model.house import compiled_house, navigable_floor
+from mjsim.model.navigable import NavigablePoints
 from mjsim.model.settling import settle
 
 POINTS = 40

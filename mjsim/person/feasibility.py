@@ -4,18 +4,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mjsim.actions import ActionResult, Pick, Place, Refusal
 from mjsim.inventory import Inventory
 from mjsim.model import avatar
-from mjsim.model.rays import first_hit, sees
-from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.model.rays import receptacle_in_sight, sees
 from mjsim.observation import ObjectStatus
 from mjsim.person.person import Person
 
 _CHEST_HEIGHT = 1.2  # m
-_RIM = 0.06  # m, from a receptacle's volume to the outside of its walls
 
 
 def resolve_pick(
@@ -86,15 +83,8 @@ def reachable_receptacles(person: Person) -> tuple[str, ...]:
     return tuple(k for k in near if _receptacle_in_sight(person, k))
 
 
-def receptacle_distance(xy: NDArray[np.float64], receptacle: ReceptacleGeometry) -> float:
-    """Horizontal distance from a floor point (2,) to the nearest point of a receptacle's volume, m."""
-    local = receptacle.rotation.T @ np.array([*(xy - receptacle.center[:2]), 0.0])
-    outside = np.maximum(np.abs(local) - receptacle.half_size, 0.0)
-    return float(np.hypot(outside[0], outside[1]))
-
-
 def _distance(person: Person, key: str) -> float:
-    return receptacle_distance(person.rig.position, person.scene.receptacles[key])
+    return person.scene.receptacles[key].distance(person.rig.position)
 
 
 def _object_distance(person: Person, item: int) -> float:
@@ -110,22 +100,5 @@ def _object_in_sight(person: Person, item: int) -> bool:
 
 
 def _receptacle_in_sight(person: Person, key: str) -> bool:
-    """Whether the top of the volume is visible, at its middle or at the point nearest to the person.
-
-    The receptacle's own rim does not hide it: a geom within its outline is taken to be part of it.
-    """
-    receptacle = person.scene.receptacles[key]
     eye = np.array([*person.rig.position, avatar.EYE_HEIGHT])
-    half = receptacle.half_size
-    nearest = np.clip(
-        (receptacle.rotation.T @ (eye - receptacle.center))[:2], -0.8 * half[:2], 0.8 * half[:2]
-    )
-    for at in (np.zeros(2), nearest):
-        towards = receptacle.center + receptacle.rotation @ np.array([*at, half[2]]) - eye
-        distance, _ = first_hit(person.scene.model, person.data, eye, towards, static_only=True)
-        if distance >= 1.0:
-            return True
-        local = receptacle.rotation.T @ (eye + distance * towards - receptacle.center)
-        if np.all(np.abs(local[:2]) <= half[:2] + _RIM):
-            return True
-    return False
+    return receptacle_in_sight(person.scene.model, person.data, eye, person.scene.receptacles[key])

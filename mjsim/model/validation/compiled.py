@@ -95,20 +95,21 @@ class Compiled:
         return Finding(rule, self.subject, message, remedy, "warning", _place(place))
 
 
-def compile_model(subject: str, path: Path) -> Compiled | Finding:
-    """Compile an MJCF file on its own, or say why it does not."""
+def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
+    """Compile an MJCF file on its own, or say why that cannot be done."""
     try:
-        text = path.read_bytes()
-        if len(text) > 0:
-            text.decode("utf-8")
+        path.read_bytes().decode("utf-8")
+        # Before MuJoCo reads it: that takes NaN for a missing number, and leaves a log file.
+        if found := list(check_numbers(subject, path)):
+            return found
         return Compiled.of(subject, path, mujoco.MjModel.from_xml_path(str(path)))
     except OSError as error:
-        return Finding("file", subject, f"{path} cannot be read: {error.strerror}", "correct the path")
+        return [Finding("file", subject, f"{path} cannot be read: {error.strerror}", "correct the path")]
     except UnicodeDecodeError as error:
-        return Finding("file", subject, f"{path} is not UTF-8 at byte {error.start}", "save it as UTF-8")
+        return [Finding("file", subject, f"{path} is not UTF-8 at byte {error.start}", "save it as UTF-8")]
     except (ValueError, mujoco.FatalError) as error:
         said = " ".join(str(error).split())
-        return Finding("file", subject, f"{path} does not compile: {said}", "correct that element")
+        return [Finding("file", subject, f"{path} does not compile: {said}", "correct that element")]
 
 
 def check_numbers(subject: str, path: Path) -> Iterator[Finding]:

@@ -11,7 +11,6 @@ from mjsim.model.validation.compiled import (
     Compiled,
     check_contact_bits,
     check_groups,
-    check_numbers,
     check_still,
     compile_model,
 )
@@ -43,13 +42,10 @@ def check_object(path: Path, key: str | None = None) -> list[Finding]:
     """
     subject = f"object {key or path.stem}"
     compiled = compile_model(subject, path)
-    found = list(check_numbers(subject, path))
-    if isinstance(compiled, Finding):
-        return [compiled, *found]
-    found += check_structure(compiled, "object")
-    if errors(found) or not len(compiled.solid):
-        return found
-    return found + [finding for rule in RULES for finding in rule(compiled)]
+    if not isinstance(compiled, Compiled):
+        return compiled
+    found = list(check_structure(compiled, "object"))
+    return found if errors(found) else [finding for rule in RULES for finding in rule(compiled)]
 
 
 def check_structure(compiled: Compiled, body: str) -> Iterator[Finding]:
