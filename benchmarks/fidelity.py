@@ -14,7 +14,7 @@ QUICK_SEEDS = 2
 OBJECTS = (6, 12, 18, 24)
 QUICK_OBJECTS = (6, 24)
 PARTICIPANTS = (("optimal", "follower"), ("highlight", "nearest"))
-COMPARED = ("completion_time_s", "task_distance_m", "inverse_path_length", "normalized_deviations")
+COMPARED = ("completion_time_s", "task_distance_m", "ipl_stand", "nd_feasible")
 SAME_DELIVERIES, TIME_DIFFERENCE = 1.0, 0.01  # targets
 
 
@@ -100,8 +100,8 @@ def _cells(row: dict[str, Any]) -> Iterator[str]:
         yield "-"
         yield f"{row['completion_time_s']['mean']:.1f} s"
         yield f"{row['task_distance_m']['mean']:.1f} m"
-        yield f"{row['inverse_path_length']['mean']:.3f}"
-        yield f"{row['normalized_deviations']['mean']:.3f}"
+        yield f"{row['ipl_stand']['mean']:.3f}"
+        yield f"{row['nd_feasible']['mean']:.3f}"
     else:
         yield f"{row['same_deliveries']:.0%}"
         for name in COMPARED:

@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 
 from experiments.conditions import TaskBoard
 from experiments.participants.base import Choice, Guidance
+from experiments.reach_bound import reach_bound
 from experiments.records import EventLog
 from experiments.regrets import Regrets
 from experiments.shown_path import TOLERANCE, ShownPath
+from experiments.visit_fields import PlaceDistances, alternatives, as_json
 from hud.conditions import condition
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.actions import EventKind, WorldEvent
-from mjsim.episode import CAPACITY
 from mjsim.observation import ObjectStatus, Observation
+from mjsim.options import WorldOptions
 from planner.plan import Status, Visit, VisitKind
 from planner.route import XY, Route, TaskState
 
@@ -62,6 +64,7 @@ class Assistant:
         log: Where plans and visits are logged.
         regrets: Works out what alternatives cost; None for one whose answers repeat.
         log_regrets: Whether the regret of every visit is logged.
+        options: Rules of the world, for how far a person reaches.
 
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
@@ -76,6 +79,7 @@ class Assistant:
         log: EventLog,
         regrets: Regrets | None = None,
         log_regrets: bool = False,
+        options: WorldOptions | None = None,
     ) -> None:
         self._board, self._house, self._episode = board, board.house, board.episode
         self._show = condition(assistance)
@@ -83,6 +87,7 @@ class Assistant:
         self._log = log
         self._regrets = regrets or Regrets(self._house.geodesics)
         self._log_regrets = log_regrets
+        self._options = options or WorldOptions()
         self._number = {placed.name: i for i, placed in enumerate(self._episode.objects)}
         self._approaches = {
             name: self._house.receptacles[key].approach[:2] for name, key in self._episode.targets.items()
@@ -91,12 +96,13 @@ class Assistant:
         self._route: Route | None = None
         self._path = ShownPath(self._house.geodesics)
         self._visits = 0
-        self._last_visit_at = np.zeros(2)
         self.shown_roles: frozenset[str] = frozenset()
 
     def begin(self, observation: Observation) -> None:
         """Plan for the start of the task."""
         self._last_visit_at = observation.position.copy()
+        self._state = self.task_state(observation)
+        self._places_visited = PlaceDistances(self._house.geodesics, self._state.position)
         self._plan(observation)
         self.show_message("started", observation.time)
         self.shown_roles = frozenset(marker.role for marker in self.hud_state(observation).markers)
@@ -170,8 +176,8 @@ class Assistant:
     def finish(self, time: float) -> None:
         """The task is over: log the regrets of visits that were not known in time."""
         self._regrets.close()
-        for number, regret in self._regrets.later():
-            self._log.append(time, "regret", visit=number, regret_m=_rounded(regret))
+        for (number, names), regret in self._regrets.later():
+            self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
 
     def task_state(self, observation: Observation) -> TaskState:
         """The task in the planner's terms."""
@@ -196,44 +202,45 @@ class Assistant:
             "visit",
             kind=made.kind.value,
             object=made.object,
-            suggested=_as_json(suggested) if suggested else None,
+            suggested=as_json(suggested) if suggested else None,
             deviated=self._route is not None and suggested != made,
-            alternatives=self._alternatives(observation, event),
-            **self._regret_fields(made),
+            **alternatives(self._state, made, suggested, self._episode.targets),
+            **self._regret_fields(made, suggested),
             position=[round(float(v), 6) for v in here],
             geodesic_m=round(walk.geodesic_distance, 6),
+            location_m=round(self._places_visited.next(self._state, made), 6),
         )
         self._visits += 1
         self._last_visit_at = here
         self._board.note_visit(made)
 
-    def _regret_fields(self, visit: Visit) -> dict[str, float | None]:
-        """Extra cost of a visit, if that is wanted. The next one of a plan that is proven has none."""
+    def _regret_fields(self, made: Visit, suggested: Visit | None) -> dict[str, float | None]:
+        """Extra cost of a visit and of the suggested one, if that is wanted."""
         if not self._log_regrets:
             return {}
-        if self._route is not None and self._route.plan.status is Status.OPTIMAL and self._next == visit:
-            return {"regret_m": 0.0}
-        return {"regret_m": _rounded(self._regrets.evaluate(self._visits, visit))}
+        if suggested is None or suggested == made:
+            return self._regret(("regret_m", "suggested_regret_m"), made)
+        return self._regret(("regret_m",), made) | self._regret(("suggested_regret_m",), suggested)
 
-    def _alternatives(self, observation: Observation, event: WorldEvent) -> int:
-        """How many other visits were feasible when this one was made."""
-        loose = set(observation.names_with(ObjectStatus.LOOSE))
-        carried = set(observation.carried)
-        if event.kind is EventKind.PICKED:
-            loose, carried = loose | {event.object}, carried - {event.object}
-        else:
-            carried = carried | {event.object}
-        return len(carried) + (len(loose) if len(carried) < CAPACITY else 0) - 1
+    def _regret(self, names: tuple[str, ...], visit: Visit) -> dict[str, float | None]:
+        """Extra cost of a visit, m, to be logged under these names. The next one of a plan that is proven has none."""
+        regret: float | None = 0.0
+        if self._route is None or self._route.plan.status is not Status.OPTIMAL or self._next != visit:
+            regret = _rounded(self._regrets.evaluate((self._visits, names), visit))
+        return dict.fromkeys(names, regret)
 
     def _plan(self, observation: Observation) -> None:
         """Follow the plan on, or make a new one where the task is no longer as planned."""
         replans, first = self._planner.replans, self._route is None
-        state = self.task_state(observation)
+        self._state = state = self.task_state(observation)
         self._route = self._planner.update(state, shown=GOAL in self.shown_roles)
         self._regrets.begin(state, self._route.plan)
         self._begin_path(observation)
         replanned = self._planner.replans > replans
-        if first or replanned:
+        if first:
+            bound = reach_bound(self._route.plan.lower_bound, self._house, self._episode, self._options)
+            self._log_plan(observation, self._route, reach_bound_m=round(bound, 6))
+        elif replanned:
             self._log_plan(observation, self._route)
         if replanned and not first and GOAL in self.shown_roles:
             self._board.announce_replan(observation.time)
@@ -255,7 +262,7 @@ class Assistant:
         if visit is not None:
             self._path.begin(observation.position, *self._places(observation, visit))
 
-    def _log_plan(self, observation: Observation, route: Route, **more: bool) -> None:
+    def _log_plan(self, observation: Observation, route: Route, **more: bool | float) -> None:
         # Cost and bound are those of the state that the plan was made for; a better plan comes a little later.
         self._log.append(
             observation.time,
@@ -263,7 +270,7 @@ class Assistant:
             cost_m=round(route.plan.cost, 6),
             lower_bound_m=round(route.plan.lower_bound, 6),
             status=route.plan.status.value,
-            visits=[_as_json(v) for v in route.visits],
+            visits=[as_json(v) for v in route.visits],
             **more,
         )
 
@@ -290,7 +297,3 @@ def _xy(point: NDArray[np.float64]) -> XY:
 
 def _rounded(metres: float | None) -> float | None:
     return None if metres is None else round(metres, 6)
-
-
-def _as_json(visit: Visit) -> list[str]:
-    return [visit.kind.value, visit.object]

@@ -18,9 +18,10 @@ from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.rollout import Rollout
 
-# 4: typed checkpoints. 3: untyped ones. 2: no health of the physics. 1: neither state hashes nor checkpoints.
-LOG_FORMAT = 4
-EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
+# 5: distances between places, ties, gaps of suggestions. 4: typed checkpoints. 3: untyped ones. 2: no health of the
+# physics. 1: neither state hashes nor checkpoints.
+LOG_FORMAT = 5
+FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
     "events.jsonl",
     "trajectory.npz",

@@ -13,6 +13,8 @@ from planner.regret_evaluator import RegretEvaluator, same_state
 from planner.route import TaskState
 from planner.solver import SolveLimit
 
+# Number of a visit, and what to log its regret as.
+Label = tuple[int, tuple[str, ...]]
 PATIENCE = 5.0  # s of wall time for the regrets of one state, in live use
 
 
@@ -49,12 +51,12 @@ class Regrets:
         state, plan = self._task
         return self._evaluator.of(state, visit, plan)
 
-    def evaluate(self, number: int, visit: Visit) -> float | None:  # noqa: ARG002 - nothing is left for later
-        """As `exact`, of a visit that is made now, or None if that comes from `later`; `number` counts the visits."""
+    def evaluate(self, label: Label, visit: Visit) -> float | None:  # noqa: ARG002 - nothing is left for later
+        """As `exact`, of a visit that is possible now, or None if that comes from `later`, with its label."""
         return self.exact(visit)
 
-    def later(self) -> Iterator[tuple[int, float | None]]:
-        """After the task: numbers and exact regrets of visits that were not known in time."""
+    def later(self) -> Iterator[tuple[Label, float | None]]:
+        """After the task: labels and exact regrets of visits that were not known in time."""
         return iter(())
 
     def close(self) -> None:
@@ -88,7 +90,7 @@ class LiveRegrets(Regrets):
         super().__init__(geodesics)
         self._job: _Job | None = None
         self._thread: threading.Thread | None = None
-        self._made: list[tuple[int, TaskState, Visit, Plan]] = []
+        self._made: list[tuple[Label, TaskState, Visit, Plan]] = []
 
     def prepare(self, state: TaskState, plan: Plan) -> None:
         """Compute the first regrets, which loads the kernels."""
@@ -121,17 +123,17 @@ class LiveRegrets(Regrets):
         if self._thread is not None:
             self._thread.join()
 
-    def evaluate(self, number: int, visit: Visit) -> float | None:
+    def evaluate(self, label: Label, visit: Visit) -> float | None:
         """None: it is left for `later`."""
         if self._task is not None:
             state, plan = self._task
-            self._made.append((number, state, visit, plan))
+            self._made.append((label, state, visit, plan))
         return None
 
-    def later(self) -> Iterator[tuple[int, float | None]]:
-        """All visits that were made."""
-        for number, state, visit, plan in self._made:
-            yield number, self._evaluator.of(state, visit, plan)
+    def later(self) -> Iterator[tuple[Label, float | None]]:
+        """All visits that were asked for."""
+        for label, state, visit, plan in self._made:
+            yield label, self._evaluator.of(state, visit, plan)
         self._made = []
 
     def close(self) -> None:

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from experiments import records
 from experiments.assistant import Assistant
+from experiments.checksums import write_checksums
 from experiments.conditions import TaskBoard
 from experiments.errors import ConfigError
 from experiments.files import save_arrays, write_json
 from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
-from experiments.health import summarise_health
 from experiments.house import House
-from experiments.metrics import compute_metrics
+from experiments.metrics import measure
 from experiments.participants import default_participant, participant
 from experiments.recording import Recording, provenance
 from experiments.records import Event, EventLog
@@ -125,6 +125,7 @@ def run_trial(
         result = _simulate(config, house, scene, folder, film, on_progress)
         arrays = _write_record(folder, episode, result)
         if isinstance(result.ended, PhysicsError):
+            write_checksums(folder, records.FILES)
             kept = keep_failed(folder, out)
             raise PhysicsError(f"{result.ended} (kept for `mjsim replay {kept}`)") from result.ended
         if topdown:
@@ -132,17 +133,14 @@ def run_trial(
 
             draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], arrays)
         metrics = {
-            **_settings(config),
-            "ended": result.ended,
-            **dataclasses.asdict(compute_metrics(result.log.events, arrays["position"])),
-            **summarise_health(result.log.events, arrays),
-            "simulated_s": float(arrays["time"][-1]),
+            **measure(result.log.events, arrays),
             "frames_sha256": result.frames_sha256,
             # The floor plan is drawn as well. Asking for the renderer's name where nothing is drawn would start it.
             "renderer": gl_info().renderer if film or topdown else NOTHING_DRAWN,
             "wall_s": round(time.perf_counter() - started, 3),
         }
         write_json(folder / records.METRICS, metrics)
+        write_checksums(folder, records.FILES)
     return metrics
 
 
@@ -287,6 +285,7 @@ def _make_assistant(
         log=log,
         regrets=regrets,
         log_regrets=config.regret,
+        options=world.options,
     )
     if config.live:
         state = assistant.task_state(world.observation())

@@ -106,7 +106,7 @@ def test_a_cold_participant_regrets_nothing_and_a_hot_one_walks_more(tmp_path):
     assert cold["total_regret_m"] < 0.05  # where one stands when reaching makes a difference of centimetres
     assert hot["regretful_visits"] > 2
     assert hot["total_regret_m"] > 3
-    assert hot["normalized_deviations"] > cold["normalized_deviations"]
+    assert hot["nd_feasible"] > cold["nd_feasible"]
     assert hot["task_distance_m"] > cold["task_distance_m"] + 3
 
 

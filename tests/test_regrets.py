@@ -77,8 +77,9 @@ def test_visits_in_live_use_are_evaluated_after_the_task(geodesics):
         stop = list(RegretEvaluator(geodesics).all(task.state))[-1]
         for keeper in (beside, at_once):
             keeper.begin(task.state, plan)
-        expected.append((number, at_once.evaluate(number, stop)))
-        assert beside.evaluate(number, stop) is None
+        label = number, ("regret_m",)
+        expected.append((label, at_once.evaluate(label, stop)))
+        assert beside.evaluate(label, stop) is None
         task.do(*stop)
     assert dict(beside.later()) == pytest.approx(dict(expected), abs=1e-9)
     assert list(beside.later()) == list(at_once.later()) == []

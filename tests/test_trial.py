@@ -42,7 +42,7 @@ def test_everything_is_delivered_without_mishap(runs, assistance):
     metrics = read_json(runs / assistance / records.METRICS)
     assert (metrics["ended"], metrics["delivered"]) == ("all delivered", 6)
     assert metrics["max_penetration_m"] < 0.010
-    assert 0 < metrics["inverse_path_length"] <= 1.0
+    assert 0 < metrics["ipl_stand"] <= 1.0
     assert metrics["simulated_s"] == pytest.approx(metrics["completion_time_s"])
     assert metrics["renderer"] == "none: nothing was drawn"
 
@@ -55,7 +55,7 @@ def test_help_shortens_the_walk(runs):
 
 
 def test_a_full_follower_never_deviates(runs):
-    assert read_json(runs / "optimal" / records.METRICS)["normalized_deviations"] == 0.0
+    assert read_json(runs / "optimal" / records.METRICS)["nd_feasible"] == 0.0
 
 
 def test_every_visit_is_judged_and_following_costs_nothing(runs):
@@ -83,7 +83,7 @@ def test_the_record_agrees_with_itself(runs):
     assert np.diff(arrays["time"]) == pytest.approx(0.04)
     assert (arrays["object_status"][-1] == 2).all()
     assert (arrays["hands"][-1] == -1).all()
-    assert read_json(folder / records.PLAN)[0]["cost_m"] == metrics["optimal_distance_m"]
+    assert read_json(folder / records.PLAN)[0]["cost_m"] == metrics["planned_distance_m"]
     # Nobody is beamed: at most 1.5 m/s.
     assert np.linalg.norm(np.diff(arrays["position"], axis=0), axis=1).max() < 1.5 * 0.04
 

@@ -1,0 +1,38 @@
+"""How short a walk could be for somebody who reaches from as far away as the rules allow."""
+
+import itertools
+
+import numpy as np
+
+from experiments.house import House
+from mjsim.episode import Episode
+from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.options import WorldOptions
+
+
+def reach_bound(tour: float, house: House, episode: Episode, options: WorldOptions) -> float:
+    """Least walk of any order of visits, m.
+
+    A tour between the places of the visits is `tour` long at least. Who picks and places from a distance can save that
+    distance on the way to a place and again on the way from it; after the last visit nobody goes on. The objects are
+    taken to stay where they lie, and reaching to go over free floor, not over a piece of furniture.
+
+    Args:
+        tour: A lower bound of all tours between the places, m.
+        house: The house.
+        episode: The disorganized house.
+        options: How far a person reaches.
+    """
+    places = [
+        options.place_reach + _extent(house.receptacles[key])
+        for key in (episode.targets[placed.name] for placed in episode.objects)
+    ]
+    saved = 2 * (len(places) * options.pick_reach + sum(places)) - min(places, default=0.0)
+    return max(0.0, tour - saved)
+
+
+def _extent(receptacle: ReceptacleGeometry) -> float:
+    """Distance from where a person is sent to use a receptacle to the farthest point of its volume, m, on the floor."""
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * receptacle.half_size
+    floor = (corners @ receptacle.rotation.T + receptacle.center)[:, :2]
+    return float(np.linalg.norm(floor - receptacle.approach, axis=1).max())
