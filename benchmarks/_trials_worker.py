@@ -18,7 +18,8 @@ from unittest.mock import patch
 
 from benchmarks.support.recorded_trial import RecordingWorld, play
 from experiments.house import House
-from experiments.trial import TrialConfig, run_trial
+from experiments.trial import run_trial
+from experiments.trial_config import TrialConfig
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.world import World

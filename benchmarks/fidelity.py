@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from benchmarks.support.agreement import TierResult, run_all_in_tiers
-from experiments.trial import TrialConfig
+from experiments.trial_config import TrialConfig
 from mjsim.options import FIDELITIES
 
 SEEDS = 50
@@ -57,7 +57,7 @@ def compare(full: Sequence[TierResult], tier: Sequence[TierResult]) -> dict[str,
             a.delivered == b.delivered for a, b in zip(full, tier, strict=True)
         ),
         "differing_seeds": [
-            b.config.seed for a, b in zip(full, tier, strict=True) if a.delivered != b.delivered
+            b.config.house_seed for a, b in zip(full, tier, strict=True) if a.delivered != b.delivered
         ],
     }
     for name in COMPARED:

@@ -21,7 +21,7 @@ from benchmarks.support.hud_speed import hud_milliseconds, session_states, summa
 from benchmarks.support.requirements import outcome
 from experiments.conditions import TaskBoard
 from experiments.house import House
-from experiments.trial import TrialConfig
+from experiments.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.state import HudState

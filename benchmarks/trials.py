@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.support.requirements import outcome
-from experiments.batch import BatchConfig, run_batch
+from experiments.batch import run_batch
+from experiments.design import factorial
 from experiments.warmup import compile_kernels
 
 OBJECTS = 24
@@ -57,17 +58,17 @@ def measure(*, seeds: int = 0, quick: bool = False) -> dict[str, Any]:
 
 def measure_batch(setting: Setting, seeds: int, objects: int = OBJECTS) -> dict[str, Any]:
     """Speed of one batch, its reference, and the share of each part of its wall time."""
-    batch = BatchConfig(
+    design = factorial(
         objects=(objects,),
         assistance=(setting.assistance,),
+        users=(setting.user,),
         seeds=range(seeds),
-        user=setting.user,
         fidelity=setting.fidelity,
         regret=False,
     )
     with tempfile.TemporaryDirectory() as folder:
         started = time.perf_counter()
-        trials = run_batch(batch, Path(folder) / "batch", workers=1)
+        trials = run_batch(design, Path(folder) / "batch", workers=1)
         elapsed = time.perf_counter() - started
     if len(trials) < seeds:
         raise RuntimeError(f"{seeds - len(trials)} of {seeds} trials failed: {setting}")

@@ -85,9 +85,9 @@ class Assistant:
         self._show = condition(assistance)
         self._planner = planner
         self._log = log
-        self._regrets = regrets or Regrets(self._house.geodesics)
-        self._log_regrets = log_regrets
         self._options = options or WorldOptions()
+        self._regrets = regrets or Regrets(self._house.geodesics, self._options.capacity)
+        self._log_regrets = log_regrets
         self._number = {placed.name: i for i, placed in enumerate(self._episode.objects)}
         self._approaches = {
             name: self._house.receptacles[key].approach[:2] for name, key in self._episode.targets.items()
@@ -204,7 +204,7 @@ class Assistant:
             object=made.object,
             suggested=as_json(suggested) if suggested else None,
             deviated=self._route is not None and suggested != made,
-            **alternatives(self._state, made, suggested, self._episode.targets),
+            **alternatives(self._state, made, suggested, self._episode.targets, self._options.capacity),
             **self._regret_fields(made, suggested),
             position=[round(float(v), 6) for v in here],
             geodesic_m=round(walk.geodesic_distance, 6),

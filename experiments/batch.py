@@ -8,59 +8,23 @@ import multiprocessing.connection
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments import records
+from experiments.design import Design
 from experiments.errors import ConfigError
 from experiments.files import read_json
 from experiments.house import House
 from experiments.table import write_tables
-from experiments.trial import TrialConfig, run_trial
+from experiments.trial import run_trial
+from experiments.trial_config import TrialConfig
 
 TRIALS = "trials"
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
-
-
-@dataclass(frozen=True)
-class BatchConfig:
-    """A full factorial design.
-
-    Attributes:
-        objects: Numbers of misplaced objects.
-        assistance: Assistance conditions.
-        seeds: Seeds.
-        user, house, planner, fidelity, regret: As in `TrialConfig`, the same for all trials.
-
-    Raises:
-        ConfigError: A list is empty or names a value twice.
-    """
-
-    objects: Sequence[int]
-    assistance: Sequence[str]
-    seeds: Sequence[int]
-    user: str | None = None
-    house: str = "apartment"
-    planner: str = TrialConfig.planner
-    fidelity: str = TrialConfig.fidelity
-    regret: bool = True
-
-    def __post_init__(self) -> None:
-        for name in ("objects", "assistance", "seeds"):
-            values = getattr(self, name)
-            if not values:
-                raise ConfigError(f"a batch needs at least one value for --{name}")
-            if len(set(values)) != len(values):
-                raise ConfigError(f"--{name} names a value twice: {list(values)}")
-
-    def trials(self) -> Iterator[TrialConfig]:
-        """The trials of the design; the seed changes fastest."""
-        same = {n: getattr(self, n) for n in ("user", "house", "planner", "fidelity", "regret")}
-        for objects, assistance, seed in itertools.product(self.objects, self.assistance, self.seeds):
-            yield TrialConfig(objects, assistance, seed, **same)
 
 
 @dataclass(frozen=True)
@@ -85,14 +49,14 @@ class BatchProgress:
 def trial_name(config: TrialConfig) -> str:
     """Folder name of a trial; different configurations of one batch have different names."""
     house = Path(config.house).parent.name if "/" in config.house else config.house
-    parts = [house, f"{config.objects:02d}", config.assistance, config.user_name, config.planner]
+    parts = [house, f"{config.objects:02d}", config.assistance, config.user, config.planner]
     if config.fidelity != TrialConfig.fidelity:
         parts.append(config.fidelity)
-    return "-".join([*parts, f"seed{config.seed:04d}"]).replace(":", ".").replace("/", ".")
+    return "-".join([*parts, f"seed{config.house_seed:04d}"]).replace(":", ".").replace("/", ".")
 
 
 def run_batch(
-    batch: BatchConfig,
+    design: Design,
     out: Path,
     *,
     workers: int,
@@ -101,7 +65,7 @@ def run_batch(
     """Run every trial of the design that `out` does not hold yet, then write the tables.
 
     Args:
-        batch: The design.
+        design: Which trials.
         out: Folder of the batch; an earlier batch there is added to.
         workers: Processes.
         on_progress: Called at the start and after every trial.
@@ -115,7 +79,7 @@ def run_batch(
     """
     if workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
-    folders = {out / TRIALS / trial_name(config): config for config in batch.trials()}
+    folders = {out / TRIALS / trial_name(config): config for config in design.trials}
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     missing = [(path, config) for path, config in folders.items() if not _is_done(path)]
     progress = BatchProgress(done=0, resumed=len(folders) - len(missing), failed=0, total=len(folders))

@@ -4,6 +4,7 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 COMMANDS = ("run", "replay", "batch", "plan", "house", "gallery", "bench", "doctor")
 FAILED = 1
@@ -42,15 +43,31 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    top.add_argument("--version", action=_Version)
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS if command is None else (command,):
         importlib.import_module(f"experiments.commands.{name}").add_parser(commands)
     return top
 
 
+class _Version(argparse.Action):
+    """Prints the version; looked up only then, so that all else starts fast."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"mjsim {version('mjsim')}")
+        parser.exit()
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     words = sys.argv[1:] if argv is None else list(argv)
+    if (here := str(Path.cwd())) not in sys.path:
+        sys.path.append(here)  # for participants, conditions and planners of one's own
     command = words[0] if words and words[0] in COMMANDS else None
     arguments = parser(command).parse_args(words)
     try:

@@ -15,7 +15,8 @@ from experiments.errors import RecordError
 from experiments.first_person import FilmConfig, FirstPersonRenderer
 from experiments.house import House
 from experiments.records import EventLog
-from experiments.trial import TrialConfig, prepare_session
+from experiments.trial import prepare_session, trial_episode
+from experiments.trial_config import TrialConfig
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.files import replacing
@@ -159,7 +160,7 @@ def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
     taken: dict[str, Image] = {}
     for trial in dict.fromkeys(shot.trial for shot in shots):
         house = House.load(trial.house)
-        scene = compose(house.sample_episode(objects=trial.objects, seed=trial.seed), house.catalogue)
+        scene = compose(trial_episode(trial, house), house.catalogue)
         mine = [shot for shot in shots if shot.trial == trial]
         targets = {name: house.receptacles[key].center for name, key in scene.episode.targets.items()}
         with FirstPersonRenderer(scene, house, film) as renderer:

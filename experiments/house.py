@@ -13,7 +13,7 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
-from mjsim.model.sampling import sample_episode
+from mjsim.model.sampling import POINTS, sample_episode
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
@@ -80,13 +80,13 @@ class House:
             if np.any(rooms == key)
         }
 
-    def sample_episode(self, *, objects: int, seed: int) -> Episode:
+    def sample_episode(self, *, objects: int, seed: int, points: int = POINTS) -> Episode:
         """Sample a disorganized house (PAPER section 4).
 
         Raises:
-            SamplingError: `objects` is out of range, or the house is too small for them.
+            SamplingError: `objects` is out of range, or the house is too small for the points.
         """
-        return sample_episode(self.catalogue, self.navmesh, objects=objects, seed=seed)
+        return sample_episode(self.catalogue, self.navmesh, objects=objects, seed=seed, points=points)
 
 
 def _farthest_points(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:

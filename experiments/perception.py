@@ -37,7 +37,8 @@ class SessionPercept(Percept):
         *,
         blocked: bool,
     ) -> None:
-        super().__init__(seen, world.scene.episode.targets, answer, blocked=blocked)
+        capacity = world.options.capacity
+        super().__init__(seen, world.scene.episode.targets, answer, blocked=blocked, capacity=capacity)
         self._world, self._assistant, self._hud = world, assistant, hud
 
     def look(self) -> Mapping[str, Point]:

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from mjsim.episode import CAPACITY
 from planner.errors import PlannerError
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Visit
@@ -26,11 +27,12 @@ class Regrets:
 
     Args:
         geodesics: Distances.
+        capacity: How many objects can be carried.
     """
 
-    def __init__(self, geodesics: Geodesics) -> None:
-        self._geodesics = geodesics
-        self._evaluator = RegretEvaluator(geodesics)
+    def __init__(self, geodesics: Geodesics, capacity: int = CAPACITY) -> None:
+        self._geodesics, self._capacity = geodesics, capacity
+        self._evaluator = RegretEvaluator(geodesics, capacity=capacity)
         self._task: tuple[TaskState, Plan] | None = None
 
     def prepare(self, state: TaskState, plan: Plan) -> None:
@@ -72,11 +74,11 @@ class _Job:
     stop: threading.Event = field(default_factory=threading.Event)
     found: Mapping[Visit, Regret] | None = None
 
-    def run(self, geodesics: Geodesics) -> None:
+    def run(self, geodesics: Geodesics, capacity: int) -> None:
         """Find them, unless told to stop. A task that cannot be done is the replanner's to report."""
         limit = SolveLimit(seconds=PATIENCE, stop=self.stop)
         with contextlib.suppress(PlannerError):
-            found = RegretEvaluator(geodesics, limit=limit).all(self.state, self.plan)
+            found = RegretEvaluator(geodesics, capacity=capacity, limit=limit).all(self.state, self.plan)
             self.found = None if self.stop.is_set() else found
 
 
@@ -86,8 +88,8 @@ class LiveRegrets(Regrets):
     Visits are evaluated after the task.
     """
 
-    def __init__(self, geodesics: Geodesics) -> None:
-        super().__init__(geodesics)
+    def __init__(self, geodesics: Geodesics, capacity: int = CAPACITY) -> None:
+        super().__init__(geodesics, capacity)
         self._job: _Job | None = None
         self._thread: threading.Thread | None = None
         self._made: list[tuple[Label, TaskState, Visit, Plan]] = []
@@ -113,7 +115,7 @@ class LiveRegrets(Regrets):
         if self._job is None:
             self._job = _Job(*self._task)
             self._thread = threading.Thread(
-                target=self._job.run, args=(self._geodesics,), name="regrets", daemon=True
+                target=self._job.run, args=(self._geodesics, self._capacity), name="regrets", daemon=True
             )
             self._thread.start()
         return self._job.found or {}

@@ -1,6 +1,5 @@
 """One trial: an episode, an assistance condition, a participant and a seed, recorded into a run directory."""
 
-import dataclasses
 import hashlib
 import time
 from contextlib import ExitStack
@@ -20,75 +19,28 @@ from experiments.files import save_arrays, write_json
 from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
 from experiments.house import House
 from experiments.metrics import measure
-from experiments.participants import default_participant, participant
+from experiments.participants import participant
 from experiments.recording import Recording, provenance
 from experiments.records import Event, EventLog
 from experiments.regrets import LiveRegrets, Regrets
 from experiments.run_directory import keep_failed, run_directory
 from experiments.session import OnProgress, Session, Viewer
+from experiments.trial_config import TrialConfig
 from experiments.video import VideoWriter
 from mjsim.episode import Episode
 from mjsim.errors import PhysicsError
 from mjsim.model.scene import Scene, compose
-from mjsim.options import FIDELITIES, WorldOptions
+from mjsim.options import WorldOptions
 from mjsim.render import gl_info
 from mjsim.world import World
 from planner.live import LiveReplanner
 from planner.replanner import Replanner
-from planner.solver import DEFAULT_SOLVER, solver
+from planner.solver import solver
 
 _SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
+_LIST_ORDER, _PERSON = 0, 1  # purposes of random numbers in a session
 NOTHING_DRAWN = "none: nothing was drawn"  # in place of the renderer's name
 FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock of a live trial starts
-SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
-
-
-@dataclass(frozen=True)
-class TrialConfig:
-    """Everything that decides how a trial goes; equal configurations give equal records.
-
-    Attributes:
-        objects: How many misplaced objects.
-        assistance: Assistance condition.
-        seed: Seed of the house, the participant and the list order.
-        user: Participant, or None for the one that makes the most of the condition.
-        house: House name, or path of a catalogue.
-        planner: Solver of the routing problem.
-        time_limit: Simulated time after which the trial ends, s; None for a generous one.
-        live: Plan in real time, with proofs in the background, as for a person. Such a run depends on the machine's
-            speed; a replay shows the plans that were shown.
-        fidelity: How much of the world is physics: `full`, `windows` or `event` (docs/fidelity.md).
-        regret: Log for every visit by how much it makes the rest of the task longer than the best one would.
-    """
-
-    objects: int
-    assistance: str
-    seed: int
-    user: str | None = None
-    house: str = "apartment"
-    planner: str = DEFAULT_SOLVER
-    time_limit: float | None = None
-    live: bool = False
-    fidelity: str = WorldOptions.fidelity
-    regret: bool = True
-
-    def __post_init__(self) -> None:
-        if self.fidelity not in FIDELITIES:
-            raise ConfigError(f"no fidelity {self.fidelity!r}; choose one of {', '.join(FIDELITIES)}")
-        if self.seed < 0:
-            raise ConfigError(f"seed must not be negative, got {self.seed}")
-        if self.time_limit is not None and not self.time_limit > 0:
-            raise ConfigError(f"time limit must be positive, got {self.time_limit} s")
-
-    @property
-    def user_name(self) -> str:
-        """The participant's name, with the default filled in."""
-        return self.user or default_participant(self.assistance)
-
-    @property
-    def limit(self) -> float:
-        """Simulated time after which the trial ends, s."""
-        return self.time_limit if self.time_limit is not None else 60.0 + SECONDS_PER_OBJECT * self.objects
 
 
 def run_trial(
@@ -119,7 +71,7 @@ def run_trial(
     """
     started = time.perf_counter()
     house = house or House.load(config.house)
-    episode = house.sample_episode(objects=config.objects, seed=config.seed)
+    episode = trial_episode(config, house)
     with run_directory(out) as folder:
         scene = compose(episode, house.catalogue)
         result = _simulate(config, house, scene, folder, film, on_progress)
@@ -142,6 +94,23 @@ def run_trial(
         write_json(folder / records.METRICS, metrics)
         write_checksums(folder, records.FILES)
     return metrics
+
+
+def trial_episode(config: TrialConfig, house: House) -> Episode:
+    """The disorganized house of a trial: sampled, or read from its file.
+
+    Raises:
+        ConfigError: The file holds another number of objects than the trial.
+        EpisodeError, SamplingError: There is no such episode.
+    """
+    if config.episode is None:
+        return house.sample_episode(objects=config.objects, seed=config.house_seed, points=config.points)
+    episode = Episode.load(Path(config.episode))
+    if len(episode.objects) != config.objects:
+        raise ConfigError(
+            f"objects is {config.objects}, but {config.episode} holds {len(episode.objects)}; leave it out"
+        )
+    return episode
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +176,9 @@ def _simulate_once(
             viewer = Filming(renderer, video)
         replanner = None
         if config.live:
-            replanner = stack.enter_context(LiveReplanner(house.geodesics, solver(config.planner)))
+            replanner = stack.enter_context(
+                LiveReplanner(house.geodesics, solver(config.planner), capacity=config.capacity)
+            )
         session, _ = prepare_session(config, house, scene, log, viewer, replanner, rollouts=rollouts)
         try:
             ended: str | PhysicsError = session.run(on_progress)
@@ -239,16 +210,14 @@ def prepare_session(
         rollouts: See `Session`.
         world: A new world of the scene in the trial's fidelity; None to make one.
     """
-    order_rng, user_rng = (
-        np.random.default_rng(s) for s in np.random.SeedSequence([config.seed, _SESSION]).spawn(2)
-    )
+    order_rng = _session_rng(config.order_seed, _LIST_ORDER)
     order = [scene.index.names[i] for i in order_rng.permutation(len(scene.index.names))]
-    world = world or World(scene, WorldOptions(fidelity=config.fidelity))
+    world = world or World(scene, WorldOptions(fidelity=config.fidelity, capacity=config.capacity))
     _log_start(config, world, order, log)
     session = Session(
         world,
         _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
-        participant(config.user_name)(house, user_rng),
+        participant(config.user)(house, _session_rng(config.person_seed, _PERSON)),
         Recording(world, log),
         walls=house.navmesh.outline,
         time_limit=config.limit,
@@ -258,6 +227,11 @@ def prepare_session(
     return session, world
 
 
+def _session_rng(seed: int, purpose: int) -> np.random.Generator:
+    """The generator of one purpose in a session, apart from those of the house with the same seed."""
+    return np.random.default_rng(np.random.SeedSequence([seed, _SESSION]).spawn(2)[purpose])
+
+
 def _log_start(config: TrialConfig, world: World, order: list[str], log: EventLog) -> None:
     episode = world.scene.episode.to_json().encode()
     log.append(
@@ -265,7 +239,7 @@ def _log_start(config: TrialConfig, world: World, order: list[str], log: EventLo
         "start",
         format=records.LOG_FORMAT,
         **provenance(world),
-        **_settings(config),
+        **config.settings(),
         episode_sha256=hashlib.sha256(episode).hexdigest(),
         order=order,
     )
@@ -276,8 +250,8 @@ def _make_assistant(
 ) -> Assistant:
     """The assistant of a trial; for a live one, all that takes long is done before the clock starts."""
     geodesics = board.house.geodesics
-    replanner = replanner or Replanner(geodesics, solver(config.planner))
-    regrets = LiveRegrets(geodesics) if config.live else Regrets(geodesics)
+    replanner = replanner or Replanner(geodesics, solver(config.planner), capacity=config.capacity)
+    regrets = (LiveRegrets if config.live else Regrets)(geodesics, config.capacity)
     assistant = Assistant(
         board,
         assistance=config.assistance,
@@ -292,8 +266,3 @@ def _make_assistant(
         route = replanner.prepare(state, seconds=FAMILIARISATION)
         regrets.prepare(state, route.plan)
     return assistant
-
-
-def _settings(config: TrialConfig) -> dict[str, Any]:
-    settings = dataclasses.asdict(config)
-    return {**settings, "user": config.user_name, "time_limit": config.limit}

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mjsim.episode import CAPACITY
 from planner.geodesics import Geodesics
 from planner.plan import Visit, VisitKind
 from planner.route import XY, TaskState
@@ -16,7 +15,7 @@ def as_json(visit: Visit) -> list[str]:
 
 
 def alternatives(
-    state: TaskState, made: Visit, suggested: Visit | None, targets: Mapping[str, str]
+    state: TaskState, made: Visit, suggested: Visit | None, targets: Mapping[str, str], capacity: int
 ) -> dict[str, int | bool]:
     """How many other visits were feasible when this one was made, and which only differ in what goes first.
 
@@ -27,8 +26,9 @@ def alternatives(
         made: The visit.
         suggested: What was suggested instead.
         targets: Object name -> receptacle.
+        capacity: How many objects can be carried.
     """
-    feasible = len(state.carried) + (len(state.loose) if len(state.carried) < CAPACITY else 0)
+    feasible = len(state.carried) + (len(state.loose) if len(state.carried) < capacity else 0)
     tied: set[str] = set()
     if suggested is not None and suggested.kind is VisitKind.PLACE:
         tied = {name for name in state.carried if targets[name] == targets[suggested.object]}

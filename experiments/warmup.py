@@ -8,9 +8,10 @@ import math
 import numpy as np
 
 from experiments.house import House
-from experiments.participants import DEFAULT_FOR_ASSISTANCE
 from experiments.records import EventLog
-from experiments.trial import TrialConfig, prepare_session
+from experiments.trial import prepare_session
+from experiments.trial_config import TrialConfig
+from hud.conditions import condition_names
 from mjsim.actions import Move, Pick, Place
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.scene import Scene, compose
@@ -57,9 +58,9 @@ def act(house: House) -> None:
 
 
 def play(house: House) -> None:
-    """Play the beginning of a trial with every kind of participant."""
+    """Play the beginning of a trial in every condition."""
     scene = compose(house.sample_episode(objects=2, seed=0), house.catalogue)
-    for assistance in DEFAULT_FOR_ASSISTANCE:
+    for assistance in condition_names():
         for fidelity, until in TRIALS:
             config = TrialConfig(
                 objects=2, assistance=assistance, seed=0, fidelity=fidelity, time_limit=until, regret=False

@@ -1,7 +1,8 @@
-"""The contents of the two hands: the knapsack of capacity two of PAPER section 3.3."""
+"""The contents of the two hands: the knapsack of PAPER section 3.3, of capacity two there."""
 
 from dataclasses import dataclass, replace
 
+from mjsim.episode import CAPACITY
 from mjsim.errors import ActionError
 
 LEFT, RIGHT = 0, 1
@@ -11,12 +12,17 @@ LEFT, RIGHT = 0, 1
 class Inventory:
     """What the left and the right hand hold: an instance name or None.
 
+    Attributes:
+        left, right: Contents.
+        capacity: How many objects are carried at most, 1 or 2; with 1, the right hand does all.
+
     Raises:
         ActionError: Both hands are said to hold the same object.
     """
 
     left: str | None = None
     right: str | None = None
+    capacity: int = CAPACITY
 
     def __post_init__(self) -> None:
         if self.left is not None and self.left == self.right:
@@ -34,8 +40,9 @@ class Inventory:
 
     @property
     def free_hands(self) -> tuple[int, ...]:
-        """Hands that hold nothing: 0 left, 1 right."""
-        return tuple(hand for hand, name in enumerate(self.hands) if name is None)
+        """Hands that can take something: 0 left, 1 right."""
+        usable = (LEFT, RIGHT) if self.capacity > 1 else (RIGHT,)
+        return tuple(hand for hand in usable if self.hands[hand] is None)
 
     def hand_of(self, name: str) -> int | None:
         """Hand that holds `name`, or None."""

@@ -4,9 +4,11 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
+from mjsim.episode import CAPACITY
 from mjsim.errors import ActionError
 
 FIDELITIES = ("full", "windows", "event")
+CAPACITIES = (1, 2)
 REST_STEPS = 4  # control steps in a row below `settle_speed`, after which an object is at rest
 
 
@@ -32,9 +34,10 @@ class WorldOptions:
         fidelity: `full`, everything in physics; `windows`, physics while something is picked or placed, and
             kinematic walking in between; `event`, kinematic except for the fall of released objects
             (docs/fidelity.md).
+        capacity: How many objects are carried at most: 2, or 1 with the right hand alone.
 
     Raises:
-        ActionError: A value is not a positive finite number, or there is no such fidelity.
+        ActionError: A value is not a positive finite number, there is no such fidelity, or nobody has so many hands.
     """
 
     control_timestep: float = 0.04
@@ -52,10 +55,15 @@ class WorldOptions:
     settle_speed: float = 0.05
     volume_margin: float = 0.005
     fidelity: str = "full"
+    capacity: int = CAPACITY
 
     def __post_init__(self) -> None:
         if self.fidelity not in FIDELITIES:
             raise ActionError(f"no fidelity {self.fidelity!r}; choose one of {', '.join(FIDELITIES)}")
+        if self.capacity not in CAPACITIES:
+            raise ActionError(
+                f"capacity is {self.capacity!r}; a person with two hands carries 1 or 2 objects"
+            )
         for field in dataclasses.fields(self):
             if field.name == "fidelity":
                 continue

@@ -1,6 +1,7 @@
 """The interface of all solvers, and their names."""
 
 import importlib
+import pkgutil
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -66,12 +67,25 @@ class Solver(Protocol):
 
 
 def solver(name: str) -> Solver:
-    """The planner of this name.
+    """The planner of this name, or one by `package.module:attribute`: a class, or a function without arguments.
 
     Raises:
-        PlannerError: No planner has this name.
+        PlannerError: No planner has this name, or it cannot be made.
     """
-    if name not in SOLVERS:
-        raise PlannerError(f"unknown solver {name!r}; choose one of {sorted(SOLVERS)}")
-    module, attribute = SOLVERS[name]
-    return cast(Solver, getattr(importlib.import_module(module), attribute)())
+    if name in SOLVERS:
+        module, attribute = SOLVERS[name]
+        return cast(Solver, getattr(importlib.import_module(module), attribute)())
+    if ":" not in name:
+        raise PlannerError(
+            f"unknown solver {name!r}; choose one of {sorted(SOLVERS)}, or package.module:attribute"
+        )
+    try:
+        found = pkgutil.resolve_name(name)()
+    except Exception as error:  # whatever the module does when it is imported
+        raise PlannerError(
+            f"cannot make the planner {name!r}: {type(error).__name__}: {error}; "
+            "modules are looked for in the current folder and among those installed"
+        ) from error
+    if not callable(getattr(found, "solve", None)):
+        raise PlannerError(f"planner {name!r} makes a {type(found).__name__}, which has no method solve")
+    return cast(Solver, found)

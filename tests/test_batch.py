@@ -9,10 +9,11 @@ import time
 import pyarrow.parquet as pq
 import pytest
 
-from experiments.batch import BatchConfig, run_batch, trial_name
+from experiments.batch import run_batch, trial_name
+from experiments.design import Design, factorial
 from experiments.errors import ConfigError
 from experiments.records import METRICS
-from experiments.trial import TrialConfig
+from experiments.trial_config import TrialConfig
 
 COMMAND = [
     sys.executable,
@@ -45,7 +46,7 @@ def test_a_killed_batch_goes_on_where_it_stopped(tmp_path):
     assert "4 trials" in done.stderr
     assert {path: path.stat().st_mtime_ns for path in before} == before
     table = pq.read_table(tmp_path / "trials.parquet").to_pydict()
-    assert list(zip(table["assistance"], table["seed"], strict=True)) == [
+    assert list(zip(table["assistance"], table["house_seed"], strict=True)) == [
         ("optimal", 0),
         ("optimal", 1),
         ("highlight", 0),
@@ -59,15 +60,18 @@ def test_a_killed_batch_goes_on_where_it_stopped(tmp_path):
 
 def test_one_failing_trial_does_not_stop_the_others(tmp_path):
     reports = []
-    batch = BatchConfig(objects=[6, 41], assistance=["optimal"], seeds=[0])
-    rows = run_batch(batch, tmp_path, workers=1, on_progress=reports.append)
-    assert [row["objects"] for row in rows] == [6]
-    assert (reports[-1].done, reports[-1].failed) == (1, 1)
-    assert any("objects is 41" in (r.failure or "") for r in reports)
+    design = factorial(objects=[6], assistance=["none", "optimal"], users=["nearest"], seeds=[0])
+    shown = factorial(objects=[6], assistance=["highlight"], users=["nearest"], seeds=[0])
+    rows = run_batch(Design(design.trials + shown.trials), tmp_path, workers=1, on_progress=reports.append)
+    assert [row["assistance"] for row in rows] == ["highlight"]
+    assert (reports[-1].done, reports[-1].failed) == (1, 2)
+    assert any("needs ['flagpole']" in (r.failure or "") for r in reports)
 
 
 def test_unlike_trials_have_unlike_names():
-    configs = list(BatchConfig(objects=[6, 12], assistance=["none", "optimal"], seeds=range(3)).trials())
+    configs = list(
+        factorial(objects=[6, 12], assistance=["none", "optimal"], users=["follower"], seeds=range(3)).trials
+    )
     configs.append(TrialConfig(objects=6, assistance="none", seed=0, user="my.users:lazy"))
     configs.append(TrialConfig(objects=6, assistance="none", seed=0, planner="greedy"))
     configs.append(TrialConfig(objects=6, assistance="none", seed=0, fidelity="event"))
@@ -85,9 +89,11 @@ def test_unlike_trials_have_unlike_names():
 )
 def test_a_design_that_makes_no_sense_is_refused(design, fault):
     with pytest.raises(ConfigError, match=fault):
-        BatchConfig(**{"objects": [6], "assistance": ["none"], "seeds": [0], **design})
+        factorial(**{"objects": [6], "assistance": ["none"], "users": ["follower"], "seeds": [0], **design})
 
 
 def test_a_batch_needs_a_worker(tmp_path):
     with pytest.raises(ConfigError, match="at least one worker, got 0"):
-        run_batch(BatchConfig(objects=[6], assistance=["none"], seeds=[0]), tmp_path, workers=0)
+        run_batch(
+            factorial(objects=[6], assistance=["none"], users=["follower"], seeds=[0]), tmp_path, workers=0
+        )

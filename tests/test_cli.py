@@ -86,7 +86,7 @@ def test_a_folder_that_cannot_be_written_is_named_in_one_line(tmp_path, capsys):
         (
             "run",
             [
-                "misplaced objects, 1 to 40 (default: 6)",
+                "misplaced objects, 1 to --points (default: 6)",
                 "(default: optimal)",
                 "frame size, px (default: 640x480)",
             ],

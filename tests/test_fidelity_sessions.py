@@ -12,7 +12,8 @@ from experiments.participants.base import WAIT, Moves
 from experiments.participants.visit_executor import VisitExecutor
 from experiments.records import EventLog, read_events
 from experiments.replaying.replay import replay
-from experiments.trial import TrialConfig, prepare_session, run_trial
+from experiments.trial import prepare_session, run_trial, trial_episode
+from experiments.trial_config import TrialConfig
 from mjsim.actions import Move
 from mjsim.errors import PhysicsError
 from mjsim.health.monitor import HealthMonitor
@@ -46,7 +47,7 @@ def event_run(house, tmp_path_factory):
 
 def played(house, config, *, rollouts, ends="all delivered"):
     """Arrays, log and state hashes of a trial, and how many single control steps its session asked for."""
-    scene = compose(house.sample_episode(objects=config.objects, seed=config.seed), house.catalogue)
+    scene = compose(trial_episode(config, house), house.catalogue)
     log = EventLog()
     session, world = prepare_session(config, house, scene, log, rollouts=rollouts)
     singles, step = 0, world.step
@@ -70,7 +71,7 @@ def played(house, config, *, rollouts, ends="all delivered"):
 @pytest.mark.parametrize("fidelity", ["windows", "event"])
 @pytest.mark.parametrize(
     ("assistance", "user"),
-    [("optimal", None), ("highlight", None), ("none", None), ("none", "boltzmann:3")],
+    [("optimal", "follower"), ("highlight", "follower"), ("none", "follower"), ("none", "boltzmann:3")],
 )
 def test_rollouts_are_what_stepping_gives(house, fidelity, assistance, user):
     config = TrialConfig(objects=3, assistance=assistance, seed=1, fidelity=fidelity, user=user)
@@ -78,7 +79,7 @@ def test_rollouts_are_what_stepping_gives(house, fidelity, assistance, user):
     stepped, all_single, _ = played(house, config, rollouts=False)
     assert {name for name in stepped if stepped[name] != rolled_out[name]} == set()
     assert all_single == steps - 1
-    searches = assistance == "none" and user is None
+    searches = assistance == "none" and user == "follower"
     assert singles < (0.6 if searches else 0.2) * steps
 
 

@@ -11,7 +11,8 @@ from experiments.cli import main
 from experiments.house import House
 from experiments.records import EventLog
 from experiments.replaying.logged_replanner import LoggedReplanner
-from experiments.trial import TrialConfig, prepare_session
+from experiments.trial import prepare_session
+from experiments.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from planner.checker import check
 from planner.errors import ProblemError, UnreachableError

@@ -9,7 +9,8 @@ from experiments.house import House
 from experiments.participants.base import WAIT
 from experiments.records import EventLog
 from experiments.session import INTERRUPTED
-from experiments.trial import TrialConfig, prepare_session
+from experiments.trial import prepare_session
+from experiments.trial_config import TrialConfig
 from hud.messages import TEXTS
 from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus

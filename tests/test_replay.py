@@ -21,7 +21,8 @@ from experiments.house import House
 from experiments.records import read_events
 from experiments.replaying.replay import ReplayFilm, replay
 from experiments.replaying.run_record import load_run
-from experiments.trial import TrialConfig, run_trial
+from experiments.trial import run_trial
+from experiments.trial_config import TrialConfig
 from mjsim.errors import PhysicsError
 
 DT = 0.04

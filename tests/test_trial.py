@@ -14,7 +14,8 @@ from experiments.files import read_json
 from experiments.first_person import FilmConfig
 from experiments.house import House
 from experiments.records import read_events
-from experiments.trial import TrialConfig, run_trial
+from experiments.trial import run_trial
+from experiments.trial_config import TrialConfig
 from mjsim.episode import Episode
 
 
@@ -151,8 +152,8 @@ def test_an_interrupted_trial_keeps_what_was_done(house, tmp_path):
 
 
 def test_a_participant_without_the_guidance_it_needs_is_refused(house, tmp_path):
-    config = TrialConfig(objects=6, assistance="none", seed=0, user="follower")
-    with pytest.raises(SessionError, match=r"needs \['goal'\]"):
+    config = TrialConfig(objects=6, assistance="none", seed=0, user="nearest")
+    with pytest.raises(SessionError, match=r"needs \['flagpole'\]"):
         run_trial(config, tmp_path / "run", house=house)
     assert list(tmp_path.iterdir()) == []
 

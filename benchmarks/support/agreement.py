@@ -11,7 +11,8 @@ from typing import Any
 from experiments.house import House
 from experiments.metrics import compute_metrics
 from experiments.records import EventLog
-from experiments.trial import TrialConfig, prepare_session
+from experiments.trial import prepare_session, trial_episode
+from experiments.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus
 from mjsim.options import FIDELITIES
@@ -34,7 +35,7 @@ class TierResult:
 
 def run_in_tiers(config: TrialConfig, house: House) -> dict[str, TierResult]:
     """Run a trial in every tier, without a record on disk; its own fidelity is ignored."""
-    scene = compose(house.sample_episode(objects=config.objects, seed=config.seed), house.catalogue)
+    scene = compose(trial_episode(config, house), house.catalogue)
     results = {}
     for fidelity in FIDELITIES:
         tier = dataclasses.replace(config, fidelity=fidelity)

@@ -13,7 +13,8 @@ from rich.console import Console
 
 from experiments.house import House
 from experiments.records import EventLog
-from experiments.trial import TrialConfig, prepare_session
+from experiments.trial import prepare_session, trial_episode
+from experiments.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
@@ -47,7 +48,7 @@ class _Recorder:
 
 def session_states(house: House, trial: TrialConfig) -> tuple[HudState, ...]:
     """The states of a trial, one per control step."""
-    scene = compose(house.sample_episode(objects=trial.objects, seed=trial.seed), house.catalogue)
+    scene = compose(trial_episode(trial, house), house.catalogue)
     recorder = _Recorder()
     session, _ = prepare_session(trial, house, scene, EventLog(), recorder)
     session.run()

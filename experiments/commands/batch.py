@@ -1,4 +1,4 @@
-"""`mjsim batch`: a factorial design on all cores."""
+"""`mjsim batch`: the trials of a design on all cores."""
 
 import argparse
 import os
@@ -15,21 +15,29 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from experiments.batch import BatchConfig, BatchProgress, run_batch
+from experiments.batch import BatchProgress, run_batch
 from experiments.commands.options import (
+    TRIAL_OPTIONS,
     add_command,
     add_trial_options,
     assistance_help,
+    given_options,
     int_list,
     text_list,
     trial_options,
 )
+from experiments.design import Design, factorial, read_design
+from experiments.errors import ConfigError
+from experiments.participants import DEFAULT_PARTICIPANT
+
+OBJECTS = 6
+ASSISTANCE = ("none", "highlight", "optimal")
 
 DESCRIPTION = """\
-Run a trial for every combination of --objects, --assistance and --seeds, without video, one process per core. Each
-trial is a run directory under OUT/trials; OUT/trials.parquet and OUT/trials.csv hold one row per trial. Finished trials
-are not run again: give the command once more to continue after an interruption, or with more values to extend the
-design. The records do not depend on --workers."""
+Run the trials of a design file, or one for every combination of --objects, --assistance, --user and --seeds, without
+video, one process per core. Each trial is a run directory under OUT/trials; OUT/trials.parquet and OUT/trials.csv hold
+one row per trial. Finished trials are not run again: give the command once more to continue after an interruption, or
+with more values to extend the design. The records do not depend on --workers."""
 
 
 def add_parser(commands: Any) -> None:
@@ -38,31 +46,35 @@ def add_parser(commands: Any) -> None:
         commands,
         "batch",
         run,
-        summary="run a factorial design on all cores; resumes",
+        summary="run the trials of a design on all cores; resumes",
         description=DESCRIPTION,
+    )
+    parser.add_argument(
+        "design",
+        nargs="?",
+        type=Path,
+        metavar="DESIGN.toml",
+        help="design with its own cells (docs/designs.md)",
     )
     parser.add_argument(
         "--objects",
         type=int_list,
-        default="6",
         metavar="N,..",
-        help="numbers of misplaced objects, each 1 to 40, such as 6,12,18,24",
+        help=f"numbers of misplaced objects, each 1 to --points, such as 6,12,18,24 (default: {OBJECTS})",
     )
     parser.add_argument(
         "--assistance",
         type=text_list,
-        default="none,highlight,optimal",
         metavar="NAME,..",
-        help=assistance_help(),
+        help=f"{assistance_help()} (default: {','.join(ASSISTANCE)})",
     )
     parser.add_argument(
         "--seeds",
         type=int_list,
-        default="0:10",
         metavar="A:B",
-        help="seeds, such as 1,2,5 or 0:10, which ends with 9",
+        help="seeds, such as 1,2,5 or 0:10, which ends with 9 (default: 0:10)",
     )
-    add_trial_options(parser)
+    add_trial_options(parser, several_users=True)
     parser.add_argument(
         "--workers",
         type=int,
@@ -73,14 +85,27 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the batch")
 
 
+def _design(arguments: argparse.Namespace) -> Design:
+    """The design's file, or the factorial of the options."""
+    if arguments.design is not None:
+        names = ("objects", "assistance", "seeds", "user", "episode", *TRIAL_OPTIONS)
+        if given := given_options(arguments, names):
+            options = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+            raise ConfigError(f"{arguments.design} says what to run; leave out {options}, or write it there")
+        return read_design(arguments.design)
+    same = trial_options(arguments)
+    return factorial(
+        objects=[same.pop("objects")] if "objects" in same else arguments.objects or [OBJECTS],
+        assistance=ASSISTANCE if arguments.assistance is None else arguments.assistance,
+        users=[DEFAULT_PARTICIPANT] if arguments.user is None else arguments.user,
+        seeds=range(10) if arguments.seeds is None else arguments.seeds,
+        **same,
+    )
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Run the batch with a progress bar; 1 if a trial failed."""
-    batch = BatchConfig(
-        objects=arguments.objects,
-        assistance=arguments.assistance,
-        seeds=arguments.seeds,
-        **trial_options(arguments),
-    )
+    design = _design(arguments)
     console = Console(stderr=True, highlight=False)
     columns = (
         TextColumn("trials"),
@@ -101,6 +126,6 @@ def run(arguments: argparse.Namespace) -> int:
             if progress.failure:
                 bars.console.print(f"failed: {progress.failure}", style="red", soft_wrap=True)
 
-        rows = run_batch(batch, arguments.out, workers=arguments.workers, on_progress=show)
+        rows = run_batch(design, arguments.out, workers=arguments.workers, on_progress=show)
     console.print(f"{len(rows)} trials in {arguments.out}/trials.parquet and .csv; {failed} failed")
     return 1 if failed else 0

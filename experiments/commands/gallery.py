@@ -9,7 +9,7 @@ from rich.console import Console
 from experiments.commands.options import add_command, add_frame, film_config
 from experiments.first_person import FilmConfig
 from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
-from experiments.trial import TrialConfig
+from experiments.trial_config import TrialConfig
 
 SEED = 7
 CONDITIONS = ("none", "highlight", "optimal")

@@ -4,9 +4,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from experiments.commands.options import add_command, add_house
+from experiments.commands.options import add_command, add_house, add_points
 from experiments.house import House
 from mjsim.model.export import export_house
+from mjsim.model.sampling import POINTS
 from mjsim.model.scene import compose
 
 DESCRIPTION = """\
@@ -19,8 +20,11 @@ def add_parser(commands: Any) -> None:
     parser = add_command(
         commands, "house", run, summary="write a disorganized house as MJCF", description=DESCRIPTION
     )
-    parser.add_argument("--objects", type=int, default=12, metavar="N", help="misplaced objects, 1 to 40")
+    parser.add_argument(
+        "--objects", type=int, default=12, metavar="N", help="misplaced objects, 1 to --points"
+    )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the house")
+    add_points(parser)
     add_house(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.xml", help="MJCF file to write")
 
@@ -28,7 +32,9 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Sample, compose, export."""
     house = House.load(arguments.house)
-    episode = house.sample_episode(objects=arguments.objects, seed=arguments.seed)
+    episode = house.sample_episode(
+        objects=arguments.objects, seed=arguments.seed, points=arguments.points or POINTS
+    )
     export_house(compose(episode, house.catalogue), arguments.out)
     episode.save(arguments.out.with_suffix(".episode.json"))
     print(f"{arguments.out} ({len(episode.objects)} misplaced objects, seed {arguments.seed})")

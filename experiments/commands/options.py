@@ -1,36 +1,38 @@
 """Option types and options that several subcommands share."""
 
 import argparse
+import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
+from experiments.design import numbers
+from experiments.errors import ConfigError
 from experiments.first_person import FilmConfig
-from experiments.participants import participant_names
+from experiments.participants import DEFAULT_PARTICIPANT, participant_names
+from experiments.trial_config import SEEDS, TrialConfig, episode_settings
 from hud.conditions import condition_names
 from hud.options import option_names
-from mjsim.options import FIDELITIES, WorldOptions
+from mjsim.episode import CAPACITY
+from mjsim.model.sampling import POINTS
+from mjsim.options import CAPACITIES, FIDELITIES
 from mjsim.render import FAST, PROFILES
 from planner.solver import DEFAULT_SOLVER, SOLVERS
+
+HOUSE_HELP = "name of a house, or path of its catalogue.toml"
 
 
 def int_list(text: str) -> list[int]:
     """Parse `6,12` or `0:10` (the end not included) or a mix of both.
 
     Raises:
-        argparse.ArgumentTypeError: It is neither.
+        argparse.ArgumentTypeError: It is neither, or too long.
     """
-    values: list[int] = []
-    for part in text.split(","):
-        if match := re.fullmatch(r"(\d+):(\d+)", part):
-            values.extend(range(int(match[1]), int(match[2])))
-        elif re.fullmatch(r"\d+", part):
-            values.append(int(part))
-        else:
-            raise argparse.ArgumentTypeError(f"{part!r} is neither a number nor a range such as 0:10")
-    if not values:
-        raise argparse.ArgumentTypeError(f"{text!r} names no number; a range's end is not included")
-    return values
+    try:
+        return numbers(text)
+    except ConfigError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def text_list(text: str) -> list[str]:
@@ -51,6 +53,21 @@ def frame_size(text: str) -> tuple[int, int]:
     if width % 2 or height % 2 or width < 160 or height < 120:
         raise argparse.ArgumentTypeError(f"{text} must be even in both directions and at least 160x120")
     return width, height
+
+
+def seconds(text: str) -> float:
+    """Parse a time, s.
+
+    Raises:
+        argparse.ArgumentTypeError: It is not a finite number from 0 on.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds from 0 on")
+    return value
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter, argparse.ArgumentDefaultsHelpFormatter):
@@ -82,42 +99,97 @@ def add_command(
 
 def add_house(parser: argparse.ArgumentParser) -> None:
     """Add `--house`."""
+    parser.add_argument("--house", default="apartment", metavar="NAME", help=HOUSE_HELP)
+
+
+def add_points(parser: argparse.ArgumentParser) -> None:
+    """Add `--points`."""
     parser.add_argument(
-        "--house", default="apartment", metavar="NAME", help="name of a house, or path of its catalogue.toml"
+        "--points",
+        type=int,
+        metavar="N",
+        help="points of the house where objects may lie, at least 1 m apart; fewer fit into a small house "
+        f"(default: {POINTS})",
     )
 
 
-def add_trial_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that a run and a batch have in common."""
+def add_trial_options(parser: argparse.ArgumentParser, *, several_users: bool = False) -> None:
+    """Add the options that a run and a batch have in common; those not given are None."""
     parser.add_argument(
         "--user",
-        metavar="NAME",
+        metavar="NAME,.." if several_users else "NAME",
+        type=text_list if several_users else str,
         help=f"simulated participant: {', '.join(participant_names())}, or package.module:attribute; "
+        "follower uses whatever guidance is shown, in any condition; "
         "boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T) "
-        "(default: the one that makes the most of the assistance)",
+        f"(default: {DEFAULT_PARTICIPANT})",
     )
-    add_house(parser)
+    parser.add_argument("--house", metavar="NAME", help=f"{HOUSE_HELP} (default: {TrialConfig.house})")
     parser.add_argument(
-        "--planner", default=DEFAULT_SOLVER, metavar="NAME", help=f"route planner: {', '.join(SOLVERS)}"
+        "--planner",
+        metavar="NAME",
+        help=f"route planner: {', '.join(SOLVERS)}, or package.module:attribute (default: {DEFAULT_SOLVER})",
     )
     parser.add_argument(
         "--fidelity",
         choices=FIDELITIES,
-        default=WorldOptions.fidelity,
         help="full: everything is physics; windows: picks and places are physics, walking is kinematic; "
-        "event: only what falls is physics (docs/fidelity.md)",
+        f"event: only what falls is physics (docs/fidelity.md; default: {TrialConfig.fidelity})",
     )
     parser.add_argument(
         "--no-regret",
         dest="regret",
-        action="store_false",
+        action="store_const",
+        const=False,
         help="do not compute what each visit cost compared with the best one (takes up to 1 s a trial)",
     )
+    parser.add_argument(
+        "--time-limit",
+        type=seconds,
+        metavar="S",
+        help="simulated seconds after which a trial ends (default: 60, plus 150 per object)",
+    )
+    add_points(parser)
+    parser.add_argument(
+        "--capacity",
+        type=int,
+        choices=CAPACITIES,
+        help=f"objects carried at most; with 1, in the right hand (default: {CAPACITY})",
+    )
+    parser.add_argument(
+        "--episode",
+        type=Path,
+        metavar="FILE",
+        help="run this episode (an episode.json) instead of sampling one; its objects, house and seed hold",
+    )
+    for name, what in SEEDS.items():
+        option = f"--{name.replace('_', '-')}"
+        parser.add_argument(option, type=int, metavar="S", help=f"seed of {what} (default: the seed)")
+
+
+TRIAL_OPTIONS = ("house", "planner", "fidelity", "regret", "time_limit", "points", "capacity", *SEEDS)
+
+
+def given_options(arguments: argparse.Namespace, names: Sequence[str]) -> dict[str, Any]:
+    """The options of these names that are given."""
+    return {name: value for name in names if (value := getattr(arguments, name)) is not None}
 
 
 def trial_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The options of `add_trial_options`, as arguments of `TrialConfig`."""
-    return {n: getattr(arguments, n) for n in ("user", "house", "planner", "fidelity", "regret")}
+    """The options of `add_trial_options` that are given, but for the user, as arguments of `TrialConfig`.
+
+    Raises:
+        ConfigError: An episode is given together with what it decides.
+        EpisodeError: The episode cannot be read.
+    """
+    options = given_options(arguments, TRIAL_OPTIONS)
+    if arguments.episode is None:
+        return options
+    if arguments.objects is not None or arguments.house_seed is not None or arguments.points is not None:
+        raise ConfigError(
+            "--episode says which objects lie where; leave out --objects, --points and --house-seed"
+        )
+    return {**episode_settings(arguments.episode), **options}
 
 
 def add_frame(

@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.commands.options import add_command, add_frame, assistance_help, film_config
+from experiments.commands.options import add_command, add_frame, assistance_help, film_config, seconds
 from experiments.errors import ConfigError, ReplayError
 from experiments.replaying.external_view import CAMERAS, FIRST_PERSON
 from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
@@ -34,7 +34,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--from",
         dest="start",
-        type=float,
+        type=seconds,
         default=0.0,
         metavar="T",
         help="simulated seconds: start at the last checkpoint at or before T",

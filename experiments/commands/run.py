@@ -14,10 +14,12 @@ from experiments.commands.options import (
     add_trial_options,
     assistance_help,
     film_config,
+    given_options,
     trial_options,
 )
 from experiments.session import Progress as SessionProgress
-from experiments.trial import TrialConfig, run_trial
+from experiments.trial import run_trial
+from experiments.trial_config import TrialConfig
 
 SHOWN_METRICS = (
     ("delivered", "objects delivered", "{}"),
@@ -36,6 +38,7 @@ SHOWN_METRICS = (
     ("wall_s", "wall time", "{:.1f} s"),
 )
 
+OBJECTS = 6
 PROGRESS_PERIOD = 1.0  # s of simulated time between updates of the progress bar
 
 DESCRIPTION = """\
@@ -56,20 +59,16 @@ task, which is no replan), and `mjsim replay` shows the same plans again."""
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     parser = add_command(commands, "run", run, summary="run one trial and film it", description=DESCRIPTION)
-    parser.add_argument("--objects", type=int, default=6, metavar="N", help="misplaced objects, 1 to 40")
+    parser.add_argument(
+        "--objects", type=int, metavar="N", help="misplaced objects, 1 to --points (default: 6)"
+    )
     parser.add_argument("--assistance", default="optimal", metavar="NAME", help=assistance_help())
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="seed of the house, the lists and the participant"
+        "--seed", type=int, default=0, metavar="S", help="seed of the house, the participant and the list"
     )
     add_trial_options(parser)
     parser.add_argument(
         "--live", action="store_true", help="plan in real time, with proofs in the background (see above)"
-    )
-    parser.add_argument(
-        "--time-limit",
-        type=float,
-        metavar="S",
-        help="simulated seconds after which the trial ends (default: 60, plus 150 per object)",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run directory to write")
     parser.add_argument("--no-video", action="store_true", help="do not film; about 10 times faster")
@@ -79,12 +78,10 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the trial, show progress, then the metrics."""
     config = TrialConfig(
-        objects=arguments.objects,
         assistance=arguments.assistance,
         seed=arguments.seed,
-        time_limit=arguments.time_limit,
         live=arguments.live,
-        **trial_options(arguments),
+        **{"objects": OBJECTS, **given_options(arguments, ("objects", "user")), **trial_options(arguments)},
     )
     film = None if arguments.no_video else film_config(arguments)
     console = Console(stderr=True)
@@ -96,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=console) as bars:
-        bar = bars.add_task(f"{config.assistance}, {config.user_name}", total=config.objects, clock=0.0)
+        bar = bars.add_task(f"{config.assistance}, {config.user}", total=config.objects, clock=0.0)
         last = SessionProgress(-PROGRESS_PERIOD, 0, 0)
 
         def show(progress: SessionProgress) -> None:

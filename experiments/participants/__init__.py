@@ -2,14 +2,22 @@
 
 import importlib
 import pkgutil
+from typing import cast
 
 from experiments.errors import ConfigError
 from experiments.participants.base import Guidance, Participant, ParticipantFactory, Percept
 
-__all__ = ["Guidance", "Participant", "ParticipantFactory", "Percept", "participant", "participant_names"]
+__all__ = [
+    "DEFAULT_PARTICIPANT",
+    "Guidance",
+    "Participant",
+    "ParticipantFactory",
+    "Percept",
+    "participant",
+    "participant_names",
+]
 
-# PAPER section 5: what each condition lets a cooperative person do.
-DEFAULT_FOR_ASSISTANCE = {"optimal": "follower", "highlight": "nearest", "none": "searcher"}
+DEFAULT_PARTICIPANT = "follower"
 
 
 def participant_names() -> tuple[str, ...]:
@@ -24,20 +32,33 @@ def participant(name: str) -> ParticipantFactory:
     A module that takes a parameter defines `with_parameter(text)`, which gives the factory.
 
     Raises:
-        ConfigError: There is no such participant, or the parameter is none of its.
+        ConfigError: There is no such participant, it cannot be loaded or called, or the parameter is none of its.
     """
-    module_name, colon, attribute = name.partition(":")
-    if colon and module_name in participant_names():
-        return _with_parameter(module_name, attribute)
+    module, colon, parameter = name.partition(":")
+    if module in participant_names():
+        if colon:
+            return _with_parameter(module, parameter)
+        return cast(ParticipantFactory, importlib.import_module(f"{__name__}.{module}").build)
     if not colon:
-        if name not in participant_names():
-            raise ConfigError(f"no participant {name!r}; there are {', '.join(participant_names())}")
-        module_name, attribute = f"{__name__}.{name}", "build"
+        raise ConfigError(
+            f"no participant {name!r}; there are {', '.join(participant_names())}, or package.module:attribute"
+        )
+    return _own_participant(name)
+
+
+def _own_participant(name: str) -> ParticipantFactory:
     try:
-        factory: ParticipantFactory = getattr(importlib.import_module(module_name), attribute)
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(f"cannot load participant {name!r}: {error}") from error
-    return factory
+        found = pkgutil.resolve_name(name)
+    except Exception as error:  # whatever the module does when it is imported
+        raise ConfigError(
+            f"cannot load participant {name!r}: {type(error).__name__}: {error}; "
+            "modules are looked for in the current folder and among those installed"
+        ) from error
+    if not callable(found):
+        raise ConfigError(
+            f"participant {name!r} is a {type(found).__name__}, not a function of a house and a generator"
+        )
+    return cast(ParticipantFactory, found)
 
 
 def _with_parameter(name: str, parameter: str) -> ParticipantFactory:
@@ -46,10 +67,3 @@ def _with_parameter(name: str, parameter: str) -> ParticipantFactory:
         raise ConfigError(f"participant {name} takes no parameter, got {parameter!r}")
     factory: ParticipantFactory = module.with_parameter(parameter)
     return factory
-
-
-def default_participant(assistance: str) -> str:
-    """Name of the participant that makes the most of an assistance condition."""
-    return DEFAULT_FOR_ASSISTANCE.get(
-        assistance.partition("-")[0], "follower"
-    )  # less the condition's options

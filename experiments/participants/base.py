@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from experiments.house import House
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult, Pick, Place
+from mjsim.episode import CAPACITY
 from mjsim.errors import ActionError
 from mjsim.observation import ObjectStatus, Observation
 from planner.plan import Visit
@@ -67,12 +68,14 @@ class Percept:
         targets: Object instance name -> receptacle key.
         answer: The world's answer to the previous action, if that was a pick or place.
         blocked: Whether the walk makes no progress.
+        capacity: How many objects the person carries at most.
 
     Attributes:
         time: Simulated time, s.
         position: Own floor position, m, shape (2,).
         heading: Own heading, rad.
         hands: Object in the left and in the right hand.
+        hands_full: Whether no other object can be carried.
         busy: Whether a pick or place is under way.
         targets: As above, from the lists in the HUD.
         answer: As above.
@@ -86,10 +89,12 @@ class Percept:
         answer: ActionResult | None = None,
         *,
         blocked: bool = False,
+        capacity: int = CAPACITY,
     ) -> None:
         self._seen = seen
         self.time, self.position, self.heading = seen.time, seen.position, seen.heading
         self.hands, self.busy = seen.hands, seen.busy
+        self.hands_full = len(seen.carried) >= capacity
         self.targets, self.answer, self.blocked = targets, answer, blocked
 
     @property

@@ -1,14 +1,16 @@
-"""Follows the breadcrumbs and does what the current step says (condition `optimal`)."""
+"""One person for all conditions: uses breadcrumbs where they are shown, else flagpoles, else its own eyes."""
 
 import numpy as np
 
 from experiments.house import House
 from experiments.participants.base import WAIT, Decision, Participant, Percept
+from experiments.participants.nearest import Nearest
+from experiments.participants.searcher import Searcher
 from experiments.participants.visit_executor import VisitExecutor
 
 
-class Follower:
-    """Complies fully with the guidance shown."""
+class BreadcrumbFollower:
+    """Walks along the breadcrumbs and does what the current step says."""
 
     needs = frozenset({"goal"})
 
@@ -22,6 +24,28 @@ class Follower:
         return self._executor.follow(percept, percept.guidance)
 
 
-def build(house: House, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance
-    """Make a participant that follows the guidance."""
-    return Follower(house)
+class Follower:
+    """Follows breadcrumbs where they are shown, goes for flagpoles as `nearest` does, and else is a `searcher`.
+
+    Guidance that was shown once is waited for: flagpoles are gone when the last object is in a hand.
+    """
+
+    needs: frozenset[str] = frozenset()
+
+    def __init__(self, house: House, rng: np.random.Generator) -> None:
+        self._along_breadcrumbs = BreadcrumbFollower(house)
+        self._to_flagpoles = Nearest(house)
+        self._conduct: Participant = Searcher(house, rng)
+
+    def act(self, percept: Percept) -> Decision:
+        """Do as the best guidance that was ever on display suggests."""
+        if percept.guidance is not None:
+            self._conduct = self._along_breadcrumbs
+        elif self._conduct is not self._along_breadcrumbs and percept.flagpoles:
+            self._conduct = self._to_flagpoles
+        return self._conduct.act(percept)
+
+
+def build(house: House, rng: np.random.Generator) -> Participant:
+    """Make a participant that makes the most of what it is shown."""
+    return Follower(house, rng)

@@ -23,7 +23,7 @@ class Nearest:
         if percept.busy:
             return WAIT
         feasible = [Visit(VisitKind.PLACE, name) for name in percept.carried]
-        if None in percept.hands:
+        if not percept.hands_full:
             feasible += [Visit(VisitKind.PICK, name) for name in percept.flagpoles]
         if not feasible:
             return WAIT

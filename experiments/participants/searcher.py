@@ -58,7 +58,7 @@ class Searcher:
         """What can be done with what is known: fetch the nearest known object, or bring what is carried."""
         bins = [Visit(VisitKind.PLACE, name) for name in percept.carried]
         known = [Visit(VisitKind.PICK, name) for name in sorted(self._remembered)]
-        feasible = bins if None not in percept.hands else known or bins
+        feasible = bins if percept.hands_full else known or bins
         if not feasible:
             return None
         if self._choice not in feasible:

@@ -62,6 +62,7 @@ class Replayer:
             assistance=assistance,
             planner=self._replanner,
             log=self._log,
+            options=self._world.options,
         )
         number = record.checkpoint_before(start)
         self.first = 0 if number is None else int(record.recorded.checkpoint_step[number])

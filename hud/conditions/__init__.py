@@ -8,6 +8,7 @@ import functools
 import importlib
 import pkgutil
 from collections.abc import Callable
+from typing import cast
 
 from hud.errors import ConditionError
 from hud.options import option, option_names
@@ -31,6 +32,8 @@ def condition(name: str) -> Condition:
     """
     base, *asked = name.split("-")
     show, options = _plain_condition(base), [option(o) for o in asked]
+    if len(set(asked)) != len(asked):
+        raise ConditionError(f"condition {name!r} names an option twice; give each once")
 
     def hud_state(view: TaskView) -> HudState:
         return functools.reduce(lambda state, apply: apply(view, state), options, show(view))
@@ -39,20 +42,20 @@ def condition(name: str) -> Condition:
 
 
 def _plain_condition(name: str) -> Condition:
-    module_name, _, attribute = name.partition(":")
-    if not attribute:
-        if name not in condition_names():
-            raise ConditionError(f"no assistance condition {name!r}; available: {_available()}")
-        module_name, attribute = f"{__name__}.{name}", ATTRIBUTE
+    if name in condition_names():
+        return cast(Condition, getattr(importlib.import_module(f"{__name__}.{name}"), ATTRIBUTE))
+    if ":" not in name:
+        raise ConditionError(f"no assistance condition {name!r}; available: {_available()}")
     try:
-        found: Condition = getattr(importlib.import_module(module_name), attribute)
-    except (ImportError, AttributeError, ValueError) as error:
+        found = pkgutil.resolve_name(name)
+    except Exception as error:  # whatever the module does when it is imported
         raise ConditionError(
-            f"cannot load condition {name!r} ({error}); available: {_available()}"
+            f"cannot load condition {name!r} ({type(error).__name__}: {error}); modules are looked for in the current "
+            f"folder and among those installed; available: {_available()}"
         ) from error
     if not callable(found):
         raise ConditionError(f"condition {name!r} is a {type(found).__name__}, not a function of a task view")
-    return found
+    return cast(Condition, found)
 
 
 def _available() -> str:

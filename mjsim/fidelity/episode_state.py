@@ -18,6 +18,10 @@ Floats = NDArray[np.float64]
 class EpisodeState:
     """Bookkeeping of one running world.
 
+    Args:
+        scene: The composed episode.
+        capacity: How many objects are carried at most.
+
     Attributes:
         inventory: The two hands.
         held: Object in the left and the right hand, or None; always the same list.
@@ -25,14 +29,15 @@ class EpisodeState:
         events: What happened during the present control step.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, capacity: int) -> None:
+        self._capacity = capacity
         self._index, self._targets = scene.index, scene.episode.targets
         self.held: list[int | None] = [None, None]
         self.reset()
 
     def reset(self) -> None:
         """Empty hands, nothing put away."""
-        self._set(Inventory())
+        self._set(Inventory(capacity=self._capacity))
         self.status = [ObjectStatus.LOOSE] * len(self._index.names)
         self.events: list[WorldEvent] = []
 
@@ -110,7 +115,7 @@ class EpisodeState:
                 f"a state of {len(details.status)} objects with {details.hands} in the hands does not fit a world of "
                 f"{len(self._index.names)} objects; take it from a world of the same episode"
             )
-        self._set(Inventory(*details.hands))
+        self._set(Inventory(*details.hands, self._capacity))
         self.status = list(details.status)
         self.events = []
 

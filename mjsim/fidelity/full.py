@@ -57,7 +57,7 @@ class Full(Tier):
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         self.scene = scene
         self.data = mujoco.MjData(scene.model)
-        self.episode_state = EpisodeState(scene)
+        self.episode_state = EpisodeState(scene, options.capacity)
         rig = Rig(scene, self.data, options.control_timestep)
         grips = Grips(scene, self.data, rig)
         self.person = Person(scene, options, self.data, rig, grips, held=self.episode_state.held)

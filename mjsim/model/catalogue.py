@@ -184,7 +184,7 @@ class _Reader:
             self._checked_receptacles(),
             self._checked_objects(),
         )
-        house_path = self._file(self._house, "house", self._path.parent)
+        house_path = self._file(self._house, "house")
         models = [house_path, *(r.path for r in receptacles.values()), *(o.path for o in objects.values())]
         return Catalogue(
             name=name,
@@ -213,11 +213,15 @@ class _Reader:
     def _entries(self, table: dict[str, Any], kind: type[T], name: str) -> dict[str, T]:
         return {key: self._convert(entry, kind, f"{name}.{key}") for key, entry in table.items()}
 
-    def _file(self, entry: _ModelEntry, where: str, folder: Path) -> Path:
-        path = folder / entry.model
-        if not path.is_file():
-            raise self._error(where, f"names the model {path}, which does not exist")
-        return path
+    def _file(self, entry: _ModelEntry, where: str) -> Path:
+        """The model's file, relative to the catalogue, else to the models that come with the package."""
+        for folder in (self._path.parent, models_root()):
+            if (folder / entry.model).is_file():
+                return folder / entry.model
+        raise self._error(
+            where,
+            f"names the model {entry.model}, which is neither in {self._path.parent} nor in {models_root()}",
+        )
 
     def _checked_categories(self) -> dict[str, Category]:
         taken: dict[str, str] = {}
@@ -247,7 +251,7 @@ class _Reader:
                 )
             if key not in category_of:
                 raise self._error(where, "takes no category; name it in one of [categories] or remove it")
-            path = self._file(entry, where, models_root())
+            path = self._file(entry, where)
             receptacles[key] = Receptacle(key, entry.label, entry.place, entry.room, category_of[key], path)
         return receptacles
 
@@ -266,7 +270,5 @@ class _Reader:
             where = f"objects.{key}"
             if key not in category_of:
                 raise self._error(where, "is in no category; list it in one of [categories] or remove it")
-            objects[key] = ObjectModel(
-                key, entry.label, category_of[key], self._file(entry, where, models_root())
-            )
+            objects[key] = ObjectModel(key, entry.label, category_of[key], self._file(entry, where))
         return objects

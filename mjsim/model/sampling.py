@@ -131,7 +131,7 @@ def sample_points(
     raise SamplingError(
         f"only {best} of {count} points fit at least {min_distance} m from each other and from "
         f"{len(keep_away)} receptacles, after {PACKINGS * DRAWS - best} rejections; "
-        "ask for fewer points or use a larger house"
+        "ask for fewer points (--points) or use a larger house"
     )
 
 
