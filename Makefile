@@ -12,7 +12,7 @@ help: ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 14
 
 demo: $(READY) ## Set up, then film an assisted clean-up into runs/demo
-	$(BIN)/mjsim run --objects 6 --assistance optimal --seed 0 --out runs/demo
+	$(BIN)/mjsim run --objects 6 --assistance guided --seed 0 --out runs/demo
 
 test: $(READY) ## Set up, then run the whole test suite; COVERAGE=1 measures what it covers
 	$(BIN)/python -m pytest -n $(WORKERS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered)

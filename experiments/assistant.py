@@ -15,6 +15,7 @@ from experiments.regrets import Regrets
 from experiments.shown_path import TOLERANCE, ShownPath
 from experiments.visit_fields import PlaceDistances, alternatives, as_json
 from hud.conditions import condition
+from hud.markers import BREADCRUMB, GOAL
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.actions import EventKind, WorldEvent
@@ -23,7 +24,7 @@ from mjsim.options import WorldOptions
 from planner.plan import Status, Visit, VisitKind
 from planner.route import XY, Route, TaskState
 
-GOAL = "goal"  # role of the markers of conditions that show the plan
+PLAN_ROLES = frozenset({BREADCRUMB, GOAL})
 
 VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLACE}
 
@@ -68,6 +69,7 @@ class Assistant:
 
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
+        shows_plan: Whether the condition shows the plan or where it leads next.
     """
 
     def __init__(
@@ -94,9 +96,11 @@ class Assistant:
         }
         self._deliveries = {name: _xy(approach) for name, approach in self._approaches.items()}
         self._route: Route | None = None
-        self._path = ShownPath(self._house.geodesics)
+        self._segment = ShownPath(self._house.geodesics, rerouted=False)
+        self._path = ShownPath(self._house.geodesics, rerouted=True)
         self._visits = 0
         self.shown_roles: frozenset[str] = frozenset()
+        self.shows_plan = self._rerouted = False
 
     def begin(self, observation: Observation) -> None:
         """Plan for the start of the task."""
@@ -105,7 +109,11 @@ class Assistant:
         self._places_visited = PlaceDistances(self._house.geodesics, self._state.position)
         self._plan(observation)
         self.show_message("started", observation.time)
-        self.shown_roles = frozenset(marker.role for marker in self.hud_state(observation).markers)
+        state = self.hud_state(observation)
+        self.shown_roles = frozenset(marker.role for marker in state.markers)
+        self._rerouted = state.rerouted
+        numbered = any(item.number is not None for item in state.checklist)
+        self.shows_plan = numbered or not self.shown_roles.isdisjoint(PLAN_ROLES)
 
     def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
         """Take note of the last control step, and of what happened in it; replan where the person left the plan."""
@@ -120,7 +128,9 @@ class Assistant:
             self._improve(observation)
         visit = self._next
         if visit is not None:
-            self._path.follow(observation.position, *self._places(observation, visit))
+            places = self._places(observation, visit)
+            self._segment.follow(observation.position, *places)
+            self._path.follow(observation.position, *places)
 
     @property
     def expecting(self) -> bool:
@@ -147,6 +157,7 @@ class Assistant:
         view = self._board.view(
             observation,
             visits=self._route.visits if self._route else (),
+            segment=None if self._next is None else self._segment.points,
             path=None if self._next is None else self._path.ahead(observation.position),
             camera=camera,
             regrets=self._regrets.known,
@@ -154,11 +165,12 @@ class Assistant:
         return self._show(view)
 
     def guidance(self, observation: Observation) -> Guidance | None:
-        """The next step and the path to it; None when all is done."""
+        """The next step and the path that the breadcrumbs mark; None where there are none, or when all is done."""
         visit = self._next
-        if visit is None:
+        if visit is None or BREADCRUMB not in self.shown_roles:
             return None
-        return Guidance(visit, self._path.points, self._goal(observation, visit), TOLERANCE)
+        shown = self._path if self._rerouted else self._segment
+        return Guidance(visit, shown.points, self._goal(observation, visit), TOLERANCE)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
         """What can be done next and what it costs compared with the best, the best first; empty until it is known."""
@@ -233,7 +245,7 @@ class Assistant:
         """Follow the plan on, or make a new one where the task is no longer as planned."""
         replans, first = self._planner.replans, self._route is None
         self._state = state = self.task_state(observation)
-        self._route = self._planner.update(state, shown=GOAL in self.shown_roles)
+        self._route = self._planner.update(state, shown=self.shows_plan)
         self._regrets.begin(state, self._route.plan)
         self._begin_path(observation)
         replanned = self._planner.replans > replans
@@ -242,7 +254,7 @@ class Assistant:
             self._log_plan(observation, self._route, reach_bound_m=round(bound, 6))
         elif replanned:
             self._log_plan(observation, self._route)
-        if replanned and not first and GOAL in self.shown_roles:
+        if replanned and not first and self.shows_plan:
             self._board.announce_replan(observation.time)
 
     def _improve(self, observation: Observation) -> None:
@@ -257,10 +269,12 @@ class Assistant:
             self._begin_path(observation)
 
     def _begin_path(self, observation: Observation) -> None:
-        """Show the path from here to the next visit."""
+        """Show the way to the next visit: the segment from the last one, and the path from here."""
         visit = self._next
         if visit is not None:
-            self._path.begin(observation.position, *self._places(observation, visit))
+            places = self._places(observation, visit)
+            self._segment.begin(self._last_visit_at, *places)
+            self._path.begin(observation.position, *places)
 
     def _log_plan(self, observation: Observation, route: Route, **more: bool | float) -> None:
         # Cost and bound are those of the state that the plan was made for; a better plan comes a little later.

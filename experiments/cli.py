@@ -19,7 +19,7 @@ and puts each into its bin. A heads-up display, driven by an optimal planner, as
 
 EPILOG = """\
 examples:
-  mjsim run --objects 6 --assistance optimal --seed 0 --out runs/demo
+  mjsim run --objects 6 --assistance guided --seed 0 --out runs/demo
       film one assisted trial, with metrics, event log and floor plan
   mjsim batch --objects 6,12 --assistance none,highlight,optimal --seeds 0:10 --out runs/batch
       run a factorial design on all cores; the same command continues after an interruption

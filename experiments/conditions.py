@@ -82,6 +82,7 @@ class TaskBoard:
         observation: Observation,
         *,
         visits: Sequence[Visit] = (),
+        segment: NDArray[np.float64] | None = None,
         path: NDArray[np.float64] | None = None,
         camera: CameraView | None = None,
         regrets: Callable[[], Mapping[Visit, Regret]] = dict,
@@ -91,7 +92,8 @@ class TaskBoard:
         Args:
             observation: State of the world.
             visits: Remaining visits in planned order.
-            path: Floor points of the path to the next visit, m, shape (k, 2).
+            segment: Floor points of the plan's segment to the next visit, m, shape (k, 2).
+            path: Floor points of the path from the person to the next visit, m, shape (k, 2).
             camera: The eye camera.
             regrets: Gives the regrets of visits that are possible next.
         """
@@ -102,6 +104,7 @@ class TaskBoard:
             hands=observation.hands,
             steps_done=tuple(self._done),
             plan=tuple(task_step(visit) for visit in visits),
+            segment=segment,
             path=path,
             goal=self._goal(observation, visits[0]) if visits else None,
             position=(float(observation.position[0]), float(observation.position[1])),

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from experiments.assistant import GOAL, Assistant
+from experiments.assistant import Assistant
 from experiments.participants.base import Choice, Guidance, Percept, Point, positions_of
 from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
@@ -59,7 +59,7 @@ class SessionPercept(Percept):
     @cached_property
     def guidance(self) -> Guidance | None:
         """Where the condition shows the plan."""
-        return self._assistant.guidance(self._seen) if GOAL in self._assistant.shown_roles else None
+        return self._assistant.guidance(self._seen)
 
     @cached_property
     def flagpoles(self) -> Mapping[str, Point]:

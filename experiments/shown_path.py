@@ -1,4 +1,4 @@
-"""The path to the next visit, as the HUD shows it."""
+"""The ways to the next visit that a HUD may show: the plan's segment, and the path from where the person is."""
 
 import math
 
@@ -15,16 +15,19 @@ Point = NDArray[np.float64]
 
 
 class ShownPath:
-    """A shortest path that keeps its place on the floor until the person leaves it or its goal moves.
+    """A shortest path that keeps its place on the floor until its goal moves, or the person leaves it.
 
     It is computed when it is first asked for, which under most conditions it never is.
 
     Args:
         geodesics: Finds it.
+        rerouted: Whether there is a new one from where the person is when the person leaves it. The segment of a plan
+            stays, whoever strays (PAPER section 5).
     """
 
-    def __init__(self, geodesics: Geodesics) -> None:
+    def __init__(self, geodesics: Geodesics, *, rerouted: bool) -> None:
         self._geodesics = geodesics
+        self._rerouted = rerouted
         self._start = self._target = self._goal = np.zeros(2)
         self._points: NDArray[np.float64] | None = None
 
@@ -32,8 +35,8 @@ class ShownPath:
         """Show a new path.
 
         Args:
-            start: Where the person is, m, shape (2,).
-            target: Where the path leads, m, shape (2,).
+            start: Where it starts, m, shape (2,).
+            target: Where it leads, m, shape (2,).
             goal: The object, or the receptacle, m, shape (2,).
         """
         self._start, self._target, self._goal, self._points = start.copy(), target.copy(), goal.copy(), None
@@ -57,14 +60,15 @@ class ShownPath:
         """Show a new path if the person has left this one or its goal has moved; all m, shape (2,), as in `begin`."""
         if self._points is None:
             return
-        gap = project(self._points, position[0], position[1])[1]
-        if gap > TOLERANCE or math.dist(goal, self._goal) > MAX_GOAL_SHIFT:
+        if math.dist(goal, self._goal) > MAX_GOAL_SHIFT:
+            self._renew(position if self._rerouted else self._start, target, goal)
+        elif self._rerouted and project(self._points, position[0], position[1])[1] > TOLERANCE:
             self._renew(position, target, goal)
 
     def follow_walk(self, positions: NDArray[np.float64], target: Point, goal: Point) -> None:
         """As `follow` with each of `positions`, m, shape (n, 2), while the goal stays where it is."""
         first = 0
-        while self._points is not None:
+        while self._rerouted and self._points is not None:
             off = first_off_path(self._points, positions, first, TOLERANCE)
             if off < 0:
                 return

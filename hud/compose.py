@@ -126,6 +126,7 @@ def _without_what_moves(state: HudState) -> HudState:
     return dataclasses.replace(
         state,
         markers=(),
+        rerouted=False,
         clock=None if state.clock is None else 0.0,
         delivered=0,
         message=message,

@@ -10,6 +10,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from hud import theme
 from hud.canvas import Rect
 from hud.errors import FrameError
@@ -78,7 +80,7 @@ def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Lay
         typeface: Of the frame's scale.
     """
     grid = _Grid(width, height, typeface)
-    checklist, first, rows = grid.checklist(state.checklist)
+    checklist, first, rows = grid.checklist(state.checklist, state.scroll)
     minimap = grid.minimap(state.minimap)
     bins, bin_rows = grid.bins(state.bins, minimap)
     message, lines = grid.message(state.message)
@@ -132,6 +134,24 @@ def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, 
     return first, stop
 
 
+def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
+    """Which rows of a list to show from a row on; from an earlier one where the rest leaves room.
+
+    Args:
+        heights: Height of each row, px; at least one.
+        first: Index of the row wanted at the top; the nearest one there is if it is outside of the list.
+        room: Height that there is, px.
+
+    Returns:
+        First row, and one past the last.
+    """
+    ends = np.cumsum(heights)
+    last_first = int(np.searchsorted(ends, ends[-1] - room)) + 1 if ends[-1] > room else 0
+    first = min(max(first, 0), last_first, len(heights) - 1)
+    start = int(ends[first]) - heights[first]
+    return first, max(first + 1, int(np.searchsorted(ends, start + room, side="right")))
+
+
 def _current_row(items: Sequence[ChecklistItem]) -> int:
     """Index of the row that must be visible: the current one, or the first, or the last when all are done."""
     last = len(items) - 1 if items[-1].number is not None else 0
@@ -160,7 +180,9 @@ class _Grid:
         """A small panel in an upper corner."""
         return Rect(x, self.margin, self.chip_width, self._chip_height)
 
-    def checklist(self, items: tuple[ChecklistItem, ...]) -> tuple[Rect | None, int, tuple[Row, ...]]:
+    def checklist(
+        self, items: tuple[ChecklistItem, ...], scroll: int
+    ) -> tuple[Rect | None, int, tuple[Row, ...]]:
         """Rectangle of the task list, its first row and the rows it shows; never more than fit."""
         if not items:
             return None, 0, ()
@@ -169,7 +191,10 @@ class _Grid:
         fixed = self._px(theme.HEADER) + self._px(theme.PADDING)
         if fixed + sum(heights) > self._column_height:
             fixed += self._px(theme.FOOTER)
-        first, stop = visible_rows(heights, _current_row(items), self._column_height - fixed)
+        room = self._column_height - fixed
+        first, stop = visible_rows(heights, _current_row(items), room)
+        if scroll:
+            first, stop = scrolled(heights, first + scroll, room)
         height = fixed + sum(heights[first:stop])
         return Rect(self.margin, self._top, self._list_width, height), first, rows[first:stop]
 
@@ -179,7 +204,7 @@ class _Grid:
         if item.target_picture is not None:
             taken += theme.TARGET + 3
         width = self._list_width - self._px(taken)
-        detail = self._typeface.paragraph(item.detail, theme.DETAIL, width, 1 if item.done else 3)
+        detail = self._typeface.paragraph(item.detail, theme.DETAIL, width, 2 if item.done else 4)
         return Row(self._px(theme.ROW + theme.LINE * max(0, len(detail) - 1)), width, detail)
 
     def minimap(self, minimap: MiniMap | None) -> Rect | None:
@@ -198,7 +223,7 @@ class _Grid:
             return None, ()
         px = self._px
         room = self._column_height if below is None else below.y - self._gap - self._top
-        width = self._bins_width - px(2 * theme.PADDING + theme.TILE + theme.GAP)
+        width = self._bins_width - px(2 * theme.PADDING + theme.BIN_TILE + theme.GAP)
         fixed = px(theme.HEADER) + px(theme.PADDING)
         rows: tuple[Row, ...] = ()
         for lines in (3, 2, 1, 0):
@@ -206,7 +231,7 @@ class _Grid:
                 self._typeface.paragraph(b.place, theme.DETAIL, width, lines) if lines else ()
                 for b in entries
             ]
-            heights = [px(max(theme.TILE, theme.LINE * (1 + len(p))) + theme.GAP) for p in places]
+            heights = [px(max(theme.BIN_TILE, theme.LINE * (1 + len(p))) + theme.GAP) for p in places]
             rows = tuple(Row(height, width, place) for height, place in zip(heights, places, strict=True))
             if fixed + sum(heights) <= room:
                 break
@@ -216,12 +241,13 @@ class _Grid:
         return Rect(self._bins_left, self._top, self._bins_width, height), rows
 
     def inventory(self) -> Rect:
-        """Two slots at the bottom, apart from each other and centred in the frame."""
+        """Two slots at the bottom, below the task list, apart from each other and centred as far as there is room."""
         px = self._px
-        width = min(2 * px(theme.SLOT_WIDTH) + px(theme.BETWEEN_HANDS), self._between)
+        span = self._bins_left - self._gap - self.margin
+        width = min(2 * px(theme.SLOT_WIDTH) + px(theme.BETWEEN_HANDS), span)
         height = px(theme.SLOT_HEIGHT)
         return Rect(
-            self._centred(width, self._left, self._between),
+            self._centred(width, self.margin, span),
             self._height - self.margin - height,
             width,
             height,

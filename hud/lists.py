@@ -1,9 +1,14 @@
-"""What the conditions have in common: the list of bins, the two hands, rows of objects in random order."""
+"""What conditions have in common: the list of bins, the hands, rows of objects in random order, flagpoles."""
 
+import math
 from collections.abc import Callable
 
+from hud.markers import flagpole
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Marker, Pointer
 from hud.task import TaskObject, TaskView
+
+
+NEAR = 1.6  # m; about where an object leaves the lower edge of the view
 
 
 def in_sentence(label: str) -> str:
@@ -58,6 +63,16 @@ def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tu
     )
 
 
+def misplaced_flagpoles(view: TaskView) -> tuple[Marker, ...]:
+    """A flagpole over every misplaced object, known through walls (PAPER section 5)."""
+    markers: list[Marker] = []
+    for item in view.objects:
+        if item.status == "loose":
+            low = math.dist(item.position[:2], view.position) < NEAR
+            markers += flagpole(item.position, object=item.name, low=low, x_ray=True)
+    return tuple(markers)
+
+
 def assemble(
     view: TaskView,
     title: str,
@@ -77,4 +92,5 @@ def assemble(
         total=len(view.objects),
         clock=view.clock,
         pointer=pointer,
+        scroll=view.scroll,
     )

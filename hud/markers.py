@@ -10,11 +10,15 @@ from hud.state import HudState, Marker, Rgba, Shape, Vec2, Vec3
 CHEST_HEIGHT = 1.2  # m, of the breadcrumb line at the person's end
 BREADCRUMB_RADIUS = 0.04  # m; 7 px across at 5 m in a 480 px frame
 BREADCRUMB_SPACING = 0.28  # m along the floor path
-BREADCRUMB_CLEARANCE = 0.5  # m of path in front of the person left empty, so that nothing fills the view
 
-RIM = 1.3  # radius of the white rim, in radii of the breadcrumb
+RIM_RADIUS = 1.3  # of the white rim, in radii of the breadcrumb
 
-FLAGPOLE = "flagpole"  # role of the parts of a flagpole
+# Roles of markers.
+BREADCRUMB = "breadcrumb"
+RIM = "rim"
+FLAGPOLE = "flagpole"
+GOAL = "goal"
+BIN = "bin"
 POLE_BANDS = 4
 
 RED: Rgba = (0.90, 0.10, 0.06, 1.0)
@@ -24,28 +28,31 @@ WHITE: Rgba = (0.95, 0.95, 0.95, 1.0)
 SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
 
 
-def breadcrumbs(path: NDArray[np.float64]) -> tuple[Marker, ...]:
-    """Spheres along a floor path, from chest height at its start down to the floor at its end.
+def breadcrumbs(path: NDArray[np.float64], clearance: float = 0.0) -> tuple[Marker, ...]:
+    """Spheres along a floor path, from chest height at its start down to the floor at its end (PAPER section 5).
 
-    Counted back from the goal, so that they keep their places on the floor while the person walks.
+    They are counted back from the end, where the last one lies on the floor.
 
     Args:
-        path: Floor polyline from the person to the goal, m, shape (k, 2).
+        path: Floor polyline to the goal, m, shape (k, 2).
+        clearance: How much of the path is left empty at its start, m.
 
     Returns:
-        Markers in order from the person to the goal; none when the goal is nearer than the clearance.
+        Markers in order to the goal: one at least.
     """
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     length = float(along[-1])
-    if length < BREADCRUMB_CLEARANCE:
-        return ()
-    count = int((length - BREADCRUMB_CLEARANCE) / BREADCRUMB_SPACING + 1e-9) + 1
+    count = max(0, int((length - clearance) / BREADCRUMB_SPACING + 1e-9)) + 1
     at = length - BREADCRUMB_SPACING * np.arange(count - 1, -1, -1)
-    heights = CHEST_HEIGHT + (BREADCRUMB_RADIUS - CHEST_HEIGHT) * at / length
+    heights = (
+        CHEST_HEIGHT + (BREADCRUMB_RADIUS - CHEST_HEIGHT) * at / length
+        if length > 0.0
+        else [BREADCRUMB_RADIUS]
+    )
     xs, ys = (np.interp(at, along, path[:, axis]) for axis in (0, 1))
     return tuple(
-        Marker("sphere", (float(x), float(y), float(z)), (BREADCRUMB_RADIUS, 0.0, 0.0), RED, "breadcrumb")
+        Marker("sphere", (float(x), float(y), float(z)), (BREADCRUMB_RADIUS, 0.0, 0.0), RED, BREADCRUMB)
         for x, y, z in zip(xs, ys, heights, strict=True)
     )
 
@@ -53,7 +60,7 @@ def breadcrumbs(path: NDArray[np.float64]) -> tuple[Marker, ...]:
 def rims(crumbs: tuple[Marker, ...]) -> tuple[Marker, ...]:
     """A thin white disc around each breadcrumb: who sees no red would lose bare spheres on a brown floor."""
     return tuple(
-        Marker("cylinder", crumb.position, (RIM * crumb.size[0], 0.003, 0.0), WHITE, "rim", crumb.x_ray)
+        Marker("cylinder", crumb.position, (RIM_RADIUS * crumb.size[0], 0.003, 0.0), WHITE, RIM, crumb.x_ray)
         for crumb in crumbs
     )
 
@@ -106,11 +113,11 @@ def flagpoles(state: HudState) -> dict[str, Vec2]:
     }
 
 
-def goal_pin(position: Vec3, *, x_ray: bool = False) -> tuple[Marker, ...]:
-    """A pin that stands over the goal of the next visit, and a ring-like disc around its foot."""
+def pin(position: Vec3, role: str = GOAL) -> tuple[Marker, ...]:
+    """A pin that stands over the goal of the next step or over a bin, m, and a disc around its foot."""
     x, y, z = position
     return (
-        Marker("cylinder", (x, y, z + 0.005), (0.16, 0.004, 0.0), (*SKY[:3], 0.45), "goal", x_ray),
-        Marker("cylinder", (x, y, z + 0.36), (0.010, 0.12, 0.0), SKY, "goal", x_ray),
-        Marker("sphere", (x, y, z + 0.52), (0.05, 0.0, 0.0), SKY, "goal", x_ray),
+        Marker("cylinder", (x, y, z + 0.005), (0.16, 0.004, 0.0), (*SKY[:3], 0.45), role),
+        Marker("cylinder", (x, y, z + 0.36), (0.010, 0.12, 0.0), SKY, role),
+        Marker("sphere", (x, y, z + 0.52), (0.05, 0.0, 0.0), SKY, role),
     )

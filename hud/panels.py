@@ -21,19 +21,19 @@ def draw_bins(
     x = px(theme.PADDING + 2)
     canvas.text(x, px(17), f"Bins (+{hidden})" if hidden else "Bins", theme.TITLE, theme.TEXT)
     top = px(theme.HEADER)
-    text_x = x + px(theme.TILE + theme.GAP)
+    text_x = x + px(theme.BIN_TILE + theme.GAP)
     for entry, row in zip(bins, rows, strict=False):
-        canvas.tile(entry.picture, x, top + px(1), px(theme.TILE))
+        canvas.tile(entry.picture, x, top + px(1), px(theme.BIN_TILE))
         width = rect.width - text_x - px(theme.PADDING)
-        lift = 0 if row.detail else px(5)
+        lift = 0 if row.detail else px(8)
         face = theme.LABEL
         if canvas.typeface.width(entry.label, face) > width:
             face = theme.Face(face.size - 1, face.weight)
         canvas.text(
-            text_x, top + px(11) + lift, canvas.typeface.fit(entry.label, face, width), face, theme.TEXT
+            text_x, top + px(12) + lift, canvas.typeface.fit(entry.label, face, width), face, theme.TEXT
         )
         for i, line in enumerate(row.detail):
-            canvas.text(text_x, top + px(11 + theme.LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
+            canvas.text(text_x, top + px(12 + theme.LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
         top += row.height
     return canvas.patch()
 

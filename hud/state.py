@@ -20,7 +20,7 @@ class Marker:
         position: Centre in the house frame, m.
         size: Sizes in m; meaning by shape.
         rgba: Colour, components in 0..1.
-        role: What it is for: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal`.
+        role: What it is for: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal`, `bin`.
         x_ray: Whether it also shows, dimmed, through walls.
         object: Instance name of the object that it stands over, or None.
     """
@@ -140,11 +140,13 @@ class HudState:
         inventory: Left and right hand.
         message: Message bar, or None.
         markers: World-locked objects.
+        rerouted: Whether the breadcrumbs start at the person and lead anew when the person leaves them.
         delivered: How many objects are in their receptacle.
         total: How many there are.
         clock: Elapsed task time to show, s, or None.
         pointer: Arrow towards a goal out of view, or None.
         minimap: The house from above, or None.
+        scroll: By how many rows the task list is scrolled from where it follows the task, positive towards its end.
     """
 
     checklist_title: str
@@ -153,8 +155,10 @@ class HudState:
     inventory: tuple[InventorySlot, InventorySlot]
     message: Message | None = None
     markers: tuple[Marker, ...] = ()
+    rerouted: bool = False
     delivered: int = 0
     total: int = 0
     clock: float | None = None
     pointer: Pointer | None = None
     minimap: MiniMap | None = None
+    scroll: int = 0

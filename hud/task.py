@@ -87,7 +87,9 @@ class TaskView:
         hands: Object name in the left and in the right hand, or None.
         steps_done: Successful picks and places so far, in order.
         plan: Remaining steps in planned order, the next one first; empty without a planner.
-        path: Floor polyline from the person to the goal of the next step, m, shape (k, 2), or None.
+        segment: Shortest floor path from where the last step was done, or the start, to the next one, m, shape (k, 2);
+            None when nothing is left to do.
+        path: As `segment`, but from where the person is, and anew when the person leaves it.
         goal: Where the next step happens (the object, or its receptacle), m, or None.
         position: Floor position of the person, m.
         eye: Position of the eye, m.
@@ -96,12 +98,13 @@ class TaskView:
         camera: The eye camera, which a pointer to a goal out of view needs; None for no pointer.
         heading: Where the person looks, rad, 0 along +x, counter-clockwise.
         bounds: xmin, ymin, xmax, ymax of the house, m, or None where there is no map of it.
+        scroll: By how many rows the task list is scrolled from where it follows the task, positive towards its end.
         alternatives: Gives all steps that are possible next; called only by conditions that show them. Empty until
             their regrets are known.
 
     Raises:
-        TaskViewError: A name is unknown or repeated, `order` is not a permutation of the objects, or `path`
-            has the wrong shape or is not finite.
+        TaskViewError: A name is unknown or repeated, `order` is not a permutation of the objects, or
+            `segment` or `path` has the wrong shape or is not finite.
     """
 
     objects: tuple[TaskObject, ...]
@@ -110,6 +113,7 @@ class TaskView:
     hands: tuple[str | None, str | None] = (None, None)
     steps_done: tuple[TaskStep, ...] = ()
     plan: tuple[TaskStep, ...] = ()
+    segment: NDArray[np.float64] | None = None
     path: NDArray[np.float64] | None = None
     goal: Vec3 | None = None
     position: tuple[float, float] = (0.0, 0.0)
@@ -119,6 +123,7 @@ class TaskView:
     camera: CameraView | None = None
     heading: float = 0.0
     bounds: tuple[float, float, float, float] | None = None
+    scroll: int = 0
     alternatives: Callable[[], tuple[Alternative, ...]] = tuple
 
     def __post_init__(self) -> None:
@@ -140,8 +145,8 @@ class TaskView:
         for hand in self.hands:
             if hand is not None and hand not in names:
                 raise TaskViewError(f"hands hold {hand!r}, which is none of {names}")
-        if self.path is not None:
-            _check_path(self.path)
+        _check_path("segment", self.segment)
+        _check_path("path", self.path)
 
     def object(self, name: str) -> TaskObject:
         """The object called `name`.
@@ -166,7 +171,9 @@ def _named(what: str, values: Mapping[str, _Value], name: str) -> _Value:
     return values[name]
 
 
-def _check_path(path: NDArray[np.float64]) -> None:
+def _check_path(what: str, path: NDArray[np.float64] | None) -> None:
+    if path is None:
+        return
     shaped = path.ndim == 2 and path.shape[1] == 2 and len(path) >= 1
     if not shaped or not np.isfinite(path).all():
-        raise TaskViewError(f"path must be finite with shape (k, 2), k >= 1, got shape {path.shape}")
+        raise TaskViewError(f"{what} must be finite with shape (k, 2), k >= 1, got shape {path.shape}")

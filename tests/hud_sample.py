@@ -83,6 +83,7 @@ def task(
         ahead = next(o for o in items if o.name == left[0].object)
         bins = {r.key: r for r in receptacles()}
         goal = ahead.position if left[0].kind == "pick" else bins[ahead.receptacle].position
+    way = None if goal is None else np.array([[0.0, 0.0], [0.3, 1.4], [goal[0], goal[1]]])
     return TaskView(
         objects=items,
         receptacles=receptacles(),
@@ -90,7 +91,8 @@ def task(
         hands=(carried[0] if carried else None, carried[1] if len(carried) > 1 else None),
         steps_done=tuple(done),
         plan=left,
-        path=None if goal is None else np.array([[0.0, 0.0], [0.3, 1.4], [goal[0], goal[1]]]),
+        segment=way,
+        path=way,
         goal=goal,
         eye=EYE,
         message=message,

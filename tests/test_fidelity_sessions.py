@@ -147,7 +147,7 @@ def test_an_interrupted_run_without_physics_replays(house, tmp_path):
 class SimpleFollower:
     """All that an author of a participant has to write."""
 
-    needs = frozenset({"goal"})
+    needs = frozenset({"breadcrumb"})
 
     def __init__(self, house):
         self._executor = VisitExecutor(house)

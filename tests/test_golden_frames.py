@@ -82,6 +82,7 @@ def studio():
     view = TaskBoard(house, scene.episode, names[::-1]).view(
         dataclasses.replace(seen, heading=heading),
         visits=[Visit(k, n) for n in ("object_09", *names[:3]) for k in (VisitKind.PICK, VisitKind.PLACE)],
+        segment=path,
         path=path,
         camera=CameraView(pose.position, pose.rotation, pose.fovy, 640, 480),
     )
@@ -103,7 +104,7 @@ def test_each_room(studio: Studio, golden_frame: Compare, room: str) -> None:
     golden_frame(studio.small.rgb(studio.data, pose), f"room_{room}")
 
 
-@pytest.mark.parametrize("name", ["none", "highlight", "optimal"])
+@pytest.mark.parametrize("name", ["none", "highlight", "optimal", "guided"])
 def test_each_condition(studio: Studio, golden_frame: Compare, name: str) -> None:
     golden_frame(studio.glasses(condition(name)(studio.view)), f"condition_{name}")
 
@@ -185,11 +186,14 @@ def relabelled(state: HudState) -> HudState:
     )
 
 
+NEAREST = 3  # the first breadcrumb that the camera sees
+
+
 MUTATIONS: dict[str, Callable[[HudState], HudState]] = {
-    "the nearest breadcrumb moves by 5 cm": lambda s: moved(s, 0, 0.05),
-    "the fourth breadcrumb moves by 5 cm": lambda s: moved(s, 3, 0.05),
+    "the nearest breadcrumb in view moves by 5 cm": lambda s: moved(s, NEAREST, 0.05),
+    "the sixth breadcrumb moves by 5 cm": lambda s: moved(s, 5, 0.05),
     "a letter of a label changes": relabelled,
-    "a breadcrumb is missing": lambda s: dataclasses.replace(s, markers=s.markers[1:]),
+    "a breadcrumb is missing": lambda s: dataclasses.replace(s, markers=s.markers[:4] + s.markers[5:]),
     "the clock is a second late": lambda s: dataclasses.replace(s, clock=84.0),
 }
 
@@ -209,7 +213,7 @@ def test_a_mutation_fails(studio: Studio, tmp_path: Path, what: str, key: str | 
 
 
 def test_a_breadcrumb_moved_by_a_millimetre_fails_on_the_known_driver(studio: Studio, tmp_path: Path) -> None:
-    frame = studio.glasses(moved(condition("optimal")(studio.view), 0, 0.001))
+    frame = studio.glasses(moved(condition("optimal")(studio.view), NEAREST, 0.001))
     with pytest.raises(FrameMismatchError, match="every pixel"):
         golden = GOLDEN / "condition_optimal.png"
         shutil.copy(golden, tmp_path)

@@ -9,8 +9,10 @@ import pytest
 from hud.conditions import condition, condition_names
 from hud.errors import ConditionError, HudError, MessageError, TaskViewError
 from hud.lists import in_sentence
-from hud.markers import flagpoles
+from hud.markers import breadcrumbs, flagpoles
 from hud.messages import FADE, SHOWN, TEXTS, fade, message
+from hud.options import option_names
+from hud.options.reroute import CLEARANCE
 from hud.state import ChecklistItem, HudState, MessageKind
 from hud.task import Alternative, TaskStep, TaskView
 
@@ -27,7 +29,7 @@ def with_status(view: TaskView, **status: str) -> TaskView:
 
 
 def test_every_file_of_the_package_is_a_condition() -> None:
-    assert condition_names() == ("highlight", "none", "optimal")
+    assert condition_names() == ("guided", "highlight", "none", "optimal")
     for name in condition_names():
         assert isinstance(shown(name, sample.task(6)), HudState)
 
@@ -50,7 +52,7 @@ def test_a_condition_from_outside_is_found_by_module_and_attribute() -> None:
     assert condition("hud.conditions.optimal:hud_state") is condition("optimal")
 
 
-@pytest.mark.parametrize("name", ["none", "highlight", "optimal"])
+@pytest.mark.parametrize("name", ["none", "highlight", "optimal", "guided"])
 @pytest.mark.parametrize("count", COUNTS)
 def test_all_conditions_list_every_bin_with_picture_and_place(name: str, count: int) -> None:
     view = sample.task(count, steps=3)
@@ -61,7 +63,7 @@ def test_all_conditions_list_every_bin_with_picture_and_place(name: str, count: 
         assert entry.place == receptacle.room
 
 
-@pytest.mark.parametrize("name", ["none", "highlight", "optimal"])
+@pytest.mark.parametrize("name", ["none", "highlight", "optimal", "guided"])
 def test_hands_progress_clock_and_message_pass_through(name: str) -> None:
     text = message("hands_full")
     view = sample.task(12, steps=6, message=text, clock=12.5)
@@ -127,6 +129,7 @@ def test_highlight_flags_exactly_the_misplaced_objects() -> None:
     loose = [o for o in view.objects if o.status == "loose"]
     assert len(loose) == 12 - 4
     assert {m.position[:2] for m in poles} == {o.position[:2] for o in loose}
+    assert all(m.x_ray for m in flags), "they are known through walls"
     for pole in poles:
         assert pole.position[2] - pole.size[1] > 0.1, "the pole stands clear above the object"
 
@@ -163,14 +166,55 @@ def test_optimal_with_everything_done_has_nothing_current_and_nothing_in_the_wor
     assert state.markers == () and state.delivered == state.total == 6
 
 
-def test_optimal_points_to_the_goal_only_when_it_is_out_of_view() -> None:
+def test_optimal_shows_breadcrumbs_along_the_segment_and_the_flagpoles_of_highlight_and_nothing_else() -> (
+    None
+):
+    view = dataclasses.replace(sample.task(12, steps=5), path=np.array([[5.0, 5.0], [6.0, 6.0]]))
+    state = shown("optimal", view)
+    crumbs = tuple(m for m in state.markers if m.role == "breadcrumb")
+    assert view.segment is not None and crumbs == breadcrumbs(view.segment)
+    assert state.markers == (*crumbs, *shown("highlight", view).markers)
+    assert (state.pointer, state.minimap, state.rerouted) == (None, None, False)
+
+
+def test_guided_is_optimal_with_its_options() -> None:
+    view = dataclasses.replace(
+        sample.task(12, steps=5),
+        path=np.array([[5.0, 5.0], [9.0, 9.0]]),
+        camera=sample.camera(640, 480, yaw=3.0),
+    )
+    state = shown("guided", view)
+    assert state == shown("optimal-reroute-rims-pin-pointer", view)
+    assert state == shown("guided-pin-pointer-rims", view), "an option that is there already adds nothing"
+    assert {m.role for m in state.markers} == {"breadcrumb", "rim", "goal", "flagpole"}
+    assert state.pointer is not None and state.rerouted
+    assert view.path is not None
+    assert tuple(m for m in state.markers if m.role == "breadcrumb") == breadcrumbs(view.path, CLEARANCE)
+    assert {"reroute", "rims", "pin", "pointer", "bins", "minimap", "regret", "xray"} == set(option_names())
+
+
+def test_reroute_adds_nothing_where_there_are_no_breadcrumbs() -> None:
+    view = dataclasses.replace(sample.task(12, steps=5), path=np.array([[5.0, 5.0], [9.0, 9.0]]))
+    for base in ("none", "highlight"):
+        assert shown(f"{base}-reroute-rims", view) == shown(base, view)
+
+
+def test_bins_pins_the_bins_of_what_is_in_the_hands() -> None:
+    for steps in range(5):
+        view = sample.task(12, steps=steps)
+        carried = {view.object(name).receptacle for name in view.hands if name is not None}
+        pins = {m.position[:2] for m in shown("none-bins", view).markers}
+        assert pins == {view.receptacle(key).position[:2] for key in carried}
+
+
+def test_the_pointer_is_shown_only_while_the_goal_is_out_of_view() -> None:
     view = sample.task(6, steps=0)
     away = dataclasses.replace(view, camera=sample.camera(640, 480, yaw=3.0))
     facing = dataclasses.replace(view, camera=sample.camera(640, 480, yaw=0.6))
     assert view.goal is not None and view.goal[0] < 0, "the goal is ahead on the left"
-    assert shown("optimal", view).pointer is None
-    assert shown("optimal", facing).pointer is None
-    assert shown("optimal", away).pointer is not None
+    assert shown("optimal-pointer", view).pointer is None
+    assert shown("optimal-pointer", facing).pointer is None
+    assert shown("optimal-pointer", away).pointer is not None
 
 
 @pytest.mark.parametrize(
@@ -181,7 +225,8 @@ def test_optimal_points_to_the_goal_only_when_it_is_out_of_view() -> None:
         ({"plan": (TaskStep("pick", "ghost"),)}, "ghost"),
         ({"steps_done": (("throw", "object_00"),)}, "throw"),
         ({"receptacles": ()}, "dish_bin"),
-        ({"path": np.zeros((2, 3))}, r"\(2, 3\)"),
+        ({"path": np.zeros((2, 3))}, r"path.*\(2, 3\)"),
+        ({"segment": np.zeros((2, 3))}, r"segment.*\(2, 3\)"),
     ],
 )
 def test_an_inconsistent_view_is_refused_by_name(change: dict[str, object], named: str) -> None:
@@ -264,7 +309,8 @@ def test_x_ray_changes_nothing_but_that_markers_show_through_walls(base: str) ->
 def test_highlight_shows_its_flagpoles_through_walls_and_optimal_hides_its_path_behind_them() -> None:
     view = sample.task(12, steps=5)
     assert all(m.x_ray for m in shown("highlight", view).markers)
-    assert shown("optimal", view).markers and not any(m.x_ray for m in shown("optimal", view).markers)
+    crumbs = [m for m in shown("optimal", view).markers if m.role == "breadcrumb"]
+    assert crumbs and not any(m.x_ray for m in crumbs)
 
 
 @pytest.mark.parametrize("base", ["none", "highlight", "optimal"])
@@ -275,7 +321,7 @@ def test_flagpoles_are_found_by_object_where_they_are_drawn(base: str) -> None:
     )  # one has a low pole without a flag
     for seen in (view, near):
         loose = {o.name: o.position[:2] for o in seen.objects if o.status == "loose"}
-        assert flagpoles(shown(base, seen)) == (loose if base == "highlight" else {})
+        assert flagpoles(shown(base, seen)) == ({} if base == "none" else loose)
 
 
 @pytest.mark.parametrize("base", ["none", "highlight", "optimal"])
@@ -289,11 +335,12 @@ def test_the_map_tells_no_more_than_the_condition(base: str) -> None:
     assert found is not None
     assert (found.bounds, found.position, found.heading) == (view.bounds, view.position, view.heading)
     loose = {o.position[:2] for o in view.objects if o.status == "loose"}
-    assert set(found.objects) == (loose if base == "highlight" else set())
+    assert set(found.objects) == (set() if base == "none" else loose)
     assert len(found.objects) == len(set(found.objects))
     crumbs = [m.position[:2] for m in state.markers if m.role == "breadcrumb"]
     assert list(found.path) == crumbs and (len(crumbs) > 0) is (base == "optimal")
-    assert found.goal == (view.goal[:2] if base == "optimal" and view.goal else None)
+    assert found.goal is None
+    assert shown(f"{base}-pin-minimap", view).minimap.goal == view.goal[:2]
 
 
 def knowing(view: TaskView, *alternatives: Alternative) -> TaskView:
@@ -361,9 +408,9 @@ def test_options_combine_and_follow_outside_conditions() -> None:
 
 
 def test_an_unknown_option_is_refused_with_the_choices() -> None:
-    with pytest.raises(ConditionError, match=r"'sparkle'.*minimap, regret, xray"):
+    with pytest.raises(ConditionError, match=r"'sparkle'.*minimap, pin, .*regret, .*xray"):
         condition("none-sparkle")
-    with pytest.raises(ConditionError, match=r"'magic'.*-minimap or -regret or -xray"):
+    with pytest.raises(ConditionError, match=r"'magic'.*-minimap or -pin.* or -xray"):
         condition("magic-minimap")
 
 

@@ -70,9 +70,10 @@ def test_pictures_are_as_they_were(name: str, tmp_path: Path) -> None:
 
 
 def moved_breadcrumb(state: HudState) -> HudState:
-    first, *rest = state.markers
-    x, y, z = first.position
-    return dataclasses.replace(state, markers=(dataclasses.replace(first, position=(x + 0.05, y, z)), *rest))
+    markers = list(state.markers)
+    x, y, z = markers[3].position  # those before it are at the feet, out of view
+    markers[3] = dataclasses.replace(markers[3], position=(x + 0.05, y, z))
+    return dataclasses.replace(state, markers=tuple(markers))
 
 
 def with_row(state: HudState, index: int, **change: object) -> HudState:

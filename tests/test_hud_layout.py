@@ -15,7 +15,7 @@ from hud.canvas import Rect
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.errors import FrameError
-from hud.layout import Layout, unit_of, visible_rows
+from hud.layout import Layout, scrolled, unit_of, visible_rows
 from hud.messages import TEXTS, message
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, MiniMap, Pointer
 from hud.task import Alternative
@@ -75,6 +75,7 @@ def states(draw: st.DrawFn) -> HudState:
         clock=draw(st.one_of(st.none(), st.floats(0.0, 1e5))),
         pointer=draw(st.one_of(st.none(), st.builds(Pointer, st.floats(-math.pi, math.pi)))),
         minimap=draw(st.one_of(st.none(), minimaps)),
+        scroll=draw(st.sampled_from((0, 0, -1000, -3, 1, 7, 1000))),
     )
 
 
@@ -101,7 +102,7 @@ def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(
     covered = sum(r.width * r.height for r in panels.values())
     assert covered <= 0.55 * size[0] * size[1], "even with twelve bins and a long message"
     if "checklist" in panels:
-        assert panels["checklist"].width <= 0.3 * size[0]
+        assert panels["checklist"].width <= 0.32 * size[0]
     centre = Rect(size[0] // 2 - 1, size[1] // 2 - 1, 2, 2)
     assert not any(overlap(centre, rect) for name, rect in panels.items()), "what the person looks at is free"
 
@@ -133,7 +134,7 @@ def test_the_current_row_is_shown_and_texts_stay_in_their_rows(
 ) -> None:
     found = layout(state, size)
     typeface = Typeface(unit_of(*size))
-    current = [i for i, item in enumerate(state.checklist) if item.current]
+    current = [i for i, item in enumerate(state.checklist) if item.current and not state.scroll]
     assert all(found.first <= i < found.stop for i in current)
     assert len(found.rows) == found.stop - found.first
     assert ("checklist" not in found.panels) is (not state.checklist)
@@ -167,6 +168,29 @@ def test_a_window_holds_the_current_row_and_wastes_no_room(heights: list[int], d
     assert stop == len(heights) or used + heights[stop] > room
     if sum(heights) <= room:
         assert (first, stop) == (0, len(heights))
+
+
+@given(st.lists(st.integers(1, 40), min_size=1, max_size=60), st.integers(40, 400))
+def test_every_row_can_be_scrolled_to_and_no_room_is_wasted(heights: list[int], room: int) -> None:
+    shown = [scrolled(heights, first, room) for first in range(-5, len(heights) + 5)]
+    assert {i for first, stop in shown for i in range(first, stop)} == set(range(len(heights)))
+    for (first, stop), (later, _) in itertools.pairwise(shown):
+        assert 0 <= first <= later and stop <= len(heights)
+        assert sum(heights[first:stop]) <= room
+        assert stop == len(heights) or sum(heights[first : stop + 1]) > room
+    first, stop = shown[-1]
+    assert stop == len(heights) and (first == 0 or sum(heights[first - 1 :]) > room)
+
+
+def test_a_list_of_48_steps_can_be_read_whole_and_is_never_cut() -> None:
+    view = sample.task(24, steps=21)
+    read = set()
+    for scroll in range(-48, 49):
+        state = condition("optimal")(dataclasses.replace(view, scroll=scroll))
+        found = layout(state, (640, 480))
+        read |= set(range(found.first, found.stop))
+        assert not any("…" in line for row in found.rows for line in row.detail)
+    assert read == set(range(48))
 
 
 def test_a_plan_of_48_steps_is_windowed_around_the_current_step() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shapely import LineString, Point
 
 from hud.errors import FrameError
-from hud.markers import breadcrumbs, flagpole, goal_pin
+from hud.markers import breadcrumbs, flagpole, pin
 from hud.projection import CameraView, in_view, pointer_to, project
 
 coordinates = st.floats(-8.0, 8.0).map(lambda v: round(v, 3))
@@ -20,7 +20,7 @@ paths = st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=7).ma
 
 
 def test_a_straight_path_by_hand() -> None:
-    marks = breadcrumbs(np.array([[0.0, 0.0], [2.0, 0.0]]))
+    marks = breadcrumbs(np.array([[0.0, 0.0], [2.0, 0.0]]), 0.5)
     xs = [m.position[0] for m in marks]
     assert xs == pytest.approx([2.0 - 0.28 * k for k in range(5, -1, -1)])
     assert [m.position[1] for m in marks] == [0.0] * 6
@@ -28,13 +28,15 @@ def test_a_straight_path_by_hand() -> None:
     assert [m.position[2] for m in marks] == pytest.approx([1.2 - 1.16 * x / 2.0 for x in xs])
 
 
-@given(paths)
-def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(path: NDArray[np.float64]) -> None:
+@given(paths, st.sampled_from((0.0, 0.5)))
+def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(
+    path: NDArray[np.float64], clearance: float
+) -> None:
     line = LineString(path)
-    marks = breadcrumbs(path)
+    marks = breadcrumbs(path, clearance)
     assume(line.length > 0.01)
-    if line.length < 0.5:
-        assert marks == ()
+    if line.length < clearance:
+        assert len(marks) == 1 and marks[0].position == pytest.approx((*path[-1], marks[0].size[0]))
         return
     points = np.array([m.position for m in marks])
     assert all(
@@ -43,9 +45,7 @@ def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(path:
     assert max(line.distance(Point(p[:2])) for p in points) < 1e-6
     assert points[-1] == pytest.approx([*path[-1], marks[-1].size[0]], abs=1e-9)
     count = len(points)
-    assert 0.5 + 0.28 * (count - 1) <= line.length + 1e-6 < 0.5 + 0.28 * count + 2e-6, (
-        "as many as fit beyond 0.5 m"
-    )
+    assert 0.28 * (count - 1) <= line.length - clearance + 1e-6 < 0.28 * count + 2e-6, "as many as fit"
     expected = [line.length - 0.28 * k for k in range(count - 1, -1, -1)]
     along = [line.interpolate(s).coords[0] for s in expected]
     assert np.allclose(points[:, :2], along, atol=1e-6)
@@ -61,12 +61,13 @@ def test_breadcrumbs_keep_their_places_while_the_person_walks_along() -> None:
     assert np.allclose([m.position[:2] for m in kept], [m.position[:2] for m in after])
 
 
-def test_a_person_at_the_goal_sees_no_breadcrumbs() -> None:
-    assert breadcrumbs(np.array([[1.0, 1.0]])) == ()
-    assert breadcrumbs(np.array([[1.0, 1.0], [1.0, 1.0]])) == ()
+def test_a_person_at_the_goal_sees_one_breadcrumb_on_the_floor() -> None:
+    for path in ([[1.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]]):
+        (mark,) = breadcrumbs(np.array(path))
+        assert mark.position == (1.0, 1.0, mark.size[0])
 
 
-@pytest.mark.parametrize("make", [flagpole, goal_pin])
+@pytest.mark.parametrize("make", [flagpole, pin])
 def test_flags_and_pins_stand_over_their_place(make: object) -> None:
     marks = make((1.0, -2.0, 0.3))  # type: ignore[operator]
     assert len({m.role for m in marks}) == 1

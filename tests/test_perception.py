@@ -98,7 +98,7 @@ def told(percept):
     return [value() if callable(value) else value for value in (getattr(percept, n) for n in public)]
 
 
-@pytest.mark.parametrize("assistance", ["none", "optimal"])
+@pytest.mark.parametrize("assistance", ["none"])
 def test_nothing_in_a_percept_holds_the_position_of_an_unseen_object(house, monkeypatch, assistance):
     percept, world, observation, hud_state = percepts(house, assistance, monkeypatch)
     eye = observation.eye, observation.heading, observation.pitch

@@ -28,7 +28,7 @@ class Guidance:
 
     Attributes:
         visit: What to do.
-        path: Floor points of the segment as it was first shown, m, shape (k, 2); what lies behind the person vanishes.
+        path: Floor points of the path that the breadcrumbs mark, m, shape (k, 2).
         goal: Where the object or the receptacle is, m, shape (2,).
         tolerance: How far the person may leave the path before a new one is shown, m.
     """
@@ -207,8 +207,8 @@ class Participant(Protocol):
     """A user of the assistance: sees a percept, answers with a decision.
 
     Attributes:
-        needs: Roles of the world-locked markers it cannot do without (`goal`, `flagpole`); a session in a condition
-            that shows none of them is refused at the start.
+        needs: Roles of the world-locked markers it cannot do without (`breadcrumb`, `flagpole`); a session in a
+            condition that shows none of them is refused at the start.
     """
 
     needs: frozenset[str]

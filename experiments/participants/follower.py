@@ -12,7 +12,7 @@ from experiments.participants.visit_executor import VisitExecutor
 class BreadcrumbFollower:
     """Walks along the breadcrumbs and does what the current step says."""
 
-    needs = frozenset({"goal"})
+    needs = frozenset({"breadcrumb"})
 
     def __init__(self, house: House) -> None:
         self._executor = VisitExecutor(house)

@@ -1,24 +1,18 @@
-"""Optimal: breadcrumbs to the goal of the next step, and the plan as numbered steps (PAPER section 5)."""
+"""Optimal: breadcrumbs to the next step, flagpoles, and the plan as numbered steps (PAPER section 5)."""
 
-from hud.lists import assemble
-from hud.markers import breadcrumbs, goal_pin, rims
-from hud.projection import pointer_to
+from hud.lists import assemble, misplaced_flagpoles
+from hud.markers import breadcrumbs
 from hud.state import ChecklistItem, HudState
 from hud.task import TaskView
 
 
 def hud_state(view: TaskView) -> HudState:
-    """Steps done and steps planned, the next one highlighted, and the path to its goal."""
+    """Steps done and steps planned, the segment of the plan that leads to the next one, and flagpoles."""
     done = len(view.steps_done)
     steps = (*view.steps_done, *view.plan)
     checklist = tuple(_row(view, i, kind, name, done) for i, (kind, name) in enumerate(steps))
-    crumbs = breadcrumbs(view.path) if view.path is not None else ()
-    markers = (*crumbs, *rims(crumbs))
-    pointer = None
-    if view.goal is not None:
-        markers += goal_pin(view.goal)
-        pointer = pointer_to(view.camera, view.goal) if view.camera is not None else None
-    return assemble(view, "Your plan", checklist, markers, pointer)
+    crumbs = () if view.segment is None else breadcrumbs(view.segment)
+    return assemble(view, "Your plan", checklist, (*crumbs, *misplaced_flagpoles(view)))
 
 
 def _row(view: TaskView, index: int, kind: str, name: str, done: int) -> ChecklistItem:
