@@ -7,7 +7,6 @@ from hud.markers import flagpole
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Marker, Pointer
 from hud.task import TaskObject, TaskView
 
-
 NEAR = 1.6  # m; about where an object leaves the lower edge of the view
 
 
