@@ -13,6 +13,7 @@ from experiments.reach_bound import reach_bound
 from experiments.records import EventLog
 from experiments.regrets import Regrets
 from experiments.shown_path import TOLERANCE, ShownPath
+from experiments.user_code import shown_by
 from experiments.visit_fields import PlaceDistances, alternatives, as_json
 from hud.conditions import condition
 from hud.markers import BREADCRUMB, GOAL
@@ -84,7 +85,7 @@ class Assistant:
         options: WorldOptions | None = None,
     ) -> None:
         self._board, self._house, self._episode = board, board.house, board.episode
-        self._show = condition(assistance)
+        self._assistance, self._show = assistance, condition(assistance)
         self._planner = planner
         self._log = log
         self._options = options or WorldOptions()
@@ -162,7 +163,7 @@ class Assistant:
             camera=camera,
             regrets=self._regrets.known,
         )
-        return self._show(view)
+        return shown_by(self._show, self._assistance, view)
 
     def guidance(self, observation: Observation) -> Guidance | None:
         """The next step and the path that the breadcrumbs mark; None where there are none, or when all is done."""

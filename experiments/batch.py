@@ -16,14 +16,15 @@ from typing import Any
 
 from experiments import records
 from experiments.design import Design
+from experiments.endings import COMPLETE
 from experiments.errors import ConfigError
 from experiments.files import read_json
 from experiments.house import House
+from experiments.run_directory import TRIALS, check_batch_folder
 from experiments.table import write_tables
 from experiments.trial import run_trial
 from experiments.trial_config import TrialConfig
 
-TRIALS = "trials"
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
 
 
@@ -80,7 +81,7 @@ def run_batch(
     if workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
     folders = {out / TRIALS / trial_name(config): config for config in design.trials}
-    (out / TRIALS).mkdir(parents=True, exist_ok=True)
+    check_batch_folder(out)
     missing = [(path, config) for path, config in folders.items() if not _is_done(path)]
     progress = BatchProgress(done=0, resumed=len(folders) - len(missing), failed=0, total=len(folders))
     on_progress(progress)
@@ -103,7 +104,9 @@ def run_batch(
 
 
 def _is_done(path: Path) -> bool:
-    return (path / records.METRICS).is_file()
+    """Whether a trial was run to its end; one that failed or was interrupted is run again."""
+    metrics = path / records.METRICS
+    return metrics.is_file() and read_json(metrics).get("ended") in COMPLETE
 
 
 def _results(
@@ -132,7 +135,7 @@ def _house(name: str) -> House:
 def _run(config: TrialConfig, out: Path) -> str | None:
     """Run a trial; None if it succeeds, else the error as text, because not every exception can be pickled."""
     try:
-        run_trial(config, out, topdown=False, house=_house(config.house))
+        run_trial(config, out, topdown=False, replace=True, house=_house(config.house))
     except Exception as error:  # an error in one trial must not stop the others
         return _failure(error)
     return None

@@ -4,6 +4,7 @@ ExperimentError
 ├── ConfigError     an option of a run or batch is unusable
 ├── SessionError    a session cannot go on
 ├── RecordError     a run directory is missing, incomplete or in the way
+├── UserCodeError   a participant, condition or planner of somebody's own raised, or returned something unusable
 └── ReplayError     a recorded run cannot be replayed, or does not go as recorded
 """
 
@@ -22,6 +23,10 @@ class SessionError(ExperimentError):
 
 class RecordError(ExperimentError):
     """A run directory is missing, incomplete or in the way."""
+
+
+class UserCodeError(ExperimentError):
+    """A participant, condition or planner of somebody's own raised, or returned something unusable."""
 
 
 class ReplayError(ExperimentError):

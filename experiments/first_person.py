@@ -1,30 +1,41 @@
 """First-person frames with the HUD over them, and films of them."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.errors import ConfigError, RecordError
 from experiments.house import House
 from experiments.video import VideoWriter
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
 from hud.state import HudState
+from mjsim.errors import RenderError
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
-from mjsim.render import Renderer, render_house_map, render_pictures
+from mjsim.render import PROFILES, Renderer, gl_info, render_house_map, render_pictures
 from mjsim.world import World
 
 
 @dataclass(frozen=True)
 class FilmConfig:
-    """How frames are made: size in px, and the render profile."""
+    """How frames are made: size in px, and the render profile.
+
+    Raises:
+        ConfigError: There is no such profile.
+    """
 
     width: int = 640
     height: int = 480
     profile: str = "fast"
+
+    def __post_init__(self) -> None:
+        if self.profile not in PROFILES:
+            raise ConfigError(f"no render profile {self.profile!r}; there are {', '.join(PROFILES)}")
 
 
 class FirstPersonRenderer:
@@ -95,3 +106,69 @@ class Filming:
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - all is in the world
         """Film one frame."""
         self._video.write(self._renderer.frame(world.data, hud_state))
+
+
+class TrialFilm:
+    """A viewer that films a trial. A trial is worth more than its film: where filming fails, the trial goes on.
+
+    Args:
+        scene: The scene.
+        house: The house.
+        film: Frame size and render profile.
+        path: Video file to write.
+
+    Attributes:
+        failure: Why there is no film, or None.
+        renderer_name: What draws the frames, or None.
+    """
+
+    def __init__(self, scene: Scene, house: House, film: FilmConfig, path: Path) -> None:
+        self._path = path
+        self.failure: str | None = None
+        self.renderer_name: str | None = None
+        self._renderer: FirstPersonRenderer | None = None
+        self._video: VideoWriter | None = None
+        try:
+            self._renderer = FirstPersonRenderer(scene, house, film)
+            self.renderer_name = gl_info().renderer
+            self._video = VideoWriter(path, width=film.width, height=film.height)
+        except (RenderError, RecordError, OSError) as error:
+            self._give_up(error)
+
+    @property
+    def frames_sha256(self) -> str | None:
+        """Hash of all frames, once closed; None if there is no film."""
+        return self._video.frames_sha256 if self._video is not None and self.failure is None else None
+
+    def camera(self, world: World) -> CameraView | None:
+        """The eye camera; None where nothing can be drawn."""
+        return self._renderer.camera_view(world.data) if self._renderer is not None else None
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - all is in the world
+        """Film one frame."""
+        if self.failure is None and self._renderer is not None and self._video is not None:
+            try:
+                self._video.write(self._renderer.frame(world.data, hud_state))
+            except (RenderError, RecordError) as error:
+                self._give_up(error)
+
+    def close(self) -> None:
+        """Finish the file, or remove what there is of it."""
+        try:
+            if self._video is not None:
+                self._video.close()
+        except RecordError as error:
+            self._give_up(error)
+        if self._renderer is not None:
+            self._renderer.close()
+        if self.failure is not None:
+            self._path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _give_up(self, error: Exception) -> None:
+        self.failure = self.failure or f"no video: {error}"

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.endings import LeaveSession
 from experiments.errors import RecordError
 from experiments.first_person import FilmConfig, FirstPersonRenderer
 from experiments.house import House
@@ -83,7 +84,7 @@ class Shot:
     trigger: Trigger
 
 
-class _Done(Exception):  # noqa: N818 - ends a session early, which is no error
+class _Done(LeaveSession):
     """All pictures are taken."""
 
 

@@ -1,5 +1,6 @@
 """The record of one trial: an append-only event log and a trajectory."""
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -14,6 +15,7 @@ from experiments.errors import RecordError
 from experiments.files import save_arrays
 from mjsim.actions import Action, Move, Pick, Place
 from mjsim.errors import ActionError
+from mjsim.files import write_text_atomically
 from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.rollout import Rollout
@@ -49,6 +51,8 @@ Event = Mapping[str, Any]
 class EventLog:
     """Append-only JSON lines, flushed line by line so that a crash loses nothing that was logged.
 
+    Where the file cannot be written any more (a full disk), logging goes on in memory; `save` writes it elsewhere.
+
     Args:
         path: File to create, or None to keep the events in memory only.
 
@@ -74,8 +78,22 @@ class EventLog:
         self._digest.update(text.encode())
         self.hash = self._digest.hash
         if self._file:
-            self._file.write(text)
-            self._file.flush()
+            try:
+                self._file.write(text)
+                self._file.flush()
+            except OSError:
+                self._close()
+
+    def save(self, path: Path) -> None:
+        """Write everything so far to `path`, whole or not at all, unless that is there already."""
+        if not path.is_file() or path.stat().st_size != self.size:
+            write_text_atomically(path, "".join(json.dumps(line) + "\n" for line in self.events))
+
+    def _close(self) -> None:
+        if self._file:
+            with contextlib.suppress(OSError):  # what could not be written is in memory
+                self._file.close()
+            self._file = None
 
     def __enter__(self) -> "EventLog":
         return self
@@ -83,8 +101,7 @@ class EventLog:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._file:
-            self._file.close()
+        self._close()
 
 
 class LogDigest:
@@ -271,10 +288,12 @@ def read_events(path: Path) -> list[Event]:
         lines = path.read_text(encoding="utf-8").splitlines()
     except OSError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise RecordError(f"{path} is not UTF-8: {error}") from error
     events: list[Event] = []
     for number, line in enumerate(lines, start=1):
         try:
             events.append(json.loads(line))
-        except json.JSONDecodeError as error:
+        except (json.JSONDecodeError, RecursionError) as error:
             raise RecordError(f"{path}, line {number} is not JSON: {error}") from error
     return events

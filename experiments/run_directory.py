@@ -1,58 +1,186 @@
-"""The folder of a run: complete, or not there at all."""
+"""Where commands write. What exists is kept, and a run directory is complete or not there at all."""
 
-import shutil
+import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from experiments import records
+from experiments.checksums import CHECKSUMS
 from experiments.errors import RecordError
-from experiments.records import EPISODE, EVENTS
+from mjsim.files import exchange, work_folder
+
+SHOWN_NAMES = 3  # of what is in the way
+TRIALS = "trials"  # folder of a batch
 
 
 def is_run(directory: Path) -> bool:
     """Whether `directory` holds the record of a trial."""
-    return (directory / EPISODE).is_file() and (directory / EVENTS).is_file()
+    return (directory / records.EPISODE).is_file() and (directory / records.EVENTS).is_file()
+
+
+def is_batch(directory: Path) -> bool:
+    """Whether `directory` is the folder of a batch: its trials are runs, and nothing else lies among them."""
+    trials = directory / TRIALS
+    if not trials.is_dir():
+        return False
+    inside = [path for path in trials.iterdir() if not path.name.startswith(".")]
+    if not inside:  # a batch that was killed before its first trial was done has no table either
+        return not list(directory.glob(f"{TRIALS}.*"))
+    return all(is_run(path) for path in inside)
+
+
+def check_run_directory(path: Path, *, replace: bool = False) -> Path:
+    """Whether a run may be written to `path`.
+
+    Args:
+        path: Where the run is to appear.
+        replace: Whether it may take the place of an earlier run. It never takes the place of anything else.
+
+    Returns:
+        The place itself, where `path` is a symbolic link.
+
+    Raises:
+        RecordError: Something is in the way; the message says what, and what to do.
+        OSError: The path is unusable: too long, below a file, not to be read.
+    """
+    place = _place(path)
+    if not place.exists():
+        return place
+    if not place.is_dir():
+        raise RecordError(f"{path} is a file; name a folder that does not exist yet")
+    if Path.cwd().is_relative_to(place) or place.is_mount():
+        raise RecordError(f"{path} is in use as a folder; name a new one inside it, such as {path / 'run'}")
+    names = sorted(entry.name for entry in place.iterdir())
+    if not names:
+        return place
+    foreign = [name for name in names if name not in (*records.FILES, CHECKSUMS)]
+    if is_batch(place):
+        raise RecordError(f"{path} holds a batch, which a run never replaces; choose another --out")
+    if foreign or not is_run(place):
+        raise RecordError(
+            f"{path} holds {_listed(foreign or names)}, which no run wrote; choose another --out or move it away "
+            "(--force replaces only a run)"
+        )
+    if not replace:
+        raise RecordError(f"{path} holds a run; choose another --out, or replace that run with --force")
+    return place
+
+
+def check_batch_folder(path: Path) -> None:
+    """Whether a batch may be written to `path`, or added to one that is there; makes the folder.
+
+    Raises:
+        RecordError: Something else is in the way.
+        OSError: The folder cannot be written.
+    """
+    place = _place(path)
+    if place.exists() and not place.is_dir():
+        raise RecordError(f"{path} is a file; name a folder for --out")
+    if place.exists() and any(place.iterdir()) and not is_batch(place):
+        what = "a run" if is_run(place) else _listed(sorted(entry.name for entry in place.iterdir()))
+        raise RecordError(
+            f"{path} holds {what} and is not the folder of a batch; choose another --out or move it away"
+        )
+    (place / TRIALS).mkdir(parents=True, exist_ok=True)
+    _check_writable(place / TRIALS)
+
+
+def check_file(path: Path, *, replace: bool = False) -> None:
+    """Whether a file may be written to `path`.
+
+    Raises:
+        RecordError: Something is in the way.
+        OSError: The folder of the file cannot be written.
+    """
+    place = _place(path)
+    if place.exists() and not place.is_file():
+        raise RecordError(f"{path} is not a regular file; name a file that does not exist yet")
+    if place.exists() and not replace:
+        raise RecordError(f"{path} exists; name another file, or replace it with --force")
+    folder = place.parent
+    while not folder.exists():
+        folder = folder.parent
+    _check_writable(folder)
 
 
 @contextmanager
-def run_directory(path: Path) -> Iterator[Path]:
-    """Yield a working folder that is renamed to `path` on success.
+def run_directory(path: Path, *, replace: bool = False) -> Iterator[Path]:
+    """Yield a working folder beside `path`. Once its metrics are written, it is kept and moved to `path`.
 
-    An earlier run at `path` is replaced; anything else there is never touched.
+    That holds also where the block raises. A folder without metrics is removed.
+
+    Args:
+        path: Where the run is to appear.
+        replace: Whether it may take the place of an earlier run.
 
     Raises:
-        RecordError: `path` exists and is not a run, so replacing it could destroy something.
+        RecordError: Something is in the way; or came there meanwhile, and the run is kept beside it.
+        OSError: The folder cannot be written.
     """
-    if path.exists() and not is_run(path) and (not path.is_dir() or any(path.iterdir())):
-        raise RecordError(f"{path} exists and is not a run; choose another --out or move it away")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    working = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
-    try:
-        yield working
-        working.chmod(0o755)
-        if path.exists():
-            shutil.rmtree(path)
-        working.replace(path)
-    finally:
-        if working.exists():
-            shutil.rmtree(working)
+    place = check_run_directory(path, replace=replace)
+    with _folder(place.parent), work_folder(place.parent) as folder:
+        try:
+            yield folder
+        finally:
+            if (folder / records.METRICS).is_file():
+                folder.chmod(0o755)
+                _move(folder, place, replace=replace)
 
 
-def keep_failed(folder: Path, out: Path) -> Path:
-    """Move the working folder of a failed run to `<out>.failed`.
-
-    An earlier failed run there is replaced; if something else has that name, a number is added.
-
-    Returns:
-        The new path.
-    """
-    kept, number = out.with_name(f"{out.name}.failed"), 1
-    while kept.exists() and not is_run(kept):
+def free_name(path: Path) -> Path:
+    """`path`, or with the first number that makes it a name of nothing that exists."""
+    number, free = 1, path
+    while os.path.lexists(free):
         number += 1
-        kept = out.with_name(f"{out.name}.failed-{number}")
-    if kept.exists():
-        shutil.rmtree(kept)
-    folder.chmod(0o755)
-    folder.replace(kept)
-    return kept
+        free = path.with_name(f"{path.name}-{number}")
+    return free
+
+
+def _move(folder: Path, place: Path, *, replace: bool) -> None:
+    try:
+        check_run_directory(place, replace=replace)
+        if place.exists() and any(place.iterdir()):
+            exchange(folder, place)
+        else:
+            folder.replace(place)
+    except (OSError, RecordError) as error:
+        kept = free_name(place)
+        folder.replace(kept)
+        raise RecordError(f"{error}; the run is kept in {kept}") from error
+
+
+@contextmanager
+def _folder(folder: Path) -> Iterator[None]:
+    """Make `folder` and those above it; those that are empty afterwards are removed again."""
+    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    finally:
+        for parent in made:
+            with suppress(OSError):  # not empty
+                parent.rmdir()
+
+
+def _place(path: Path) -> Path:
+    """What `path` stands for, links followed.
+
+    Raises:
+        RecordError: It is a link that leads nowhere.
+    """
+    if path.is_symlink() and not path.exists():
+        raise RecordError(f"{path} is a symbolic link that leads nowhere; remove it or choose another --out")
+    return Path(os.path.realpath(path))
+
+
+def _check_writable(folder: Path) -> None:
+    with tempfile.TemporaryFile(dir=folder):  # has no name, so nothing can be left behind
+        pass
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - SHOWN_NAMES
+    shown = ", ".join(names[:SHOWN_NAMES])
+    return f"{shown} and {more} more" if more > 0 else shown

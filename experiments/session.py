@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.assistant import Assistant
-from experiments.errors import SessionError
+from experiments.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
+from experiments.errors import SessionError, UserCodeError
 from experiments.locomotion import LocomotionController
 from experiments.participants.base import Decision, Moves, Participant, Wait, WalkAlong
 from experiments.perception import SessionPercept
 from experiments.recording import Recording
 from experiments.records import Trajectory
+from experiments.signals import signal_of
+from experiments.user_code import decide, describe
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.actions import IDLE, Action, ActionResult, Move, WorldEvent
@@ -22,12 +25,6 @@ from mjsim.observation import ObjectStatus, Observation
 from mjsim.rollout import Rollout
 from mjsim.world import World
 
-ALL_DELIVERED, TIME_LIMIT, INTERRUPTED, PHYSICS_ERROR = (
-    "all delivered",
-    "time limit",
-    "interrupted",
-    "physics error",
-)
 FINAL_HOLD = 1.6  # s the session goes on after the last delivery, so that the person sees that all is done
 MAX_MOTION = 30.0  # s; no pick or place takes as long
 
@@ -107,10 +104,15 @@ class Session:
         Raises:
             SessionError: The participant needs guidance that the assistance condition does not show.
             PhysicsError: The physics failed; the log says when.
+            UserCodeError: A participant or condition of one's own failed; the log says when.
         """
-        observation = self._world.reset()
-        self._assistant.begin(observation)
-        self.start(observation)
+        self._now = self._world.reset()
+        try:
+            self._assistant.begin(self._now)
+        except UserCodeError as error:
+            self._log_end(self._now.time, ERROR, error=describe(error))
+            raise
+        self.start(self._now)
         return self.finish(on_progress)
 
     def start(self, observation: Observation) -> None:
@@ -129,20 +131,22 @@ class Session:
             )
 
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
-        """Go on to the end, once started; returns and raises as `run` does."""
+        """Go on to the end, once started; returns and raises as `run` does. Whatever ends the session is logged."""
         try:
             while (reason := self.end_reason) is None:
                 self.advance()
                 on_progress(self.progress)
             self._end(reason)
-        except KeyboardInterrupt:
-            # What has been done so far is kept and measured, as it would be for a person who stops early.
-            reason = INTERRUPTED
-        except PhysicsError as error:
-            self._log.append(self._recorded_until, "end", reason=PHYSICS_ERROR, error=str(error))
+            self._assistant.finish(self._now.time)
+        except KeyboardInterrupt as stop:
+            self._assistant.finish(self._now.time)
+            self._log_end(self._now.time, INTERRUPTED, signal=signal_of(stop).name)
+            return INTERRUPTED
+        except Exception as error:
+            reason = PHYSICS_ERROR if isinstance(error, PhysicsError) else ERROR
+            self._log_end(self._recorded_until, reason, error=describe(error))
             raise
-        self._assistant.finish(self._now.time)
-        self._log.append(self._now.time, "end", reason=reason)
+        self._log_end(self._now.time, reason)
         return reason
 
     @property
@@ -173,9 +177,15 @@ class Session:
             self._hud_state,
             blocked=self._controller.blocked,
         )
-        decision = self._participant.act(percept)
+        decision = decide(self._participant, percept)
         if not (self._rollouts and self._roll_out(decision)):
             self._step(self._action(decision))
+
+    def _log_end(self, time: float, reason: str, **details: str) -> None:
+        """Log the end; a record has one state at least."""
+        if not self.recording.step:
+            self._record(IDLE)
+        self._log.append(time, "end", reason=reason, **details)
 
     def _action(self, decision: Decision) -> Action:
         """What a decision means for the next control step."""

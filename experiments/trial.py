@@ -2,36 +2,34 @@
 
 import hashlib
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments import records
 from experiments.assistant import Assistant
-from experiments.checksums import write_checksums
 from experiments.conditions import TaskBoard
-from experiments.errors import ConfigError
-from experiments.files import save_arrays, write_json
-from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
+from experiments.endings import INTERRUPTED
+from experiments.errors import ConfigError, UserCodeError
+from experiments.first_person import FilmConfig, TrialFilm
 from experiments.house import House
-from experiments.metrics import measure
-from experiments.participants import participant
 from experiments.recording import Recording, provenance
-from experiments.records import Event, EventLog
+from experiments.records import EventLog
 from experiments.regrets import LiveRegrets, Regrets
-from experiments.run_directory import keep_failed, run_directory
-from experiments.session import OnProgress, Session, Viewer
+from experiments.run_directory import run_directory
+from experiments.session import OnProgress, Progress, Session, Viewer
+from experiments.signals import Stopped, signals_postponed
 from experiments.trial_config import TrialConfig
-from experiments.video import VideoWriter
+from experiments.trial_record import NOTHING_FILMED, SessionResult, draw_floor_plan, save_record
+from experiments.user_code import make_participant
 from mjsim.episode import Episode
 from mjsim.errors import PhysicsError
 from mjsim.model.scene import Scene, compose
 from mjsim.options import WorldOptions
-from mjsim.render import gl_info
 from mjsim.world import World
 from planner.live import LiveReplanner
 from planner.replanner import Replanner
@@ -39,7 +37,6 @@ from planner.solver import solver
 
 _SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
 _LIST_ORDER, _PERSON = 0, 1  # purposes of random numbers in a session
-NOTHING_DRAWN = "none: nothing was drawn"  # in place of the renderer's name
 FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock of a live trial starts
 
 
@@ -49,50 +46,59 @@ def run_trial(
     *,
     film: FilmConfig | None = None,
     topdown: bool = True,
+    replace: bool = False,
     house: House | None = None,
     on_progress: OnProgress = lambda _: None,
+    on_warning: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Run a trial and write its record to `out`, whole or not at all.
+    """Run a trial and write its record to `out`, whole or not at all; however it ended, what was simulated is kept.
 
     Args:
         config: What to run.
-        out: Run directory; an earlier run there is replaced.
+        out: Run directory.
         film: How to film it, or None for no video.
         topdown: Whether to draw the floor plan.
+        replace: Whether `out` may take the place of an earlier run.
         house: A loaded house to use again; it must be the one that `config` names.
         on_progress: Called after every control step.
+        on_warning: Called with what went wrong without harm to the record: no video, no floor plan.
 
     Returns:
         What `metrics.json` holds.
 
     Raises:
-        ExperimentError, MjsimError, PlannerError, HudError: The configuration or the run directory is unusable.
-        PhysicsError: The physics failed. What led there is kept beside `out`, and the message says where.
+        ExperimentError, MjsimError, PlannerError, HudError: The configuration or the run directory is unusable, or
+            participant or condition failed.
+        PhysicsError: The physics failed.
+        Stopped: A signal came when the session was over.
     """
     started = time.perf_counter()
-    house = house or House.load(config.house)
-    episode = trial_episode(config, house)
-    with run_directory(out) as folder:
-        scene = compose(episode, house.catalogue)
-        result = _simulate(config, house, scene, folder, film, on_progress)
-        arrays = _write_record(folder, episode, result)
-        if isinstance(result.ended, PhysicsError):
-            write_checksums(folder, records.FILES)
-            kept = keep_failed(folder, out)
-            raise PhysicsError(f"{result.ended} (kept for `mjsim replay {kept}`)") from result.ended
-        if topdown:
-            from experiments.analysis.topdown import draw_topdown  # matplotlib: batches do without
+    with signals_postponed() as signals:
+        with run_directory(out, replace=replace) as folder:
+            house = house or House.load(config.house)
+            scene = compose(trial_episode(config, house), house.catalogue)
+            trial = _Trial(config, house, scene, folder, film)
 
-            draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], arrays)
-        metrics = {
-            **measure(result.log.events, arrays),
-            "frames_sha256": result.frames_sha256,
-            # The floor plan is drawn as well. Asking for the renderer's name where nothing is drawn would start it.
-            "renderer": gl_info().renderer if film or topdown else NOTHING_DRAWN,
-            "wall_s": round(time.perf_counter() - started, 3),
-        }
-        write_json(folder / records.METRICS, metrics)
-        write_checksums(folder, records.FILES)
+            def progress(now: Progress) -> None:
+                on_progress(now)
+                signals.check()
+
+            result = trial.run(progress)
+            if result.error is not None and not result.recorded:
+                raise result.error
+            signals.save()
+            wall = time.perf_counter() - started
+            metrics = save_record(folder, out, scene, result, wall)
+        if result.error is not None:
+            raise _kept(result.error, out)
+    for warning in (
+        result.no_film,
+        draw_floor_plan(out, house, scene, result) if topdown else None,
+    ):
+        if warning is not None:
+            on_warning(warning)
+    if signals.number is not None and metrics["ended"] != INTERRUPTED:
+        raise Stopped(signals.number)
     return metrics
 
 
@@ -113,78 +119,56 @@ def trial_episode(config: TrialConfig, house: House) -> Episode:
     return episode
 
 
-@dataclass(frozen=True, eq=False)
-class _SessionResult:
-    """A session that is over: why it ended, or how the physics failed, and the hash of the frames filmed."""
-
-    session: Session
-    log: EventLog
-    ended: str | PhysicsError
-    frames_sha256: str | None
-
-    @property
-    def plans(self) -> list[Event]:
-        """Every plan that was logged."""
-        return [event for event in self.log.events if event["event"] == "plan"]
+def _kept(error: Exception, out: Path) -> Exception:
+    """The error that ended a trial; it also says where the record is."""
+    if isinstance(error, PhysicsError | UserCodeError):
+        error.args = (f"{error} (kept for `mjsim replay {out}`)",)
+    error.add_note(f"What was simulated is kept in {out}.")
+    return error
 
 
-def _write_record(folder: Path, episode: Episode, result: _SessionResult) -> dict[str, NDArray[Any]]:
-    """Write what the session left behind, and return the arrays of its trajectory."""
-    arrays = result.session.trajectory.arrays()
-    episode.save(folder / records.EPISODE)
-    save_arrays(folder / records.TRAJECTORY, arrays)
-    result.session.recording.save(folder / records.RECORDING, arrays["action"])
-    write_json(folder / records.PLAN, result.plans)
-    return arrays
+@dataclass(frozen=True)
+class _Trial:
+    """A trial that is about to run in its working folder."""
 
+    config: TrialConfig
+    house: House
+    scene: Scene
+    folder: Path
+    film: FilmConfig | None
 
-def _simulate(
-    config: TrialConfig,
-    house: House,
-    scene: Scene,
-    folder: Path,
-    film: FilmConfig | None,
-    on_progress: OnProgress,
-) -> _SessionResult:
-    """Run the session of a trial; log and video are complete in `folder` afterwards."""
-    result = _simulate_once(config, house, scene, folder, film, on_progress, rollouts=True)
-    if isinstance(result.ended, PhysicsError) and config.fidelity != "full":
-        # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
-        for path in folder.iterdir():
-            path.unlink()
-        result = _simulate_once(config, house, scene, folder, film, on_progress, rollouts=False)
-    return result
+    def run(self, on_progress: OnProgress) -> SessionResult:
+        """Run the session; log and video are complete in the folder afterwards."""
+        result = self._run_once(on_progress, rollouts=True)
+        if isinstance(result.error, PhysicsError) and self.config.fidelity != "full":
+            # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
+            for path in self.folder.iterdir():
+                path.unlink()
+            result = self._run_once(on_progress, rollouts=False)
+        return result
 
-
-def _simulate_once(
-    config: TrialConfig,
-    house: House,
-    scene: Scene,
-    folder: Path,
-    film: FilmConfig | None,
-    on_progress: OnProgress,
-    *,
-    rollouts: bool,
-) -> _SessionResult:
-    with ExitStack() as stack:
-        log = stack.enter_context(EventLog(folder / records.EVENTS))
-        video = viewer = None
-        if film is not None:
-            renderer = stack.enter_context(FirstPersonRenderer(scene, house, film))
-            writer = VideoWriter(folder / records.VIDEO, width=film.width, height=film.height)
-            video = stack.enter_context(writer)
-            viewer = Filming(renderer, video)
-        replanner = None
-        if config.live:
-            replanner = stack.enter_context(
-                LiveReplanner(house.geodesics, solver(config.planner), capacity=config.capacity)
+    def _run_once(self, on_progress: OnProgress, *, rollouts: bool) -> SessionResult:
+        film = error = replanner = None
+        with ExitStack() as stack:
+            log = stack.enter_context(EventLog(self.folder / records.EVENTS))
+            if self.film is not None:
+                film = TrialFilm(self.scene, self.house, self.film, self.folder / records.VIDEO)
+                stack.enter_context(film)
+            if self.config.live:
+                planner = solver(self.config.planner)
+                live = LiveReplanner(self.house.geodesics, planner, capacity=self.config.capacity)
+                replanner = stack.enter_context(live)
+            session, _ = prepare_session(
+                self.config, self.house, self.scene, log, film, replanner, rollouts=rollouts
             )
-        session, _ = prepare_session(config, house, scene, log, viewer, replanner, rollouts=rollouts)
-        try:
-            ended: str | PhysicsError = session.run(on_progress)
-        except PhysicsError as error:
-            ended = error
-    return _SessionResult(session, log, ended, video.frames_sha256 if video else None)
+            try:
+                session.run(on_progress)
+            except Exception as failure:
+                error = failure
+        if film is None:
+            return SessionResult(session, log, error)
+        name = film.renderer_name or NOTHING_FILMED
+        return SessionResult(session, log, error, film.frames_sha256, name, film.failure)
 
 
 def prepare_session(
@@ -217,7 +201,7 @@ def prepare_session(
     session = Session(
         world,
         _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
-        participant(config.user)(house, _session_rng(config.person_seed, _PERSON)),
+        make_participant(config.user, house, _session_rng(config.person_seed, _PERSON)),
         Recording(world, log),
         walls=house.navmesh.outline,
         time_limit=config.limit,

@@ -125,7 +125,7 @@ def test_a_failure_of_the_physics_within_a_walk_leaves_every_step(house, tmp_pat
     config = TrialConfig(objects=3, assistance="optimal", seed=3, fidelity="windows")
     with pytest.raises(PhysicsError, match="on purpose"):
         run_trial(config, tmp_path / "run", topdown=False, house=house)
-    kept = tmp_path / "run.failed"
+    kept = tmp_path / "run"
     last = read_events(kept / records.EVENTS)[-1]
     assert last["reason"] == "physics error"
     assert len(np.load(kept / records.TRAJECTORY)["time"]) == round(last["t"] / 0.04) + 1 > 200

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.errors import RecordError
-from experiments.files import read_arrays, read_json
-from experiments.records import EPISODE, EVENTS, EventLog, Trajectory, decode_action, read_events
-from experiments.run_directory import keep_failed, run_directory
+from experiments.files import read_json
+from experiments.records import EPISODE, EVENTS, METRICS, EventLog, Trajectory, decode_action, read_events
+from experiments.run_directory import run_directory
 from mjsim.actions import Move, Pick, Place
 from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
@@ -40,6 +40,7 @@ def observation(time=0.0, hands=(None, "b")):
 def fill(folder):
     (folder / EPISODE).write_text("{}")
     (folder / EVENTS).write_text("")
+    (folder / METRICS).write_text("{}")
 
 
 def test_a_run_directory_appears_whole(tmp_path):
@@ -50,13 +51,19 @@ def test_a_run_directory_appears_whole(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
+def test_a_complete_record_is_kept_even_where_something_fails_afterwards(tmp_path):
+    with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run") as folder:
+        fill(folder)
+        raise ZeroDivisionError
+    assert (tmp_path / "run" / METRICS).is_file()
+
+
 def test_a_failed_run_leaves_the_earlier_one_untouched(tmp_path):
     with run_directory(tmp_path / "run") as folder:
         fill(folder)
         (folder / "metrics.json").write_text("first")
-    with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run") as folder:
-        fill(folder)
-        (folder / "metrics.json").write_text("second")
+    with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run", replace=True) as folder:
+        (folder / EVENTS).write_text("second")
         raise ZeroDivisionError
     assert (tmp_path / "run" / "metrics.json").read_text() == "first"
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
@@ -64,9 +71,10 @@ def test_a_failed_run_leaves_the_earlier_one_untouched(tmp_path):
 
 def test_a_run_replaces_an_earlier_run(tmp_path):
     for text in ("first", "second"):
-        with run_directory(tmp_path / "run") as folder:
+        with run_directory(tmp_path / "run", replace=True) as folder:
             fill(folder)
             (folder / "metrics.json").write_text(text)
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
     assert (tmp_path / "run" / "metrics.json").read_text() == "second"
 
 
@@ -74,8 +82,8 @@ def test_a_run_never_replaces_anything_else(tmp_path):
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "chapter.tex").write_text("precious")
     with (
-        pytest.raises(RecordError, match="thesis exists and is not a run"),
-        run_directory(tmp_path / "thesis"),
+        pytest.raises(RecordError, match=r"thesis holds chapter\.tex, which no run wrote"),
+        run_directory(tmp_path / "thesis", replace=True),
     ):
         pass
     assert (tmp_path / "thesis" / "chapter.tex").read_text() == "precious"
@@ -180,43 +188,3 @@ def test_the_log_knows_the_size_and_hash_of_its_file(tmp_path):
         content = (tmp_path / "events.jsonl").read_bytes()
         assert log.size == memory.size == len(content)
         assert log.hash == memory.hash == int.from_bytes(hashlib.sha1(content).digest()[:8], "little")
-
-
-def test_what_a_failed_run_left_is_kept_beside_the_run(tmp_path):
-    """A later failure replaces it, but nothing else of that name."""
-    for text in ("first", "second"):
-        with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run") as folder:
-            fill(folder)
-            (folder / "note").write_text(text)
-            assert keep_failed(folder, tmp_path / "run") == tmp_path / "run.failed"
-            raise ZeroDivisionError
-    assert (tmp_path / "run.failed" / "note").read_text() == "second"
-    (tmp_path / "other.failed").mkdir()
-    with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "other") as folder:
-        fill(folder)
-        assert keep_failed(folder, tmp_path / "other") == tmp_path / "other.failed-2"
-        raise ZeroDivisionError
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["other.failed", "other.failed-2", "run.failed"]
-
-
-@pytest.mark.parametrize("keep", [0, 1, 100, 600])
-def test_arrays_cut_short_are_named(tmp_path, keep):
-    path = tmp_path / "t.npz"
-    np.savez_compressed(path, a=np.arange(300.0), b=np.zeros(5))
-    assert read_arrays(path)["a"][299] == 299.0
-    path.write_bytes(path.read_bytes()[:keep])
-    with pytest.raises(RecordError, match=r"t\.npz is cut short or damaged"):
-        read_arrays(path)
-    path.unlink()
-    with pytest.raises(RecordError, match=r"cannot read .*t\.npz"):
-        read_arrays(path)
-
-
-def test_damaged_arrays_are_named(tmp_path):
-    path = tmp_path / "t.npz"
-    np.savez_compressed(path, a=np.arange(300.0))
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 255
-    path.write_bytes(bytes(content))
-    with pytest.raises(RecordError, match=r"t\.npz is cut short or damaged"):
-        read_arrays(path)

@@ -479,10 +479,10 @@ def test_a_physics_error_leaves_a_dump_that_replays(own_house, tmp_path, capsys)
     ball.write_text(text[:end].rstrip() + BOMB + text[end + len("</body>") :])
     catalogue = str(own_house / "catalogue.toml")
     config = TrialConfig(objects=2, assistance="optimal", seed=0, house=catalogue, time_limit=20.0)
-    with pytest.raises(PhysicsError, match=r"kept for `mjsim replay .*run\.failed`"):
+    with pytest.raises(PhysicsError, match=r"kept for `mjsim replay .*run`"):
         run_trial(config, tmp_path / "run", topdown=False)
-    assert not (tmp_path / "run").exists()
-    dump = tmp_path / "run.failed"
+    dump = tmp_path / "run"
+    assert read_json(dump / records.METRICS)["ended"] == "physics error"
     last = read_events(dump / records.EVENTS)[-1]
     assert last["reason"] == "physics error"
     report = replay(dump)

@@ -45,7 +45,7 @@ def test_everything_is_delivered_without_mishap(runs, assistance):
     assert metrics["max_penetration_m"] < 0.010
     assert 0 < metrics["ipl_stand"] <= 1.0
     assert metrics["simulated_s"] == pytest.approx(metrics["completion_time_s"])
-    assert metrics["renderer"] == "none: nothing was drawn"
+    assert metrics["renderer"] == "none: nothing was filmed"
 
 
 def test_help_shortens_the_walk(runs):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from hud.state import HudState
-from mjsim.actions import Action, ActionResult, Pick, Place
+from mjsim.actions import Action, ActionResult, Move, Pick, Place
 from mjsim.episode import CAPACITY
 from mjsim.errors import ActionError
 from mjsim.observation import ObjectStatus, Observation
@@ -201,6 +201,7 @@ class Wait:
 
 WAIT: Final = Wait()
 Decision = Action | WalkAlong | Moves | Wait
+DECISIONS = (Move, Pick, Place, WalkAlong, Moves, Wait)
 
 
 class Participant(Protocol):

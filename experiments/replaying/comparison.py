@@ -7,6 +7,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from experiments import records
+from experiments.endings import BROKEN_OFF, PHYSICS_ERROR
 from experiments.errors import RecordError
 from experiments.files import read_json
 from experiments.health import summarise_health
@@ -14,7 +15,6 @@ from experiments.metrics import compute_metrics
 from experiments.records import Event
 from experiments.replaying.replayer import Replayer
 from experiments.replaying.run_record import PER_STEP, WORLD_EVENTS, Mismatch, RunRecord
-from experiments.session import INTERRUPTED, PHYSICS_ERROR
 
 # Events that follow from the physics. Plans and visits are the assistant's; the hashes of the log protect them.
 COMPARED_EVENTS = frozenset({*WORLD_EVENTS, "attempt", "end"})
@@ -71,8 +71,8 @@ def _compare_checkpoints(replayer: Replayer) -> Iterator[Mismatch]:
 
 def _compare_events(replayer: Replayer) -> Iterator[Mismatch]:
     record = replayer.record
-    # The last step of an interrupted run is not simulated again.
-    end = record.steps - 1 if record.reason == INTERRUPTED else record.steps
+    # The last step of a run that was broken off is not simulated again.
+    end = record.steps - 1 if record.reason in BROKEN_OFF else record.steps
     logged = [
         (step, event)
         for step, event in record.events

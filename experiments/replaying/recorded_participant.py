@@ -2,17 +2,17 @@
 
 from typing import Never
 
+from experiments.endings import BROKEN_OFF, PHYSICS_ERROR, LeaveSession
 from experiments.errors import RecordError
 from experiments.participants.base import WAIT, Decision, Moves, Percept
 from experiments.recording import Recording
 from experiments.replaying.run_record import Mismatch, RunRecord
-from experiments.session import INTERRUPTED, PHYSICS_ERROR
 from mjsim.world import World
 
 MAX_ROLLOUT = 250  # control steps
 
 
-class EndOfReplay(Exception):  # noqa: N818 - no error
+class EndOfReplay(LeaveSession):
     """The record ends here, or differs from the replay."""
 
 
@@ -48,7 +48,7 @@ class RecordedParticipant:
         if record.mismatch is not None and step >= record.mismatch.step:
             raise EndOfReplay
         if record.mismatch is None and step == record.steps - 1:
-            if record.reason == INTERRUPTED:
+            if record.reason in BROKEN_OFF:
                 raise EndOfReplay
             if record.reason != PHYSICS_ERROR:
                 self._stop(step, f"the run ended here ({record.reason}), the replay goes on")

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from experiments.assistant import Assistant
 from experiments.conditions import TaskBoard
+from experiments.endings import INTERRUPTED
 from experiments.errors import ReplayError
 from experiments.house import House
 from experiments.recording import Recording, provenance
@@ -15,7 +16,7 @@ from experiments.records import Event, EventLog
 from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.recorded_participant import EndOfReplay, RecordedParticipant
 from experiments.replaying.run_record import WORLD_EVENTS, Mismatch, RunRecord
-from experiments.session import INTERRUPTED, Session, Viewer
+from experiments.session import Session, Viewer
 from mjsim.actions import WorldEvent
 from mjsim.errors import PhysicsError, StateError
 from mjsim.model.scene import compose

@@ -35,6 +35,7 @@ def condition(name: str) -> Condition:
     if len(set(asked)) != len(asked):
         raise ConditionError(f"condition {name!r} names an option twice; give each once")
 
+    @functools.wraps(show)
     def hud_state(view: TaskView) -> HudState:
         return functools.reduce(lambda state, apply: apply(view, state), options, show(view))
 

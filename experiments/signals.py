@@ -1,0 +1,111 @@
+"""Signals that ask a process to stop: Ctrl-C, SIGTERM (what clusters send) and SIGHUP (a terminal that is closed)."""
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+PATIENCE = 1.0  # s that a trial has to notice a signal, before it is interrupted wherever it is
+
+
+class Stopped(KeyboardInterrupt):
+    """A signal asked to stop.
+
+    Attributes:
+        number: The signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.number = number
+
+
+def signal_of(stop: KeyboardInterrupt) -> signal.Signals:
+    """The signal that caused an interruption."""
+    return signal.Signals(stop.number if isinstance(stop, Stopped) else signal.SIGINT)
+
+
+def exit_code(number: int) -> int:
+    """The exit code of a process that a signal stopped, as shells have it."""
+    return 128 + number
+
+
+@contextmanager
+def signals_raised() -> Iterator[None]:
+    """Raise `Stopped` wherever the main thread is when a signal comes."""
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        raise Stopped(number)
+
+    with _handled(stop):
+        yield
+
+
+class PostponedSignals:
+    """Signals that have come, and wait until it is convenient.
+
+    Attributes:
+        number: The first of them, or None.
+    """
+
+    def __init__(self) -> None:
+        self.number: int | None = None
+        self._saving = False
+
+    def check(self) -> None:
+        """Stop here, if a signal has come.
+
+        Raises:
+            Stopped: It has.
+        """
+        if self.number is not None:
+            self._stop_timer()
+            raise Stopped(self.number)
+
+    def save(self) -> None:
+        """From here on nothing is interrupted any more."""
+        self._saving = True
+        self._stop_timer()
+
+    def note(self, number: int, _frame: FrameType | None) -> None:
+        """Take a signal; who does not `check` in time, such as a participant that hangs, is interrupted."""
+        first, self.number = self.number is None, self.number or number
+        if first and not self._saving:
+            signal.signal(signal.SIGALRM, self._interrupt)
+            signal.setitimer(signal.ITIMER_REAL, PATIENCE)
+
+    def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
+        if self.number is not None and not self._saving:
+            raise Stopped(self.number)
+
+    def _stop_timer(self) -> None:
+        if self.number is not None and threading.current_thread() is threading.main_thread():
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+@contextmanager
+def signals_postponed() -> Iterator[PostponedSignals]:
+    """Note signals instead of being interrupted by them; in other threads than the main one, nothing changes."""
+    postponed = PostponedSignals()
+    with _handled(postponed.note):
+        yield postponed
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], Any]) -> Iterator[None]:
+    """Handle all signals but those that the process ignores (as after `nohup`) by `handler`."""
+    previous: dict[signal.Signals, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in SIGNALS:
+            before = signal.getsignal(number)
+            if before is not None and before != signal.SIG_IGN:
+                previous[number] = before
+                signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number, before in previous.items():
+            signal.signal(number, before)

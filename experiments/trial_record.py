@@ -1,0 +1,132 @@
+"""What a session left behind, written to a run directory: the record first, pictures last."""
+
+import dataclasses
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments import records
+from experiments.checksums import write_checksums
+from experiments.errors import RecordError
+from experiments.files import save_arrays, write_json
+from experiments.house import House
+from experiments.metrics import measure
+from experiments.records import Event, EventLog
+from experiments.run_directory import free_name
+from experiments.session import Session
+from experiments.user_code import describe
+from mjsim.model.scene import Scene
+
+NOTHING_FILMED = "none: nothing was filmed"  # in place of the renderer's name
+
+
+@dataclass(frozen=True, eq=False)
+class SessionResult:
+    """A session that is over.
+
+    Attributes:
+        session: Has the trajectory and the recording.
+        log: The event log; its last event says why it ended.
+        error: What ended it, where that is an error.
+        frames_sha256: Hash of the frames filmed, or None.
+        renderer: What drew them.
+        no_film: Why there is no film although one was wanted, or None.
+    """
+
+    session: Session
+    log: EventLog
+    error: Exception | None
+    frames_sha256: str | None = None
+    renderer: str = NOTHING_FILMED
+    no_film: str | None = None
+
+    @property
+    def recorded(self) -> bool:
+        """Whether there is anything to keep."""
+        return self.session.recording.step > 0
+
+    @property
+    def end(self) -> Event:
+        """The last event."""
+        return self.log.events[-1]
+
+    @property
+    def plans(self) -> list[Event]:
+        """Every plan that was logged."""
+        return [event for event in self.log.events if event["event"] == "plan"]
+
+
+def save_record(folder: Path, out: Path, scene: Scene, result: SessionResult, wall: float) -> dict[str, Any]:
+    """Write the record of a session, and what it measured, to a run directory.
+
+    Args:
+        folder: The run directory.
+        out: Where it will appear; named in errors.
+        scene: The scene of the session.
+        result: The session.
+        wall: Time that the trial took, s.
+
+    Returns:
+        What `metrics.json` holds.
+
+    Raises:
+        RecordError: The folder cannot be written, and the record is kept elsewhere; the message says where.
+    """
+    try:
+        return _write(folder, scene, result, wall)
+    except OSError as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        kept = _save_elsewhere(out, scene, result, wall)
+        raise RecordError(f"cannot write {out} ({error.strerror}); the run is kept in {kept}") from error
+
+
+def draw_floor_plan(folder: Path, house: House, scene: Scene, result: SessionResult) -> str | None:
+    """Draw the floor plan of a run into its directory; why that was not possible, or None."""
+    if not result.plans:
+        return None
+    try:
+        from experiments.analysis.topdown import draw_topdown  # matplotlib: batches do without
+
+        arrays = result.session.trajectory.arrays()
+        draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], arrays)
+        write_checksums(folder, records.FILES)
+    except Exception as error:  # no picture is worth a record
+        return f"no floor plan: {describe(error)}"
+    return None
+
+
+def _write(folder: Path, scene: Scene, result: SessionResult, wall: float) -> dict[str, Any]:
+    arrays = result.session.trajectory.arrays()
+    scene.episode.save(folder / records.EPISODE)
+    result.log.save(folder / records.EVENTS)
+    save_arrays(folder / records.TRAJECTORY, arrays)
+    result.session.recording.save(folder / records.RECORDING, arrays["action"])
+    write_json(folder / records.PLAN, result.plans)
+    metrics = {
+        **measure(result.log.events, arrays),
+        **{name: result.end[name] for name in ("signal", "error") if name in result.end},
+        "frames_sha256": result.frames_sha256,
+        "renderer": result.renderer,
+        "wall_s": round(wall, 3),
+    }
+    write_json(folder / records.METRICS, metrics)  # a run directory with metrics is complete
+    write_checksums(folder, records.FILES)
+    return metrics
+
+
+def _save_elsewhere(out: Path, scene: Scene, result: SessionResult, wall: float) -> Path:
+    """Save a record that cannot be written where it should be among the temporary files.
+
+    Raises:
+        OSError: It cannot be written there either.
+    """
+    kept = free_name(Path(tempfile.gettempdir()) / f"mjsim-{out.name}")
+    kept.mkdir()
+    try:
+        _write(kept, scene, dataclasses.replace(result, frames_sha256=None), wall)
+    except OSError:
+        shutil.rmtree(kept, ignore_errors=True)
+        raise
+    return kept
