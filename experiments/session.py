@@ -104,7 +104,6 @@ class Session:
         Raises:
             SessionError: The participant needs guidance that the assistance condition does not show.
             PhysicsError: The physics failed; the log says when.
-            UserCodeError: A participant or condition of one's own failed; the log says when.
         """
         self._now = self._world.reset()
         try:
