@@ -11,7 +11,7 @@ from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
 from mjsim.actions import ActionResult
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.visibility import visible_objects
+from mjsim.visibility import in_field_of_view, visible_objects
 from mjsim.world import World
 
 
@@ -63,10 +63,14 @@ class SessionPercept(Percept):
 
     @cached_property
     def flagpoles(self) -> Mapping[str, Point]:
-        """What the picture shows, and no more: object -> floor position, m, shape (2,)."""
+        """Those that are inside the field of view: object -> floor position, m, shape (2,)."""
         if FLAGPOLE not in self._assistant.shown_roles:
             return {}
-        return {name: np.array(place) for name, place in flagpoles(self._hud()).items()}
+        seen, state = self._seen, self._hud()
+        parts = [marker for marker in state.markers if marker.role == FLAGPOLE]
+        shown = in_field_of_view([part.position for part in parts], seen.eye, seen.heading, seen.pitch)
+        names = {part.object for part, is_shown in zip(parts, shown, strict=True) if is_shown}
+        return {name: np.array(place) for name, place in flagpoles(state).items() if name in names}
 
     @cached_property
     def choices(self) -> Sequence[Choice]:

@@ -14,6 +14,7 @@ from experiments.trial_config import TrialConfig
 from hud.messages import TEXTS
 from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus
+from mjsim.render import Renderer
 from mjsim.visibility import visible_objects
 
 UPDATED = TEXTS["replanned"][1]
@@ -117,12 +118,26 @@ def test_nothing_in_a_percept_holds_the_position_of_an_unseen_object(house, monk
         assert np.linalg.norm(places[name] - observation.position) >= 1.3
 
 
-def test_flagpoles_are_those_of_the_picture(house, monkeypatch):
-    percept, _, observation, hud_state = percepts(house, "highlight", monkeypatch)
-    poles = {m.position[:2] for m in hud_state.markers if m.role == "flagpole" and m.shape == "sphere"}
-    assert {tuple(place) for place in percept.flagpoles.values()} == poles
-    assert set(percept.flagpoles) == set(observation.names_with(ObjectStatus.LOOSE))
-    assert all(marker.x_ray for marker in hud_state.markers)  # so the picture shows those behind walls, too
+@pytest.mark.parametrize("assistance", ["highlight", "optimal"])
+def test_flagpoles_are_those_of_the_picture(house, monkeypatch, assistance):
+    """Every pole that has pixels in a frame drawn without the HUD's panels is perceived, and no other."""
+    percept, world, observation, hud_state = percepts(house, assistance, monkeypatch)
+    poles = {
+        m.object: m.position[:2] for m in hud_state.markers if m.role == "flagpole" and m.shape == "sphere"
+    }
+    assert set(poles) == set(observation.names_with(ObjectStatus.LOOSE))
+    with Renderer(world.scene.model) as renderer:
+        plain = renderer.rgb(world.data)
+        drawn = {
+            name
+            for name in poles
+            if (
+                renderer.rgb(world.data, markers=[m for m in hud_state.markers if m.object == name]) != plain
+            ).any()
+        }
+    assert 0 < len(drawn) < len(poles), "some are behind the person"
+    assert set(percept.flagpoles) == drawn
+    assert {name: tuple(place) for name, place in percept.flagpoles.items()} == {n: poles[n] for n in drawn}
 
 
 def test_no_flagpoles_and_no_path_where_none_are_shown(house, monkeypatch):

@@ -123,7 +123,7 @@ class Percept:
 
     @property
     def flagpoles(self) -> Mapping[str, Point]:
-        """Object instance name -> floor position of the flagpole over it, m, shape (2,); empty where none is shown."""
+        """Flagpoles in view now, through walls too: object -> floor position, m, shape (2,)."""
         return {}
 
     @property

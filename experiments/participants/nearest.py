@@ -3,13 +3,18 @@
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import WAIT, Decision, Participant, Percept
+from experiments.locomotion import TIME_TOLERANCE
+from experiments.participants.base import WAIT, Decision, Participant, Percept, Point
+from experiments.participants.looking import LOOK_INTERVAL, FullTurn
 from experiments.participants.visit_executor import VisitExecutor, nearest_visit
 from planner.plan import Visit, VisitKind
 
 
 class Nearest:
-    """Greedy: goes to the nearest place where something can be done, and keeps to a decision once made."""
+    """Greedy: goes to the nearest place where something can be done, and keeps to a decision once made.
+
+    It turns around once to see all flagpoles, remembers them, and turns again when it knows of none.
+    """
 
     needs = frozenset({"flagpole"})
 
@@ -17,19 +22,44 @@ class Nearest:
         self._house = house
         self._executor = VisitExecutor(house)
         self._choice: Visit | None = None
+        self._known: dict[str, Point] = {}
+        self._turn: FullTurn | None = None
+        self._next_look = 0.0
 
     def act(self, percept: Percept) -> Decision:
-        """Go to the nearest flagpole or bin; pick or place there."""
+        """Look around at first; then go to the nearest flagpole or bin, and pick or place there."""
         if percept.busy:
             return WAIT
+        self._look(percept)
+        if not self._known and not percept.carried and self._turn is None:
+            self._turn = FullTurn(percept.heading)
+        if self._turn is not None:
+            turning = self._turn.act(percept)
+            if turning is not None:
+                return turning
+            self._turn = None
+        return self._visit(percept)
+
+    def _look(self, percept: Percept) -> None:
+        """Learn where flagpoles are; forget those of objects in a hand, and of one that is not where it was."""
+        for name in percept.carried:
+            self._known.pop(name, None)
+        refused = percept.answer is not None and not percept.answer.applied
+        if refused and self._choice is not None and self._choice.object not in percept.flagpoles:
+            self._known.pop(self._choice.object, None)
+        if percept.time >= self._next_look - TIME_TOLERANCE:
+            self._next_look = percept.time + LOOK_INTERVAL
+            self._known.update(percept.flagpoles)
+
+    def _visit(self, percept: Percept) -> Decision:
         feasible = [Visit(VisitKind.PLACE, name) for name in percept.carried]
         if not percept.hands_full:
-            feasible += [Visit(VisitKind.PICK, name) for name in percept.flagpoles]
+            feasible += [Visit(VisitKind.PICK, name) for name in self._known]
         if not feasible:
             return WAIT
         if self._choice not in feasible:
-            self._choice = nearest_visit(self._house, percept, feasible, percept.flagpoles)
-        return self._executor.act(percept, self._choice, percept.flagpoles)
+            self._choice = nearest_visit(self._house, percept, feasible, self._known)
+        return self._executor.act(percept, self._choice, self._known)
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance

@@ -5,14 +5,12 @@ import numpy as np
 from experiments.house import House
 from experiments.locomotion import TIME_TOLERANCE
 from experiments.participants.base import WAIT, Decision, Participant, Percept, Point
+from experiments.participants.looking import LOOK_INTERVAL, FullTurn
 from experiments.participants.visit_executor import VisitExecutor, estimated_distances, nearest_visit
-from mjsim.actions import IDLE, Move
+from mjsim.actions import IDLE
 from planner.plan import Visit, VisitKind
 
-LOOK_INTERVAL = 0.2  # s between two looks while walking
 SEARCHED = 0.5  # m from a viewpoint before the look around begins
-LOOK_AROUND_RATE = 2.0  # rad/s
-FULL_TURN = 2 * np.pi
 GONE = 1.2  # m: a remembered object nearer than this and not in view is no longer there
 
 
@@ -30,8 +28,7 @@ class Searcher:
         self._unsearched: list[tuple[str, Point]] = []
         self._target: tuple[str, Point] | None = None
         self._room: str | None = None
-        self._turned: float | None = None
-        self._last_heading = 0.0
+        self._turn: FullTurn | None = None
         self._next_look = 0.0
         self._choice: Visit | None = None
 
@@ -43,7 +40,7 @@ class Searcher:
         visit = self._next_visit(percept)
         if visit is None:
             return self._search(percept)
-        self._turned = None
+        self._turn = None
         return self._executor.act(percept, visit, self._remembered, until=self._next_look)
 
     def _look(self, percept: Percept) -> None:
@@ -75,13 +72,13 @@ class Searcher:
         return refused and near and name not in percept.look()
 
     def _search(self, percept: Percept) -> Decision:
-        if self._turned is not None:
-            return self._look_around(percept)
+        if self._turn is not None:
+            return self._look_around(percept, self._turn)
         room, viewpoint = self._viewpoint(percept)
         if float(np.linalg.norm(viewpoint - percept.position)) > SEARCHED:
             return self._executor.walk_to(percept, viewpoint, SEARCHED, until=self._next_look)
-        self._room, self._turned, self._last_heading = room, 0.0, percept.heading
-        return Move(turn=LOOK_AROUND_RATE)
+        self._room, self._turn = room, FullTurn(percept.heading)
+        return self._look_around(percept, self._turn)
 
     def _viewpoint(self, percept: Percept) -> tuple[str, Point]:
         """Viewpoint to search from next, and its room."""
@@ -89,12 +86,11 @@ class Searcher:
             self._target = self._next_viewpoint(percept.position)
         return self._target
 
-    def _look_around(self, percept: Percept) -> Decision:
-        step = (percept.heading - self._last_heading + np.pi) % FULL_TURN - np.pi
-        self._turned, self._last_heading = (self._turned or 0.0) + step, percept.heading
-        if self._turned < FULL_TURN:
-            return Move(turn=LOOK_AROUND_RATE)
-        self._turned = None
+    def _look_around(self, percept: Percept, turn: FullTurn) -> Decision:
+        turning = turn.act(percept)
+        if turning is not None:
+            return turning
+        self._turn = None
         if self._target is not None:
             self._unsearched = [v for v in self._unsearched if v is not self._target]
             self._target = None
