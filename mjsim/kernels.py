@@ -44,6 +44,12 @@ def kernel(function: F) -> F:
     return cast(F, numba.njit(nogil=True)(function))
 
 
+def cache_base() -> Path:
+    """Where everything that can be computed again is kept: `NUMBA_CACHE_DIR`, else the user's cache folder."""
+    chosen = numba.config.CACHE_DIR
+    return Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
+
+
 @cache
 def cache_folder(source: Path) -> Path | None:
     """Folder for the machine code of a module's kernels, None where none is writable.
@@ -51,8 +57,7 @@ def cache_folder(source: Path) -> Path | None:
     It lies in `NUMBA_CACHE_DIR` where that is set, else in the user's cache folder. Its name holds a hash of all
     that is compiled in: numba itself notices a change in a kernel's own file only, not in the kernels that it calls.
     """
-    chosen = numba.config.CACHE_DIR
-    base = Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
+    base = cache_base()
     digest = hashlib.sha256()
     try:
         for path in sorted(_compiled_in(source)):

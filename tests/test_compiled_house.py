@@ -148,7 +148,7 @@ def test_a_scene_from_a_shared_house_is_the_same_every_time(catalogue: Catalogue
 def test_a_house_that_does_not_compile_says_which_and_why(fresh_house: Path, name: str) -> None:
     broken = fresh_house.with_name(name)
     broken.write_text(broken.read_text().replace("</worldbody>", '<geom name="flat" size="0"/></worldbody>'))
-    with pytest.raises(AssetError, match=r"house\.xml .*does not compile: .*flat.*correct") as caught:
+    with pytest.raises(AssetError, match=rf"{name}.*does not compile: .*flat.*correct") as caught:
         House.load(str(fresh_house))
     assert "\n" not in str(caught.value)
 

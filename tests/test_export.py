@@ -120,13 +120,13 @@ def _with_mesh_files(small_house: Path, folder: Path) -> Catalogue:
         (folder / file.name).write_text(text, encoding="utf-8")
     for name, top in (("wedge", 0.1), ("ball", 0.2)):
         (folder / name).mkdir()
-        corners = f"v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 {top}\n"
+        corners = f"v -.06 -.05 0\nv .06 -.05 0\nv 0 .05 0\nv 0 0 {top}\n"
         faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
         (folder / name / "part.obj").write_text(corners + faces, encoding="utf-8")
         (folder / f"{name}.xml").write_text(
             f"""<mujoco><compiler meshdir="{name}"/><asset><mesh name="part" file="part.obj"/></asset>
-            <worldbody><body name="object"><geom type="mesh" mesh="part"/>
-            <site name="grip_0" pos="0 0 .1"/><site name="grip_1" pos="0 0 .1"/></body></worldbody></mujoco>""",
+            <worldbody><body name="object"><geom type="mesh" mesh="part" mass="0.2"/>
+            <site name="grip_0" pos="0 0 {top}"/><site name="grip_1" pos="0 0 {top}" quat="0 0 0 1"/></body></worldbody></mujoco>""",
             encoding="utf-8",
         )
     return Catalogue.load(str(folder / "catalogue.toml"))

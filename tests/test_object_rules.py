@@ -131,7 +131,9 @@ def test_an_object_that_breaks_a_convention_is_refused_by_that_rule(change: str,
     old, new, rule, word = BROKEN[change]
     found = errors(findings(tmp_path, old, new))
     assert any(f.rule == rule and word in str(f) for f in found), [str(f) for f in found]
-    assert all(f.remedy and "\n" not in str(f) and str(f).startswith("object block: ") for f in found)
+    assert all(
+        f.remedy and "\n" not in str(f) and str(f).startswith("object block (block.xml): ") for f in found
+    )
 
 
 @pytest.mark.parametrize("change", SURPRISING)

@@ -158,9 +158,9 @@ def _broken(small_house: Path, folder: Path, name: str, old: str, new: str) -> C
     [
         ("house.xml", '"mount:tray"', '"mount:trays"', "mount:tray"),
         ("house.xml", "</mujoco>", "", "house.xml"),
-        ("tray.xml", '"receptacle"', '"thing"', "tray.xml.*receptacle"),
+        ("tray.xml", '"receptacle"', '"thing"', "tray.xml.*'receptacle'"),
         ("cube.xml", '"object"', '"thing"', "cube.xml.*object"),
-        ("cube.xml", 'mass="0.2"', 'mass="0"', "does not compile"),
+        ("cube.xml", 'mass="0.2"', 'mass="0"', "cube.xml.*weighs 0 kg"),
         ("tray.xml", '"volume"', '"space"', "tray.*volume"),
         ("tray.xml", '"approach"', '"spot"', "tray.*approach"),
         ("tray.xml", '"volume" type="box"', '"volume" type="sphere"', "tray.*box"),

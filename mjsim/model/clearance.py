@@ -10,10 +10,8 @@ from scipy.ndimage import distance_transform_edt
 
 from mjsim.kernels import kernel
 from mjsim.model.footprint import footprint
-from mjsim.model.house import compiled_house
-from mjsim.model.scene import Scene
 
-_BORDER = 0.4  # m of grid around the rooms
+BORDER = 0.4  # m of grid around the rooms
 
 
 class ClearanceField(NamedTuple):
@@ -34,17 +32,23 @@ class ClearanceField(NamedTuple):
 
     @classmethod
     def from_model(
-        cls, model: mujoco.MjModel, *, low: float, high: float, resolution: float = 0.04
+        cls,
+        model: mujoco.MjModel,
+        *,
+        low: float,
+        high: float,
+        resolution: float = 0.04,
+        border: float = BORDER,
     ) -> "ClearanceField":
-        """Rasterise the static colliding geoms between two heights, m.
+        """Rasterise the static colliding geoms between two heights, m, up to `border` m around the rooms.
 
         Raises:
             AssetError: The house has no rooms.
         """
         plan = footprint(model, low=low, high=high)
         xmin, ymin, xmax, ymax = plan.bounds
-        origin = np.array([xmin - _BORDER, ymin - _BORDER])
-        shape = np.ceil((np.array([xmax, ymax]) + _BORDER - origin) / resolution).astype(int) + 1
+        origin = np.array([xmin - border, ymin - border])
+        shape = np.ceil((np.array([xmax, ymax]) + border - origin) / resolution).astype(int) + 1
         solid = np.zeros(tuple(shape), dtype=bool)
         for polygon in plan.obstacles:
             _fill(solid, (polygon - origin) / resolution)
@@ -69,17 +73,6 @@ def clearance_at(x: float, y: float, field: ClearanceField) -> tuple[float, floa
     high = (1 - a) * distance[i, j + 1] + a * distance[i + 1, j + 1]
     near_i, near_j = i + int(a > 0.5), j + int(b > 0.5)
     return (1 - b) * low + b * high, gradient[near_i, near_j, 0], gradient[near_i, near_j, 1]
-
-
-CARRY_BAND = (0.93, 1.60)  # heights of carried objects, m
-
-
-def carry_clearance(scene: Scene) -> ClearanceField:
-    """Clearance at the heights of what is carried; computed once per house."""
-    low, high = CARRY_BAND
-    return compiled_house(scene.catalogue).once(
-        ("clearance", low, high), lambda: ClearanceField.from_model(scene.model, low=low, high=high)
-    )
 
 
 def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:

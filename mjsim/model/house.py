@@ -17,6 +17,7 @@ from mjsim.model.navigable import NavigableFloor, installed_builder
 from mjsim.model.object_model import remove_visuals, separate_visuals
 from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
 from mjsim.model.rooms import RoomMap
+from mjsim.model.validation.verdicts import require_usable
 
 TIMESTEP = 0.004
 SLEEP_TOLERANCE = 0.05
@@ -135,8 +136,13 @@ def compiled_house(catalogue: Catalogue) -> CompiledHouse:
     """The compiled house of a catalogue: one per process for all catalogues of the same content.
 
     A file that changes on disk changes the content of the next catalogue that is loaded, and so gives a new model.
+
+    Raises:
+        AssetError: The house, a receptacle or an object breaks a convention of docs/models.md.
     """
-    return CompiledHouse(catalogue)
+    house = CompiledHouse(catalogue)
+    require_usable(house)
+    return house
 
 
 def navigable_floor(catalogue: Catalogue) -> NavigableFloor:

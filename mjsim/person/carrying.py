@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from mjsim.inventory import LEFT, RIGHT
 from mjsim.kernels import kernel
 from mjsim.model import avatar
-from mjsim.model.clearance import ClearanceField, carry_clearance
+from mjsim.model.carry_clearance import carry_clearance
+from mjsim.model.clearance import ClearanceField
 from mjsim.model.scene import Scene
 from mjsim.person.person import Person
 from mjsim.person.postures import (

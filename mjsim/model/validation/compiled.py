@@ -88,11 +88,11 @@ class Compiled:
 
     def error(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
         """A finding about this model; `place` is (x, y, z), m."""
-        return Finding(rule, self.subject, message, remedy, "error", _place(place))
+        return Finding(rule, self.subject, message, remedy, "error", self.path.name, _place(place))
 
     def warning(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
         """A finding that does not make the model unusable; `place` is (x, y, z), m."""
-        return Finding(rule, self.subject, message, remedy, "warning", _place(place))
+        return Finding(rule, self.subject, message, remedy, "warning", self.path.name, _place(place))
 
 
 def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
@@ -104,12 +104,12 @@ def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
             return found
         return Compiled.of(subject, path, mujoco.MjModel.from_xml_path(str(path)))
     except OSError as error:
-        return [Finding("file", subject, f"{path} cannot be read: {error.strerror}", "correct the path")]
+        message, remedy = f"{path} cannot be read: {error.strerror}", "correct the path"
     except UnicodeDecodeError as error:
-        return [Finding("file", subject, f"{path} is not UTF-8 at byte {error.start}", "save it as UTF-8")]
+        message, remedy = f"is not UTF-8 at byte {error.start}", "save it as UTF-8"
     except (ValueError, mujoco.FatalError) as error:
-        said = " ".join(str(error).split())
-        return [Finding("file", subject, f"{path} does not compile: {said}", "correct that element")]
+        message, remedy = f"does not compile: {' '.join(str(error).split())}", "correct that element"
+    return [Finding("file", subject, message, remedy, file=path.name)]
 
 
 def check_numbers(subject: str, path: Path) -> Iterator[Finding]:
@@ -123,8 +123,9 @@ def check_numbers(subject: str, path: Path) -> Iterator[Finding]:
                 yield Finding(
                     "finite",
                     subject,
-                    f"<{element.tag} {label}> has {name}={bad} in {path.name}",
+                    f"<{element.tag} {label}> has {name}={bad}",
                     "give a finite number in metres, kilograms, seconds or radians",
+                    file=path.name,
                 )
 
 

@@ -17,6 +17,7 @@ class Finding:
         message: Where, and with which value.
         remedy: What to change.
         severity: `error` where it cannot be used, `warning` where it can but people would be surprised.
+        file: Name of the file to change; empty where the subject says it.
         place: Where, m, (x, y) or (x, y, z) in the frame of the house or of the object; None where it has no place.
     """
 
@@ -25,10 +26,12 @@ class Finding:
     message: str
     remedy: str
     severity: Severity = "error"
+    file: str = ""
     place: tuple[float, ...] | None = None
 
     def __str__(self) -> str:
-        return f"{self.subject}: {self.message}; {self.remedy}"
+        where = f"{self.subject} ({self.file})" if self.file else self.subject
+        return f"{where}: {self.message}; {self.remedy}"
 
 
 def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -36,8 +39,8 @@ def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(f for f in findings if f.severity == "error")
 
 
-def one_line(findings: Iterable[Finding], path: object) -> str:
-    """The first error, and how many more there are, for an exception."""
+def one_line(findings: Iterable[Finding], name: object) -> str:
+    """The first error of what is called `name`, and how many more there are, for an exception."""
     first, *more = errors(findings)
-    rest = f" (and {len(more)} more: mjsim check {path})" if more else ""
-    return f"{' '.join(str(first).split())}{rest}"
+    rest = f"; {len(more)} more: mjsim check {name}" if more else ""
+    return f"{name}: {' '.join(str(first).split())}{rest}"

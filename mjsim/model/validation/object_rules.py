@@ -42,8 +42,11 @@ def check_object(path: Path, key: str | None = None) -> list[Finding]:
     """
     subject = f"object {key or path.stem}"
     compiled = compile_model(subject, path)
-    if not isinstance(compiled, Compiled):
-        return compiled
+    return check_compiled_object(compiled) if isinstance(compiled, Compiled) else compiled
+
+
+def check_compiled_object(compiled: Compiled) -> list[Finding]:
+    """All that is wrong with a compiled object."""
     found = list(check_structure(compiled, "object"))
     return found if errors(found) else [finding for rule in RULES for finding in rule(compiled)]
 

@@ -1,0 +1,86 @@
+"""One validator of houses, objects and receptacles, for `mjsim check` and for whatever loads them."""
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.errors import AssetError
+from mjsim.model.validation.compiled import Compiled, compile_model
+from mjsim.model.validation.findings import Finding, errors
+from mjsim.model.validation.floor_rules import Floor, check_floor
+from mjsim.model.validation.house_rules import check_house_file
+from mjsim.model.validation.object_rules import check_compiled_object
+from mjsim.model.validation.receptacle_rules import check_receptacle
+
+if TYPE_CHECKING:
+    from mjsim.model.house import CompiledHouse
+
+SLOTS = 2.5  # footprints of an average object of the category that a receptacle's floor should have room for
+
+
+def check_house(house: "CompiledHouse") -> list[Finding]:
+    """All that is wrong with a house, its receptacles and its objects.
+
+    What needs a sound file is only judged where the file is sound: a house of the wrong size has no floor plan.
+    """
+    catalogue = house.catalogue
+    found = check_house_file(catalogue)
+    for receptacle in catalogue.receptacles.values():
+        found += check_receptacle(receptacle.path, receptacle.key)
+    footprints = {}
+    for model in catalogue.objects.values():
+        compiled = compile_model(f"object {model.key}", model.path)
+        if isinstance(compiled, Compiled):
+            found += check_compiled_object(compiled)
+            footprints[model.key] = np.sort(np.ptp(compiled.extent(compiled.solid), axis=0)[:2])
+        else:
+            found += compiled
+    return found if errors(found) else [*found, *_check_composed(house), *_check_sizes(house, footprints)]
+
+
+def _check_composed(house: "CompiledHouse") -> list[Finding]:
+    try:
+        compiled = Compiled.of("house", house.catalogue.house_path, house.model)
+        floor = Floor(
+            compiled,
+            house.rooms,
+            house.receptacles,
+            {r.key: r.room for r in house.catalogue.receptacles.values()},
+            house.navigable,
+        )
+    except AssetError as error:
+        return [Finding("file", "house", str(error), "correct it")]
+    return check_floor(floor)
+
+
+def _check_sizes(house: "CompiledHouse", footprints: Mapping[str, NDArray[np.float64]]) -> Iterator[Finding]:
+    """Every object fits into its receptacle, and a few of them do side by side."""
+    for category in house.catalogue.categories.values():
+        interior = np.sort(2 * house.receptacles[category.receptacle].half_size[:2])
+        sizes = {key: footprints[key] for key in category.objects}
+        yield from _too_large(category.receptacle, interior, sizes)
+        room = float(np.prod(interior)) / float(np.mean([np.prod(size) for size in sizes.values()]))
+        if room < SLOTS:
+            yield Finding(
+                "capacity",
+                f"receptacle {category.receptacle}",
+                f"its floor has room for {room:.1f} objects of {category.key!r} side by side",
+                f"enlarge it to {SLOTS} or more: a trial may bring eight",
+                "warning",
+            )
+
+
+def _too_large(
+    receptacle: str, interior: NDArray[np.float64], sizes: Mapping[str, NDArray[np.float64]]
+) -> Iterator[Finding]:
+    for key, size in sizes.items():
+        if np.any(size > interior):
+            sides = " x ".join(f"{s:.2f}" for s in size)
+            yield Finding(
+                "capacity",
+                f"object {key}",
+                f"its footprint of {sides} m does not fit into {receptacle!r}, {interior[0]:.2f} x {interior[1]:.2f} m",
+                "enlarge the receptacle, shrink the object, or put it into another category",
+            )
