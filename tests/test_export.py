@@ -126,7 +126,8 @@ def _with_mesh_files(small_house: Path, folder: Path) -> Catalogue:
         (folder / f"{name}.xml").write_text(
             f"""<mujoco><compiler meshdir="{name}"/><asset><mesh name="part" file="part.obj"/></asset>
             <worldbody><body name="object"><geom type="mesh" mesh="part" mass="0.2"/>
-            <site name="grip_0" pos="0 0 {top}"/><site name="grip_1" pos="0 0 {top}" quat="0 0 0 1"/></body></worldbody></mujoco>""",
+            <site name="grip_0" pos="0 0 {top}"/><site name="grip_1" pos="0 0 {top}" quat="0 0 0 1"/>
+            </body></worldbody></mujoco>""",
             encoding="utf-8",
         )
     return Catalogue.load(str(folder / "catalogue.toml"))
