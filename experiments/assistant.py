@@ -251,7 +251,9 @@ class Assistant:
         self._begin_path(observation)
         replanned = self._planner.replans > replans
         if first:
-            bound = reach_bound(self._route.plan.lower_bound, self._house, self._episode, self._options)
+            bound = reach_bound(
+                round(self._route.plan.lower_bound, 6), self._house, self._episode, self._options
+            )
             self._log_plan(observation, self._route, reach_bound_m=round(bound, 6))
         elif replanned:
             self._log_plan(observation, self._route)

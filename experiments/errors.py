@@ -8,6 +8,8 @@ ExperimentError
 └── ReplayError     a recorded run cannot be replayed, or does not go as recorded
 """
 
+from collections.abc import Sequence
+
 
 class ExperimentError(Exception):
     """Base of every error raised by :mod:`experiments`."""
@@ -34,8 +36,10 @@ class ReplayError(ExperimentError):
 
     Attributes:
         step: First bad control step, or None where no step can be named.
+        verdicts: A line for every file of the run, where it got as far as that.
     """
 
-    def __init__(self, message: str, step: int | None = None) -> None:
+    def __init__(self, message: str, step: int | None = None, verdicts: Sequence[str] = ()) -> None:
         super().__init__(message)
         self.step = step
+        self.verdicts = tuple(verdicts)

@@ -1,6 +1,7 @@
 """Arrays and JSON on disk: written whole or not at all, and read with errors that name the file."""
 
 import json
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -13,15 +14,33 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.files import replacing, write_text_atomically
 
+# NumPy's name of an array's type (or `TEXT`), and its shape; None where any length will do.
+Layout = tuple[str, tuple[int | None, ...]]
+TEXT = "U"
 _LEVEL = 3  # of compression
+# What zipfile and NumPy raise on damaged files.
+_DAMAGE = (
+    OSError,
+    ValueError,
+    EOFError,
+    KeyError,
+    TypeError,
+    SyntaxError,
+    RuntimeError,
+    MemoryError,
+    OverflowError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
-def read_arrays(path: Path, dimensions: Mapping[str, int] | None = None) -> dict[str, NDArray[Any]]:
+def read_arrays(path: Path, layouts: Mapping[str, Layout] | None = None) -> dict[str, NDArray[Any]]:
     """Read every array of an NPZ.
 
     Args:
         path: The file.
-        dimensions: Number of dimensions of each array that must be there; None for no check.
+        layouts: Type and shape of each array that must be there; None for no check.
 
     Returns:
         The arrays by name, of any shape.
@@ -34,12 +53,24 @@ def read_arrays(path: Path, dimensions: Mapping[str, int] | None = None) -> dict
             arrays = {name: archive[name] for name in archive.files}
     except FileNotFoundError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+    except _DAMAGE as error:
         raise RecordError(f"{path} is cut short or damaged: {error}") from error
-    bad = sorted(n for n, d in (dimensions or {}).items() if n not in arrays or arrays[n].ndim != d)
+    bad = sorted(
+        n for n, layout in (layouts or {}).items() if n not in arrays or not _fits(arrays[n], layout)
+    )
     if bad:
-        raise RecordError(f"{path} lacks {', '.join(bad)}, or has them in another shape")
+        raise RecordError(f"{path} lacks {', '.join(bad)}, or has them in another type or shape")
     return arrays
+
+
+def _fits(array: NDArray[Any], layout: Layout) -> bool:
+    kind, shape = layout
+    same_type = array.dtype.kind == kind if kind == TEXT else array.dtype == np.dtype(kind)
+    return (
+        same_type
+        and len(shape) == array.ndim
+        and all(wanted in (None, found) for wanted, found in zip(shape, array.shape, strict=True))
+    )
 
 
 def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:

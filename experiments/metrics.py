@@ -87,11 +87,13 @@ def measure(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict
         Rows of `metrics.json`.
     """
     settings = {name: value for name, value in events[0].items() if name not in PROVENANCE}
+    ending = {name: events[-1][name] for name in ("signal", "error") if name in events[-1]}
     return {
         **settings,
         **asdict(compute_metrics(events, arrays["position"])),
         **summarise_health(events, arrays),
         "simulated_s": float(arrays["time"][-1]),
+        **ending,
     }
 
 

@@ -10,12 +10,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.files import read_arrays, save_arrays
+from experiments.files import TEXT, Layout, read_arrays, save_arrays
 from experiments.records import EventLog
 from mjsim.observation import Observation
 from mjsim.world import World
 from mjsim.world_state import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint
 
+_LAYOUTS: dict[str, Layout] = {
+    "state_hash": ("u8", (None,)),
+    "action_hash": ("u8", (None,)),
+    "log_size": ("i8", (None,)),
+    "log_hash": ("u8", (None,)),
+    "checkpoint_step": ("i8", (None,)),
+    "checkpoint_physics": ("f8", (None, None)),
+    "checkpoint_details": (TEXT, (None,)),
+    "checkpoint_hash": ("u8", (None,)),
+}
 NO_CHECKPOINT_AHEAD = 1000  # control steps to the next checkpoint, where there is none
 
 
@@ -142,9 +152,8 @@ class Recorded:
         Raises:
             RecordError: It is missing, damaged or incomplete; the message names the file.
         """
-        names = [field.name for field in dataclasses.fields(cls)]
-        arrays = read_arrays(path, {n: 2 if n == "checkpoint_physics" else 1 for n in names})
-        return cls(**{name: arrays[name] for name in names})
+        arrays = read_arrays(path, _LAYOUTS)
+        return cls(**{name: arrays[name] for name in _LAYOUTS})
 
     def checkpoint(self, number: int) -> WorldState:
         """The `number`-th checkpoint.

@@ -106,7 +106,6 @@ def _write(folder: Path, scene: Scene, result: SessionResult, wall: float) -> di
     write_json(folder / records.PLAN, result.plans)
     metrics = {
         **measure(result.log.events, arrays),
-        **{name: result.end[name] for name in ("signal", "error") if name in result.end},
         "frames_sha256": result.frames_sha256,
         "renderer": result.renderer,
         "wall_s": round(wall, 3),

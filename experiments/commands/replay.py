@@ -103,6 +103,8 @@ def run(arguments: argparse.Namespace) -> int:
                 on_progress=lambda done, total: bars.update(bar, completed=done, total=total),
             )
     except ReplayError as error:
+        for line in error.verdicts:
+            print(line)
         print(f"mjsim: {error}", file=sys.stderr)
         return 1
     print(_summary(report))
@@ -113,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _summary(report: ReplayReport) -> str:
-    text = f"{report.steps} steps verified"
+    text = "\n".join(map(str, report.verdicts)) + f"\n{report.steps} steps verified"
     if report.first:
         text += f" from the checkpoint at step {report.first} on"
     text += f"; the run ended with {report.ended!r}"

@@ -2,7 +2,8 @@
 
 from typing import Never
 
-from experiments.endings import BROKEN_OFF, PHYSICS_ERROR, LeaveSession
+from experiments import records
+from experiments.endings import PHYSICS_ERROR, LeaveSession
 from experiments.errors import RecordError
 from experiments.participants.base import WAIT, Decision, Moves, Percept
 from experiments.recording import Recording
@@ -48,7 +49,7 @@ class RecordedParticipant:
         if record.mismatch is not None and step >= record.mismatch.step:
             raise EndOfReplay
         if record.mismatch is None and step == record.steps - 1:
-            if record.reason in BROKEN_OFF:
+            if record.broke_off:
                 raise EndOfReplay
             if record.reason != PHYSICS_ERROR:
                 self._stop(step, f"the run ended here ({record.reason}), the replay goes on")
@@ -76,5 +77,5 @@ class RecordedParticipant:
 
     def _stop(self, step: int, message: str) -> Never:
         if self.mismatch is None or step < self.mismatch.step:
-            self.mismatch = Mismatch(step, message)
+            self.mismatch = Mismatch(step, message, records.RECORDING)
         raise EndOfReplay

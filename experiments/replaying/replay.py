@@ -10,10 +10,10 @@ from experiments.errors import ConfigError, RecordError
 from experiments.files import read_json
 from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
 from experiments.house import House
-from experiments.replaying.comparison import first_mismatch
 from experiments.replaying.external_view import CAMERAS, FIRST_PERSON, FREE, ExternalViewer, camera_path
 from experiments.replaying.replayer import Replayer, mismatch_error
 from experiments.replaying.run_record import RunRecord, load_run
+from experiments.replaying.verdicts import Verdict, all_mismatches, verdicts
 from experiments.session import Viewer
 from experiments.video import VideoWriter
 from mjsim.files import replacing
@@ -59,6 +59,7 @@ class ReplayReport:
         ended: Why the run ended.
         failure: Error of the physics that ended run and replay, or None.
         differences: Versions and models that differ from those of the recording, without effect.
+        verdicts: What was checked of each file.
         frames_sha256: Hash of the filmed frames, or None.
         as_filmed: Whether they equal the frames of the run's video bit for bit; None if one of the two has no film.
     """
@@ -68,6 +69,7 @@ class ReplayReport:
     ended: str
     failure: str | None
     differences: tuple[str, ...]
+    verdicts: tuple[Verdict, ...]
     frames_sha256: str | None
     as_filmed: bool | None
 
@@ -107,9 +109,10 @@ def replay(
     with ExitStack() as stack:
         viewer, video = _open_film(replayer, film, stack) if film else (None, None)
         replayer.run(viewer, on_progress)
-        mismatch = first_mismatch(replayer)
-        if mismatch is not None:
-            raise replayer.error(mismatch)
+        mismatches = all_mismatches(replayer)
+        found = verdicts(replayer, mismatches)
+        if mismatches:
+            raise replayer.error(mismatches[0], found)
     frames = video.frames_sha256 if video else None
     return ReplayReport(
         first=replayer.first,
@@ -117,6 +120,7 @@ def replay(
         ended=record.reason or "",
         failure=replayer.failure,
         differences=replayer.differences,
+        verdicts=found,
         frames_sha256=frames,
         as_filmed=_as_filmed(record, frames),
     )

@@ -1,6 +1,6 @@
 """Simulates the session of a recorded run again."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +12,13 @@ from experiments.endings import INTERRUPTED
 from experiments.errors import ReplayError
 from experiments.house import House
 from experiments.recording import Recording, provenance
-from experiments.records import Event, EventLog
+from experiments.records import RECORDING, Event, EventLog
 from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.recorded_participant import EndOfReplay, RecordedParticipant
 from experiments.replaying.run_record import WORLD_EVENTS, Mismatch, RunRecord
 from experiments.session import Session, Viewer
 from mjsim.actions import WorldEvent
-from mjsim.errors import PhysicsError, StateError
+from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.model.scene import compose
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
@@ -50,9 +50,10 @@ class Replayer:
         self.scene = compose(record.episode, house.catalogue)
         try:
             self._world = World(self.scene, WorldOptions(**record.start["world"]))
-        except TypeError as error:
+        except (TypeError, ActionError) as error:
             raise ReplayError(
-                f"the options of the recorded world are not those of this version: {error}"
+                f"the options of the recorded world are not those of this version: {error}; the first bad step is 0",
+                0,
             ) from error
         self.differences = tuple(_differences(record.start, provenance(self._world)))
         self.failure: str | None = None
@@ -70,7 +71,7 @@ class Replayer:
         if record.mismatch is not None and record.mismatch.step <= self.first:
             raise self.error(record.mismatch)
         self._observation = self._begin(number)
-        self._logged_before = len(self._log.events)
+        self._logged_before = 0 if number is None else len(self._log.events)
         steps = [int(step) for step in record.recorded.checkpoint_step]
         self.recording = Recording(self._world, self._log, checkpoints=steps, first=self.first)
         self._participant = RecordedParticipant(record, self._world, self.recording)
@@ -121,10 +122,11 @@ class Replayer:
         """Log of the replay, from `first` on."""
         return self._log.events[self._logged_before :]
 
-    def error(self, mismatch: Mismatch) -> ReplayError:
-        """The error of a mismatch: which step, what differs, and possible reasons."""
+    def error(self, mismatch: Mismatch, verdicts: Sequence[object] = ()) -> ReplayError:
+        """The error of a mismatch: which step, what differs, possible reasons, and the verdicts of the files."""
         reasons = f" (since it was recorded: {'; '.join(self.differences)})" if self.differences else ""
-        return mismatch_error(self.record.directory, self.record.start, mismatch, reasons)
+        error = mismatch_error(self.record.directory, self.record.start, mismatch, reasons)
+        return ReplayError(str(error), error.step, [str(verdict) for verdict in verdicts])
 
     def _begin(self, number: int | None) -> Observation:
         """Set world and assistant to the start of the run, or to a checkpoint; returns the state there."""
@@ -135,7 +137,7 @@ class Replayer:
         try:
             observation = self._world.restore(self.record.recorded.checkpoint(number))
         except StateError as error:
-            raise self.error(Mismatch(self.first, str(error))) from error
+            raise self.error(Mismatch(self.first, str(error), RECORDING)) from error
         self._catch_up()
         return observation
 

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments import records
+from experiments.endings import COMPLETE, PHYSICS_ERROR
 from experiments.errors import RecordError, ReplayError
-from experiments.files import read_arrays
+from experiments.event_types import check_event
+from experiments.files import TEXT, Layout, read_arrays
 from experiments.recording import Recorded, action_hashes
 from experiments.records import STATUS_CODE, Event, LogDigest, decode_action
 from mjsim.actions import Action, EventKind
@@ -23,23 +25,24 @@ from mjsim.observation import Observation
 
 STATUS = {code: status for status, code in STATUS_CODE.items()}
 WORLD_EVENTS = {kind.value: kind for kind in EventKind}
-# Dimensions of the arrays that have a row per control step.
-PER_STEP = {
-    "time": 1,
-    "position": 2,
-    "heading": 1,
-    "pitch": 1,
-    "hands": 2,
-    "object_position": 3,
-    "object_quaternion": 3,
-    "object_status": 2,
-    "action": 2,
-    "penetration_m": 1,
-    "trunk_penetration_m": 1,
-    "weld_error_m": 2,
-    "weld_error_rad": 2,
-    "settle_s": 1,
+# Arrays of the trajectory that have a row per control step: type, and shape of a row; None for one per object.
+_ROWS: dict[str, tuple[str, tuple[int | None, ...]]] = {
+    "time": ("f8", ()),
+    "position": ("f8", (2,)),
+    "heading": ("f8", ()),
+    "pitch": ("f8", ()),
+    "hands": ("i2", (2,)),
+    "object_position": ("f8", (None, 3)),
+    "object_quaternion": ("f8", (None, 4)),
+    "object_status": ("i1", (None,)),
+    "action": ("f8", (6,)),
+    "penetration_m": ("f8", ()),
+    "trunk_penetration_m": ("f8", ()),
+    "weld_error_m": ("f8", (2,)),
+    "weld_error_rad": ("f8", (2,)),
+    "settle_s": ("f8", ()),
 }
+PER_STEP = tuple(_ROWS)
 
 
 @dataclass(frozen=True)
@@ -49,10 +52,12 @@ class Mismatch:
     Attributes:
         step: The first control step that it concerns.
         message: What differs.
+        file: Name of the file that is not as recorded.
     """
 
     step: int
     message: str
+    file: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +92,11 @@ class RunRecord:
         """Why the run ended, or None where its log is cut short."""
         last = self.events[-1][1]
         return str(last.get("reason")) if last["event"] == "end" else None
+
+    @property
+    def broke_off(self) -> bool:
+        """Whether the run was ended in the middle of a control step, which is then not simulated again."""
+        return self.reason not in (*COMPLETE, PHYSICS_ERROR)
 
     def action(self, step: int) -> Action:
         """The action of a control step; raises `RecordError` if the row is not an action."""
@@ -124,7 +134,9 @@ class RunRecord:
 
     def checkpoint_before(self, time: float) -> int | None:
         """Index of the last checkpoint at or before a time, s, or None."""
-        count = int(np.sum(self.arrays["time"][self.recorded.checkpoint_step] <= time + 1e-9))
+        steps = self.recorded.checkpoint_step
+        steps = steps[(steps >= 0) & (steps < len(self.arrays["time"]))]
+        count = int(np.sum(self.arrays["time"][steps] <= time + 1e-9))
         return count - 1 if count else None
 
 
@@ -141,19 +153,29 @@ def load_run(directory: Path) -> RunRecord:
     start = _first_event(log)
     _check_format(directory, start)
     try:
-        arrays = read_arrays(directory / records.TRAJECTORY, {**PER_STEP, "unknown_objects": 1})
-        recorded = Recorded.load(directory / records.RECORDING)
+        check_event(log.split(b"\n", 1)[0])
         text = (directory / records.EPISODE).read_text(encoding="utf-8")
         episode = Episode.from_json(text)
+        arrays = read_arrays(directory / records.TRAJECTORY, _layouts(len(episode.objects)))
+        recorded = Recorded.load(directory / records.RECORDING)
     except (RecordError, EpisodeError, OSError, UnicodeDecodeError) as error:
-        raise ReplayError(f"{error}; the first bad step is 0", 0) from error
+        raise ReplayError(f"{directory}: {error}; the first bad step is 0", 0) from error
     mismatches = [*_check_arrays(arrays, recorded), *_check_log(log, recorded), *_check_checkpoints(recorded)]
     if hashlib.sha256(text.encode()).hexdigest() != start.get("episode_sha256"):
-        mismatches.append(Mismatch(0, f"{records.EPISODE} is not the episode that was run"))
+        wrong = f"{records.EPISODE} is not the episode that was run"
+        mismatches.append(Mismatch(0, wrong, records.EPISODE))
+    events, malformed = _events(log, recorded.log_size)
+    mismatches += [*malformed, *_check_settings(start, episode)]
     first = min(mismatches, key=lambda mismatch: mismatch.step, default=None)
-    return RunRecord(
-        directory, start, tuple(_events(log, recorded.log_size)), episode, arrays, recorded, first
-    )
+    return RunRecord(directory, start, tuple(events), episode, arrays, recorded, first)
+
+
+def _layouts(objects: int) -> dict[str, Layout]:
+    rows = {
+        name: (kind, (None, *(objects if size is None else size for size in row)))
+        for name, (kind, row) in _ROWS.items()
+    }
+    return {**rows, "unknown_objects": (TEXT, (None,))}
 
 
 def _first_event(log: bytes) -> Event:
@@ -161,7 +183,7 @@ def _first_event(log: bytes) -> Event:
         start = json.loads(log.split(b"\n", 1)[0])
         if isinstance(start, dict) and start.get("event") == "start":
             return start
-    except ValueError:
+    except (ValueError, RecursionError):
         pass
     raise ReplayError(f"{records.EVENTS} does not begin with a start event; the first bad step is 0", 0)
 
@@ -169,42 +191,59 @@ def _first_event(log: bytes) -> Event:
 def _check_format(directory: Path, start: Event) -> None:
     found = start.get("format")
     if found != records.LOG_FORMAT:
-        version = start.get("versions", {}).get("mjsim", "unknown")
+        versions = start.get("versions")
+        version = versions.get("mjsim", "unknown") if isinstance(versions, dict) else "unknown"
         raise ReplayError(
             f"{directory} has log format {found!r} of mjsim {version}; this version replays format "
             f"{records.LOG_FORMAT} only: replay it with the version that wrote it, or run the trial again"
         )
 
 
-def _events(log: bytes, log_size: NDArray[np.int64]) -> Iterator[tuple[int, Event]]:
-    """The events up to the first malformed line, each with the control step that logged it."""
+def _events(log: bytes, log_size: NDArray[np.int64]) -> tuple[list[tuple[int, Event]], list[Mismatch]]:
+    """The events up to the first malformed line, each with the control step that logged it; what is malformed."""
+    events: list[tuple[int, Event]] = []
     offset = 0
-    for line in log.splitlines(keepends=True):
+    for number, line in enumerate(log.splitlines(keepends=True), start=1):
+        step = max(0, int(np.searchsorted(log_size[:-1], offset, side="right")) - 1)
         try:
-            event = json.loads(line)
-        except ValueError:
-            return
-        if not isinstance(event, dict) or not {"t", "event"} <= set(event):
-            return
-        yield max(0, int(np.searchsorted(log_size[:-1], offset, side="right")) - 1), event
+            check_event(line)
+            events.append((step, json.loads(line)))
+        except (RecordError, ValueError) as error:
+            return events, [Mismatch(step, f"line {number}: {error}", records.EVENTS)]
         offset += len(line)
+    return events, []
+
+
+def _check_settings(start: Event, episode: Episode) -> Iterator[Mismatch]:
+    """Whether the start event is about this episode."""
+    names = [placed.name for placed in episode.objects]
+    for what, wrong in (
+        (
+            f"{start.get('objects')!r} objects, the episode has {len(names)}",
+            start.get("objects") != len(names),
+        ),
+        ("an order of other objects than the episode's", sorted(start.get("order", ())) != sorted(names)),
+    ):
+        if wrong:
+            yield Mismatch(0, f"{records.EVENTS}: the start event has {what}", records.EVENTS)
 
 
 def _check_arrays(arrays: Mapping[str, NDArray[Any]], recorded: Recorded) -> Iterator[Mismatch]:
     steps = len(recorded.state_hash)
-    lengths = {f"{records.TRAJECTORY}: {name}": len(arrays[name]) for name in PER_STEP}
-    lengths[f"{records.RECORDING}: action_hash"] = len(recorded.action_hash)
-    lengths[f"{records.RECORDING}: log_size"] = len(recorded.log_size) - 1
-    lengths[f"{records.RECORDING}: log_hash"] = len(recorded.log_hash) - 1
-    for name, length in lengths.items():
+    lengths = {(records.TRAJECTORY, name): len(arrays[name]) for name in PER_STEP}
+    lengths[records.RECORDING, "action_hash"] = len(recorded.action_hash)
+    lengths[records.RECORDING, "log_size"] = len(recorded.log_size) - 1
+    lengths[records.RECORDING, "log_hash"] = len(recorded.log_hash) - 1
+    for (file, name), length in lengths.items():
         if length != steps:
             step = max(0, min(length, steps))
-            yield Mismatch(step, f"{name} has {length} steps where the states have {steps}")
+            yield Mismatch(step, f"{file}: {name} has {length} steps where the states have {steps}", file)
     actions = arrays["action"][:steps]
     count = min(len(actions), len(recorded.action_hash))
     bad = np.flatnonzero(action_hashes(actions[:count]) != recorded.action_hash[:count])
     if bad.size:
-        yield Mismatch(int(bad[0]), f"{records.TRAJECTORY}: the action is not the one that was recorded")
+        what = f"{records.TRAJECTORY}: the action is not the one that was recorded"
+        yield Mismatch(int(bad[0]), what, records.TRAJECTORY)
 
 
 def _check_log(log: bytes, recorded: Recorded) -> Iterator[Mismatch]:
@@ -213,29 +252,32 @@ def _check_log(log: bytes, recorded: Recorded) -> Iterator[Mismatch]:
     for step, (size, expected) in enumerate(zip(recorded.log_size.tolist(), recorded.log_hash, strict=False)):
         begin, end, at = end, size, max(0, step - 1)
         if size < begin:
-            yield Mismatch(at, f"{records.RECORDING}: log_size goes backwards")
+            yield Mismatch(at, f"{records.RECORDING}: log_size goes backwards", records.RECORDING)
             return
         digest.update(log[begin:size])
         if size > len(log):
-            yield Mismatch(at, f"{records.EVENTS} is cut short: {len(log)} bytes, and more were written here")
+            what = f"{records.EVENTS} is cut short: {len(log)} bytes, and more were written here"
+            yield Mismatch(at, what, records.EVENTS)
             return
         if digest.hash != int(expected):
             first = log[:begin].count(b"\n") + 1
             last = first + max(0, log[begin:size].count(b"\n") - 1)
             lines = f"line {first}" + (f" to {last}" if last > first else "")
-            yield Mismatch(at, f"{records.EVENTS} is not as written, at {lines}")
+            yield Mismatch(at, f"{records.EVENTS} is not as written, at {lines}", records.EVENTS)
             return
     if end != len(log):
-        yield Mismatch(max(0, len(recorded.log_size) - 2), f"{records.EVENTS} goes on after its end")
+        last = max(0, len(recorded.log_size) - 2)
+        yield Mismatch(last, f"{records.EVENTS} goes on after its end", records.EVENTS)
 
 
 def _check_checkpoints(recorded: Recorded) -> Iterator[Mismatch]:
     steps, numbers = len(recorded.state_hash), recorded.checkpoint_step.tolist()
     count = {len(getattr(recorded, f"checkpoint_{name}")) for name in ("step", "physics", "details", "hash")}
-    if len(count) > 1 and numbers:
-        yield Mismatch(numbers[min(count)], f"{records.RECORDING}: checkpoints are missing")
+    if len(count) > 1:
+        first = numbers[min(count)] if min(count) < len(numbers) else 0
+        yield Mismatch(max(0, first), f"{records.RECORDING}: checkpoints are missing", records.RECORDING)
         return
     for number, step in enumerate(numbers):
         if not 0 <= step < steps or not recorded.checkpoint_is_intact(number):
             what = f"{records.RECORDING}: the checkpoint is not the one that was recorded"
-            yield Mismatch(max(0, min(step, steps)), what)
+            yield Mismatch(max(0, min(step, steps)), what, records.RECORDING)

@@ -1,0 +1,208 @@
+"""The events of a log, one type for each line of `events.jsonl`; docs/data.md is made from them."""
+
+from typing import Annotated, Any
+
+import msgspec
+
+from experiments.errors import RecordError
+from mjsim.actions import EventKind, Refusal
+from planner.plan import Status, VisitKind
+
+Seconds = Annotated[float, msgspec.Meta(ge=0.0)]
+Metres = Annotated[float, msgspec.Meta(ge=0.0)]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+VisitPair = tuple[VisitKind, str]
+
+
+class Logged(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="event", tag=str.lower, kw_only=True
+):
+    """A line of the log.
+
+    Attributes:
+        t: Simulated time, s.
+    """
+
+    t: Seconds
+
+
+class Start(Logged, frozen=True, forbid_unknown_fields=False):
+    """First line: what was run, and on what. The settings of the trial stand here too, as in `metrics.json`.
+
+    Attributes:
+        format: Format of the log.
+        versions: Versions of mjsim, its physics code, MuJoCo and NumPy, and the machine's architecture.
+        model: Fingerprint of the compiled house with its objects, without what is only drawn.
+        world: Options of the world: timestep, speeds, reaches, fidelity.
+        episode_sha256: SHA-256 of `episode.json`.
+        order: Object names in the participant's own random order.
+    """
+
+    format: int
+    versions: dict[str, str]
+    model: str
+    world: dict[str, float | str]
+    episode_sha256: str
+    order: list[str]
+    objects: Count
+    assistance: str
+    house: str
+    time_limit: Seconds
+
+
+class Plan(Logged, frozen=True):
+    """The assistant made a plan: at the start, where the person did something else, or a better one.
+
+    Attributes:
+        cost_m: Length of the planned tour from where the person was, from place to place, m.
+        lower_bound_m: No tour between these places is shorter, m.
+        status: `optimal` if the planner proved it, else `feasible`.
+        visits: The tour: what is done, with which object.
+        improved: Whether it is a better plan for the same state of the task.
+        reach_bound_m: Of the first plan: the least walk for somebody who reaches, m (docs/metrics.md).
+    """
+
+    cost_m: Metres
+    lower_bound_m: Metres
+    status: Status
+    visits: list[VisitPair]
+    improved: bool = False
+    reach_bound_m: Metres | None = None
+
+
+class Attempt(Logged, frozen=True):
+    """The person tried to pick or place something.
+
+    Attributes:
+        action: `pick` or `place`.
+        object: The object, or null where none was named and none was found.
+        applied: Whether the motion began.
+        refusal: Why not, or null.
+    """
+
+    action: VisitKind
+    object: str | None
+    applied: bool
+    refusal: Refusal | None
+
+
+class Visit(Logged, frozen=True):
+    """A pick or place succeeded.
+
+    Attributes:
+        kind: `pick` or `place`.
+        object: The object.
+        suggested: The visit that was suggested, or null.
+        deviated: Whether it is another one.
+        alternatives: How many other visits were feasible.
+        tied_alternatives: How many of them place another object into the bin of the suggested visit.
+        tied: Whether the visit deviates only in which object goes first into that bin.
+        position: Where the person stood, m.
+        geodesic_m: Shortest walk from where the person stood at the visit before, m.
+        location_m: The planner's distance from the place of the visit before to the place of this one, m.
+        regret_m: By how much the visit makes the rest of the task longer than the best one, m; null where not known,
+            absent without regrets.
+        suggested_regret_m: The same of the suggested visit, m.
+    """
+
+    kind: VisitKind
+    object: str
+    suggested: VisitPair | None
+    deviated: bool
+    alternatives: Count
+    tied_alternatives: Count
+    tied: bool
+    position: tuple[float, float]
+    geodesic_m: Metres
+    location_m: Metres
+    regret_m: Metres | None = None
+    suggested_regret_m: Metres | None = None
+
+
+class Regret(Logged, frozen=True):
+    """Regrets of a visit that were found after the task.
+
+    Attributes:
+        visit: Number of the visit, from 0.
+        regret_m: As in `visit`.
+        suggested_regret_m: As in `visit`.
+    """
+
+    visit: Count
+    regret_m: Metres | None = None
+    suggested_regret_m: Metres | None = None
+
+
+class Familiarisation(Logged, frozen=True):
+    """The person got to know the house before the task.
+
+    Attributes:
+        duration_s: For how long, s.
+    """
+
+    duration_s: Seconds
+
+
+class End(Logged, frozen=True):
+    """Last line.
+
+    Attributes:
+        reason: Why the trial ended.
+        error: What went wrong, where something did.
+    """
+
+    reason: str
+    error: str | None = None
+
+
+class Outcome(Logged, frozen=True):
+    """Something happened in the world.
+
+    Attributes:
+        object: The object.
+        receptacle: The receptacle concerned, or null.
+    """
+
+    object: str
+    receptacle: str | None
+
+
+OUTCOMES = {
+    EventKind.PICKED: "an object was gripped and lifted",
+    EventKind.PICK_FAILED: "a pick was begun but did not succeed",
+    EventKind.PLACED: "an object came to rest in its receptacle",
+    EventKind.PLACE_FAILED: "a place was begun, but the object did not end up in the receptacle",
+    EventKind.GRIP_LOST: "a carried object slipped out of a hand",
+    EventKind.DISLODGED: "a delivered object left its receptacle again",
+    EventKind.EJECTED: "an object was faster than anything could throw it (docs/health.md)",
+    EventKind.TUNNELLED: "an object went through something solid (docs/health.md)",
+}
+TYPES: tuple[type[Logged], ...] = (Start, Familiarisation, Plan, Attempt, Visit, Regret, End)
+
+
+def _decoder() -> msgspec.json.Decoder[Any]:
+    union: Any = Start
+    outcomes = [
+        msgspec.defstruct(
+            kind.name.title(), [], bases=(Outcome,), frozen=True, tag_field="event", tag=kind.value
+        )
+        for kind in EventKind
+    ]
+    for member in (*TYPES[1:], *outcomes):
+        union = union | member
+    return msgspec.json.Decoder(union)
+
+
+_DECODER = _decoder()
+
+
+def check_event(line: bytes) -> None:
+    """Check that a line of a log is an event with the fields of its kind.
+
+    Raises:
+        RecordError: It is not; the message says where.
+    """
+    try:
+        _DECODER.decode(line)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise RecordError(f"events.jsonl has a line that is no event: {error}") from error
