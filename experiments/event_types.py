@@ -149,9 +149,11 @@ class End(Logged, frozen=True):
     Attributes:
         reason: Why the trial ended.
         error: What went wrong, where something did.
+        signal: Name of the signal that interrupted it, where one did.
     """
 
     reason: str
+    signal: str | None = None
     error: str | None = None
 
 

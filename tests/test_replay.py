@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from experiments import records
+from experiments.checksums import write_checksums
 from experiments.cli import main
 from experiments.errors import RecordError, ReplayError
 from experiments.files import read_arrays, read_json
@@ -104,6 +105,7 @@ def rewrite_log(folder, edit):
     sizes = np.array([len(part) for part in parts], np.int64)
     hashes = [int.from_bytes(hashlib.sha1(part).digest()[:8], "little") for part in parts]
     change(folder, records.RECORDING, log_size=sizes, log_hash=np.array(hashes, np.uint64))
+    write_checksums(folder, records.FILES)
 
 
 def bad_step(folder, house, **options):

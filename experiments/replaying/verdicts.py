@@ -33,12 +33,14 @@ class Verdict:
 
 
 def all_mismatches(replayer: Replayer) -> list[Mismatch]:
-    """Everything in which a finished replay or the files on disk differ from the record, the earliest first."""
-    found = list(simulated_mismatches(replayer))
+    """Everything in which a finished replay or the files on disk differ from the record.
+
+    The earliest step comes first; that a file has another checksum comes last, as it says the least.
+    """
+    found = sorted(simulated_mismatches(replayer), key=lambda mismatch: mismatch.step)
     if not found:
         found += derived_mismatches(replayer.record)
-    found += checksum_mismatches(replayer.record)
-    return sorted(found, key=lambda mismatch: mismatch.step)
+    return [*found, *checksum_mismatches(replayer.record)]
 
 
 def verdicts(replayer: Replayer, mismatches: Sequence[Mismatch]) -> tuple[Verdict, ...]:
