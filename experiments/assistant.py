@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from experiments.participants.base import Choice, Guidance
 from experiments.reach_bound import reach_bound
 from experiments.records import EventLog
 from experiments.regrets import Regrets
-from experiments.shown_path import TOLERANCE, ShownPath
+from experiments.shown_path import TOLERANCE, PathsToNext
 from experiments.user_code import shown_by
 from experiments.visit_fields import PlaceDistances, alternatives, as_json
 from hud.conditions import condition
@@ -23,34 +22,11 @@ from mjsim.actions import EventKind, WorldEvent
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
 from planner.plan import Status, Visit, VisitKind
-from planner.route import XY, Route, TaskState
+from planner.route import XY, Route, RoutePlanner, TaskState
 
 PLAN_ROLES = frozenset({BREADCRUMB, GOAL})
 
 VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLACE}
-
-
-class RoutePlanner(Protocol):
-    """Keeps the route of a task; the replanners of `planner` do, and a replay with the logged plans.
-
-    Attributes:
-        replans: How often `update` made a new plan because the old one no longer fitted.
-    """
-
-    replans: int
-
-    @property
-    def pending(self) -> bool:
-        """Whether `poll` may have a better route."""
-        ...
-
-    def update(self, state: TaskState, *, shown: bool = True) -> Route:
-        """The route for the task as it is now; `shown` tells whether somebody sees it."""
-        ...
-
-    def poll(self, state: TaskState) -> Route | None:
-        """A better route for the same task, if one was found meanwhile."""
-        ...
 
 
 class Assistant:
@@ -97,8 +73,7 @@ class Assistant:
         }
         self._deliveries = {name: _xy(approach) for name, approach in self._approaches.items()}
         self._route: Route | None = None
-        self._segment = ShownPath(self._house.geodesics, rerouted=False)
-        self._path = ShownPath(self._house.geodesics, rerouted=True)
+        self._paths = PathsToNext(self._house.geodesics)
         self._visits = 0
         self.shown_roles: frozenset[str] = frozenset()
         self.shows_plan = self._rerouted = False
@@ -129,9 +104,7 @@ class Assistant:
             self._improve(observation)
         visit = self._next
         if visit is not None:
-            places = self._places(observation, visit)
-            self._segment.follow(observation.position, *places)
-            self._path.follow(observation.position, *places)
+            self._paths.follow(observation.position, *self._places(observation, visit))
 
     @property
     def expecting(self) -> bool:
@@ -147,19 +120,23 @@ class Assistant:
         """
         visit = self._next
         if visit is not None:
-            self._path.follow_walk(positions, *self._places(observation, visit))
+            self._paths.path.follow_walk(positions, *self._places(observation, visit))
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
         """Put a message about an event or a refusal into the message bar."""
         self._board.show_message(key, time, object_name)
+
+    def scroll(self, rows: int) -> None:
+        """Scroll the task list by so many rows, positive towards its end."""
+        self._board.scroll(rows)
 
     def hud_state(self, observation: Observation, camera: CameraView | None = None) -> HudState:
         """What the HUD shows now; a condition needs the eye camera to point to a goal out of view."""
         view = self._board.view(
             observation,
             visits=self._route.visits if self._route else (),
-            segment=None if self._next is None else self._segment.points,
-            path=None if self._next is None else self._path.ahead(observation.position),
+            segment=None if self._next is None else self._paths.segment.points,
+            path=None if self._next is None else self._paths.path.ahead(observation.position),
             camera=camera,
             regrets=self._regrets.known,
         )
@@ -170,7 +147,7 @@ class Assistant:
         visit = self._next
         if visit is None or BREADCRUMB not in self.shown_roles:
             return None
-        shown = self._path if self._rerouted else self._segment
+        shown = self._paths.path if self._rerouted else self._paths.segment
         return Guidance(visit, shown.points, self._goal(observation, visit), TOLERANCE)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
@@ -276,8 +253,7 @@ class Assistant:
         visit = self._next
         if visit is not None:
             places = self._places(observation, visit)
-            self._segment.begin(self._last_visit_at, *places)
-            self._path.begin(observation.position, *places)
+            self._paths.begin(self._last_visit_at, observation.position, *places)
 
     def _log_plan(self, observation: Observation, route: Route, **more: bool | float) -> None:
         # Cost and bound are those of the state that the plan was made for; a better plan comes a little later.

@@ -57,6 +57,7 @@ class TaskBoard:
         self.episode = episode
         self._order = tuple(order)
         self._done: list[TaskStep] = []
+        self._scroll = 0
         self._latest = _Shown("started", -math.inf)
         self._replanned_at: float | None = None
         self._objects: dict[int, TaskObject] = {}  # by number, ascending
@@ -65,6 +66,12 @@ class TaskBoard:
     def note_visit(self, visit: Visit) -> None:
         """Note a successful pick or place."""
         self._done.append(task_step(visit))
+        self._scroll = 0
+
+    def scroll(self, rows: int) -> None:
+        """Scroll the task list by so many rows, positive towards its end; it follows the task again from a visit on."""
+        rows_at_most = 2 * len(self.episode.objects)
+        self._scroll = min(max(self._scroll + rows, -rows_at_most), rows_at_most)
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
         """Show a message about an event or refusal from `time` s on; it replaces the one before."""
@@ -114,6 +121,7 @@ class TaskBoard:
             camera=camera,
             heading=observation.heading,
             bounds=self.house.bounds,
+            scroll=self._scroll,
             alternatives=lambda: alternatives(regrets()),
         )
 

@@ -180,6 +180,12 @@ class Session:
         if not (self._rollouts and self._roll_out(decision)):
             self._step(self._action(decision))
 
+    def scroll(self, rows: int) -> None:
+        """Scroll the task list by so many rows, positive towards its end; logged, so that a replay shows the same."""
+        self._log.append(self._now.time, "scroll", rows=rows)
+        self._assistant.scroll(rows)
+        self._hud = None
+
     def _log_end(self, time: float, reason: str, **details: str) -> None:
         """Log the end; a record has one state at least."""
         if not self.recording.step:

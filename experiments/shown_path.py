@@ -78,3 +78,29 @@ class ShownPath:
     def _renew(self, position: Point, target: Point, goal: Point) -> None:
         self.begin(position, target, goal)
         _ = self.points
+
+
+class PathsToNext:
+    """What a condition may show of the way to the next visit.
+
+    Args:
+        geodesics: Finds shortest paths.
+
+    Attributes:
+        segment: The segment of the plan, from where the last visit ended.
+        path: The path from where the person is.
+    """
+
+    def __init__(self, geodesics: Geodesics) -> None:
+        self.segment = ShownPath(geodesics, rerouted=False)
+        self.path = ShownPath(geodesics, rerouted=True)
+
+    def begin(self, last_visit: Point, position: Point, target: Point, goal: Point) -> None:
+        """Lead to another visit; all m, shape (2,): where the last one ended, the person, and as in `ShownPath`."""
+        self.segment.begin(last_visit, target, goal)
+        self.path.begin(position, target, goal)
+
+    def follow(self, position: Point, target: Point, goal: Point) -> None:
+        """As `ShownPath.follow`."""
+        self.segment.follow(position, target, goal)
+        self.path.follow(position, target, goal)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from planner.errors import ProblemError
 from planner.plan import Plan, Visit, VisitKind
@@ -77,3 +78,26 @@ def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | 
         else:
             carried.remove(name)
     return tuple(visits[done:])
+
+
+class RoutePlanner(Protocol):
+    """Keeps the route of a task; the replanners of `planner` do, and a replay with the logged plans.
+
+    Attributes:
+        replans: How often `update` made a new plan because the old one no longer fitted.
+    """
+
+    replans: int
+
+    @property
+    def pending(self) -> bool:
+        """Whether `poll` may have a better route."""
+        ...
+
+    def update(self, state: TaskState, *, shown: bool = True) -> Route:
+        """The route for the task as it is now; `shown` tells whether somebody sees it."""
+        ...
+
+    def poll(self, state: TaskState) -> Route | None:
+        """A better route for the same task, if one was found meanwhile."""
+        ...

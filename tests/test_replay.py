@@ -22,6 +22,7 @@ from experiments.house import House
 from experiments.records import read_events
 from experiments.replaying.replay import ReplayFilm, replay
 from experiments.replaying.run_record import load_run
+from experiments.session import Session
 from experiments.trial import run_trial
 from experiments.trial_config import TrialConfig
 from mjsim.errors import PhysicsError
@@ -509,6 +510,32 @@ def test_a_replay_films_the_same_frames(film, house, tmp_path):
     report = frames_of(film, house, tmp_path)
     assert report.frames_sha256 == read_json(film / records.METRICS)["frames_sha256"]
     assert report.as_filmed
+
+
+def test_a_replay_shows_the_list_scrolled_as_it_was(house, tmp_path):
+    rows, advance = {0: 2, 10: 3, 60: -1, 90: 20}, Session.advance  # scrolled by so many, by control step
+    frames = []
+
+    def scrolling(session):
+        if session.recording.step in rows:
+            session.scroll(rows[session.recording.step])
+        advance(session)
+
+    config = TrialConfig(objects=6, assistance="optimal", seed=3, time_limit=5.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.video.VideoWriter.write", lambda _, frame: frames.append(frame))
+        run_trial(config, tmp_path / "plain", film=SMALL, topdown=False, house=house)
+        plain, frames[:] = frames.copy(), []
+        with patch.context() as scroll:
+            scroll.setattr(Session, "advance", scrolling)
+            run_trial(config, tmp_path / "run", film=SMALL, topdown=False, house=house)
+        filmed = frames.copy()
+        differ = [not np.array_equal(a, b) for a, b in zip(plain, filmed, strict=True)]
+        assert all(differ[:40]), "the list is scrolled until a visit is made"
+        for start in (0.0, 3.0):
+            frames.clear()
+            first = frames_of(tmp_path / "run", house, tmp_path, start=start).first
+            assert all(np.array_equal(a, b) for a, b in zip(filmed[first:], frames, strict=True))
 
 
 def test_a_replay_from_a_checkpoint_films_the_same_frames(film, house, tmp_path):

@@ -16,7 +16,7 @@ from experiments.records import RECORDING, Event, EventLog
 from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.recorded_participant import EndOfReplay, RecordedParticipant
 from experiments.replaying.run_record import WORLD_EVENTS, Mismatch, RunRecord
-from experiments.session import Session, Viewer
+from experiments.session import Progress, Session, Viewer
 from mjsim.actions import WorldEvent
 from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.model.scene import compose
@@ -74,6 +74,7 @@ class Replayer:
         self._logged_before = 0 if number is None else len(self._log.events)
         steps = [int(step) for step in record.recorded.checkpoint_step]
         self.recording = Recording(self._world, self._log, checkpoints=steps, first=self.first)
+        self._scrolls = [e for step, e in record.events if e["event"] == "scroll" and step >= self.first]
         self._participant = RecordedParticipant(record, self._world, self.recording)
 
     def run(self, viewer: Viewer | None, on_progress: Callable[[int, int], None]) -> None:
@@ -93,9 +94,15 @@ class Replayer:
             viewer=viewer,
         )
         self._replanner.clock = lambda: float(self._world.data.time)
+
+        def advanced(_: Progress) -> None:
+            self._scroll(session)
+            on_progress(recording.step, record.steps)
+
         try:
             session.start(self._observation)
-            reason = session.finish(lambda _: on_progress(recording.step, record.steps))
+            self._scroll(session)
+            reason = session.finish(advanced)
             if reason == INTERRUPTED:
                 raise KeyboardInterrupt
         except EndOfReplay:
@@ -106,6 +113,11 @@ class Replayer:
         except PhysicsError as error:
             self.failure = str(error)
         self._trajectory = session.trajectory
+
+    def _scroll(self, session: Session) -> None:
+        """Scroll the task list where the log says that it was scrolled in the present state."""
+        while self._scrolls and self._scrolls[0]["t"] <= round(session.progress.time, 6):
+            session.scroll(int(self._scrolls.pop(0)["rows"]))
 
     @property
     def mismatch(self) -> Mismatch | None:
@@ -152,6 +164,8 @@ class Replayer:
             observation = record.observation(step + 1)
             self._replanner.clock = _constant(observation.time)
             for event in events_of_step.get(step, []):
+                if event["event"] == "scroll":
+                    assistant.scroll(int(event["rows"]))
                 if event["event"] == "attempt" and event["refusal"] is not None:
                     assistant.show_message(event["refusal"], observation.time, event["object"])
             events = [_world_event(e) for e in events_of_step.get(step, []) if e["event"] in WORLD_EVENTS]
