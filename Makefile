@@ -34,7 +34,7 @@ assets: $(READY) ## Make textures and meshes under models/ anew
 	PYTHONPATH=tools $(BIN)/python -m authoring
 
 pictures: $(READY) ## Make the pictures of the README anew
-	$(BIN)/mjsim gallery --out docs/pictures
+	$(BIN)/mjsim gallery --force --out docs/pictures
 
 clean: ## Remove the environment, caches and runs
 	rm -rf $(VENV) runs dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -3,11 +3,6 @@
 import dataclasses
 import functools
 import itertools
-import multiprocessing
-import multiprocessing.connection
-import os
-import signal
-import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
@@ -21,9 +16,12 @@ from experiments.errors import ConfigError
 from experiments.files import read_json
 from experiments.house import House
 from experiments.run_directory import TRIALS, check_batch_folder
+from experiments.signals import signals_postponed
 from experiments.table import write_tables
 from experiments.trial import run_trial
 from experiments.trial_config import TrialConfig
+from experiments.workers import worker_pool
+from mjsim.files import remove_leftovers
 
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
 
@@ -76,7 +74,7 @@ def run_batch(
 
     Raises:
         ConfigError: `workers` is below 1.
-        OSError: A table cannot be written.
+        OSError: A table cannot be written, or a worker was killed.
     """
     if workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
@@ -85,21 +83,20 @@ def run_batch(
     missing = [(path, config) for path, config in folders.items() if not _is_done(path)]
     progress = BatchProgress(done=0, resumed=len(folders) - len(missing), failed=0, total=len(folders))
     on_progress(progress)
-    # Spawned, not forked: a forked GL context or thread pool does not work.
-    pool = ProcessPoolExecutor(
-        workers, mp_context=multiprocessing.get_context("spawn"), initializer=_start_worker
-    )
     try:
-        for failure in _results(pool, iter(missing), workers):
-            field = "done" if failure is None else "failed"
-            count = getattr(progress, field) + 1
-            progress = dataclasses.replace(progress, failure=failure, **{field: count})
-            on_progress(progress)
+        with worker_pool(max(1, min(workers, len(missing)))) as pool:
+            for failure in _results(pool, iter(missing), workers):
+                field = "done" if failure is None else "failed"
+                count = getattr(progress, field) + 1
+                progress = dataclasses.replace(progress, failure=failure, **{field: count})
+                on_progress(progress)
     finally:
-        pool.shutdown(cancel_futures=True)
-        rows = [read_json(path / records.METRICS) for path in folders if _is_done(path)]
-        if rows:
-            write_tables(out, rows)
+        with signals_postponed() as signals:
+            signals.save()
+            remove_leftovers(out / TRIALS)
+            rows = [read_json(path / records.METRICS) for path in folders if _is_done(path)]
+            if rows:
+                write_tables(out, rows)
     return rows
 
 
@@ -143,16 +140,3 @@ def _run(config: TrialConfig, out: Path) -> str | None:
 
 def _failure(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
-
-
-def _start_worker() -> None:
-    """Leave Ctrl-C to the parent process, and exit when it is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_exit_with, args=(parent.sentinel,), daemon=True).start()
-
-
-def _exit_with(sentinel: int) -> None:
-    multiprocessing.connection.wait([sentinel])
-    os._exit(1)

@@ -5,11 +5,13 @@ import importlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
+
+from experiments.failures import USAGE_ERROR, drop_output, end_with
+from experiments.signals import exit_code, signal_of, signals_raised
+from mjsim.gl_choice import postpone_gl
 
 COMMANDS = ("run", "replay", "batch", "plan", "house", "gallery", "bench", "doctor")
-FAILED = 1
-USAGE_ERROR = 2
-INTERRUPTED = 130
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
@@ -37,7 +39,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     Args:
         command: The only command to load, so that `mjsim plan` starts fast; None for all.
     """
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="mjsim",
         description=DESCRIPTION,
         epilog=EPILOG,
@@ -63,37 +65,49 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+class Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong with a command line."""
+
+    def error(self, message: str) -> NoReturn:
+        """End the process."""
+        said = " ".join(message.split())
+        self.exit(USAGE_ERROR, f"mjsim: {said}; `{self.prog} --help` lists the options\n")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    """Run the command line.
+
+    Returns:
+        The exit code: 0 done, 1 failed, 2 bad input, 70 a bug of ours, 128 + n stopped by signal n.
+    """
     words = sys.argv[1:] if argv is None else list(argv)
     if (here := str(Path.cwd())) not in sys.path:
         sys.path.append(here)  # for participants, conditions and planners of one's own
+    postpone_gl()
+    with signals_raised():
+        try:
+            return _run(words)
+        except KeyboardInterrupt as stop:
+            number = signal_of(stop)
+            print(f"mjsim: stopped by {number.name}; what was finished is kept", file=sys.stderr)
+            return exit_code(number)
+        except Exception as error:
+            return end_with(error, words)
+
+
+def _run(words: list[str]) -> int:
     command = words[0] if words and words[0] in COMMANDS else None
     arguments = parser(command).parse_args(words)
-    try:
-        return int(arguments.run(arguments))
-    except KeyboardInterrupt:
-        print("mjsim: interrupted; what was finished is kept", file=sys.stderr)
-        return INTERRUPTED
-    except Exception as error:
-        code = exit_code(error)
-        if code is None:
+    code = int(arguments.run(arguments))
+    if sys.stdout is not None:
+        try:
+            sys.stdout.flush()
+        except BrokenPipeError:
             raise
-        print(f"mjsim: {error}", file=sys.stderr)
-        return code
-
-
-def exit_code(error: Exception) -> int | None:
-    """The exit code of an error whose message is enough for the user; None for a bug, which needs its traceback."""
-    # Imported only on errors, so that `mjsim plan` starts fast.
-    from experiments.errors import ExperimentError
-    from hud.errors import HudError
-    from mjsim.errors import MjsimError, PhysicsError
-    from planner.errors import PlannerError
-
-    if isinstance(error, PhysicsError | OSError):  # a full disk, or a folder that cannot be written
-        return FAILED
-    return USAGE_ERROR if isinstance(error, ExperimentError | MjsimError | PlannerError | HudError) else None
+        except OSError as error:
+            drop_output()
+            raise OSError(error.errno, f"cannot write to standard output: {error.strerror}") from error
+    return code
 
 
 if __name__ == "__main__":

@@ -157,6 +157,7 @@ def _folder(folder: Path) -> Iterator[None]:
     made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     try:
+        _check_writable(folder)
         yield
     finally:
         for parent in made:
@@ -176,8 +177,11 @@ def _place(path: Path) -> Path:
 
 
 def _check_writable(folder: Path) -> None:
-    with tempfile.TemporaryFile(dir=folder):  # has no name, so nothing can be left behind
-        pass
+    try:
+        with tempfile.TemporaryFile(dir=folder):  # has no name, so nothing can be left behind
+            pass
+    except OSError as error:
+        raise OSError(error.errno, f"cannot be written to ({error.strerror})", str(folder)) from error
 
 
 def _listed(names: list[str]) -> str:

@@ -5,10 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mjsim.conflicts import PACKAGES, hidden_package, shared_names
 from mjsim.errors import RenderError
-from mjsim.render.context import EGL_PACKAGES, GlInfo, gl_info
+from mjsim.gl_choice import BACKENDS, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
+
+if TYPE_CHECKING:
+    from mjsim.render.context import GlInfo
 
 VENDOR_FOLDER = Path("/usr/share/glvnd/egl_vendor.d")
 DISTRIBUTIONS = ("mujoco", "dm-control", "numpy", "ortools", "opencv-python-headless", "pyopengl")
@@ -34,7 +38,7 @@ class EnvironmentReport:
     versions: Mapping[str, str | None]
     hidden: tuple[str, ...]
     egl_vendors: tuple[str, ...]
-    gl: GlInfo | None
+    gl: "GlInfo | None"
     problem: str | None
     advice: tuple[str, ...]
 
@@ -65,9 +69,14 @@ def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport
     gl: GlInfo | None = None
     problem: str | None = None
     try:
+        # Where MuJoCo or NumPy is broken, this cannot even be imported, and the report has to say so.
+        from mjsim.render.context import gl_info
+
         gl = gl_info()
     except RenderError as error:
         problem = str(error)
+    except Exception as error:
+        problem = f"{type(error).__name__}: {' '.join(str(error).split())}"
     versions = {name: _version(name) for name in DISTRIBUTIONS}
     vendors = egl_vendors(vendor_folder)
     return EnvironmentReport(
@@ -88,13 +97,15 @@ def egl_vendors(folder: Path = VENDOR_FOLDER) -> tuple[str, ...]:
 
 
 def advise(
-    versions: Mapping[str, str | None], vendors: tuple[str, ...], gl: GlInfo | None
+    versions: Mapping[str, str | None], vendors: tuple[str, ...], gl: "GlInfo | None"
 ) -> tuple[str, ...]:
     """What to do about missing distributions, a missing OpenGL or an unused GPU."""
     steps = [
         f"{name} is missing: pip install {name}" for name, version in versions.items() if version is None
     ]
-    if gl is None:
+    if gl is None and chosen_gl() not in (*BACKENDS, *DISABLED):
+        steps.append(f"no frame can be drawn: unset {VARIABLE}, or set it to {' or '.join(BACKENDS)}")
+    elif gl is None:
         steps.append(
             f"no frame can be drawn: on Debian or Ubuntu, apt-get install {' '.join(EGL_PACKAGES)}; "
             "with an NVIDIA GPU also the driver's libnvidia-gl package"

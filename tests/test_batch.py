@@ -28,7 +28,7 @@ COMMAND = [
 
 
 def finished(out):
-    return sorted(out.glob(f"trials/*/{METRICS}"))
+    return sorted(out.glob(f"trials/[!.]*/{METRICS}"))
 
 
 def test_a_killed_batch_goes_on_where_it_stopped(tmp_path):

@@ -5,11 +5,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
-    Progress,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -26,6 +24,7 @@ from experiments.commands.options import (
     text_list,
     trial_options,
 )
+from experiments.commands.terminal import error_console, progress_bars
 from experiments.design import Design, factorial, read_design
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
@@ -106,7 +105,7 @@ def _design(arguments: argparse.Namespace) -> Design:
 def run(arguments: argparse.Namespace) -> int:
     """Run the batch with a progress bar; 1 if a trial failed."""
     design = _design(arguments)
-    console = Console(stderr=True, highlight=False)
+    console = error_console()
     columns = (
         TextColumn("trials"),
         BarColumn(),
@@ -116,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
         TimeRemainingColumn(),
     )
     failed = 0
-    with Progress(*columns, console=console) as bars:
+    with progress_bars(console, *columns) as bars:
         bar = bars.add_task("trials", total=None)
 
         def show(progress: BatchProgress) -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from experiments.commands.options import add_command, int_list
+from experiments.commands.options import add_command, add_force, int_list
 from experiments.errors import ConfigError
+from experiments.run_directory import check_file
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
@@ -69,6 +70,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("name", metavar="NAME", help=f"benchmark: {names}")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the result as well")
+    add_force(parser, "replace a picture that exists")
     group = parser.add_argument_group("size of the benchmark, where it has such an option")
     for name, kind, metavar, text in OPTIONS:
         group.add_argument(f"--{name}", type=kind, metavar=metavar, help=text)
@@ -142,7 +144,10 @@ def options(module: ModuleType, arguments: argparse.Namespace) -> dict[str, Any]
 def run(arguments: argparse.Namespace) -> int:
     """Measure and print."""
     module = benchmark(arguments.name)
-    result = module.measure(**options(module, arguments))
+    given = options(module, arguments)
+    if arguments.picture is not None:
+        check_file(arguments.picture, replace=arguments.force)
+    result = module.measure(**given)
     if arguments.picture is not None:
         module.picture(result, arguments.picture)
     if arguments.json:

@@ -4,11 +4,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
-from experiments.commands.options import add_command, add_frame, film_config
+from experiments.commands.options import add_command, add_force, add_frame, film_config
+from experiments.commands.terminal import error_console
 from experiments.first_person import FilmConfig
 from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
+from experiments.run_directory import check_file
 from experiments.trial_config import TrialConfig
 
 SEED = 7
@@ -33,6 +33,7 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the pictures")
     add_frame(parser, size=(960, 720), profile="quality")
+    add_force(parser)
     parser.add_argument(
         "--contact-sheet",
         action="store_true",
@@ -43,9 +44,19 @@ def add_parser(commands: Any) -> None:
     )
 
 
+def _names(arguments: argparse.Namespace) -> list[str]:
+    """Files that will be written."""
+    names = [] if arguments.contact_sheet else [f"{shot.name}.png" for shot in SHOTS]
+    if arguments.frames:
+        names += [f"{condition}_{key}.png" for condition in CONDITIONS for key in SITUATIONS]
+    return [*names, SHEET]
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Take the pictures."""
-    console = Console(stderr=True, highlight=False)
+    console = error_console()
+    for name in _names(arguments):
+        check_file(arguments.out / name, replace=arguments.force)
     arguments.out.mkdir(parents=True, exist_ok=True)
 
     def write(name: str, frame: Any) -> None:

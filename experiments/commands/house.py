@@ -4,8 +4,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from experiments.commands.options import add_command, add_house, add_points
+from experiments.commands.options import add_command, add_force, add_house, add_points
 from experiments.house import House
+from experiments.run_directory import check_file
 from mjsim.model.export import export_house
 from mjsim.model.sampling import POINTS
 from mjsim.model.scene import compose
@@ -27,15 +28,19 @@ def add_parser(commands: Any) -> None:
     add_points(parser)
     add_house(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.xml", help="MJCF file to write")
+    add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Sample, compose, export."""
+    episode_file = arguments.out.with_suffix(".episode.json")
+    for path in (arguments.out, episode_file):
+        check_file(path, replace=arguments.force)
     house = House.load(arguments.house)
     episode = house.sample_episode(
         objects=arguments.objects, seed=arguments.seed, points=arguments.points or POINTS
     )
     export_house(compose(episode, house.catalogue), arguments.out)
-    episode.save(arguments.out.with_suffix(".episode.json"))
+    episode.save(episode_file)
     print(f"{arguments.out} ({len(episode.objects)} misplaced objects, seed {arguments.seed})")
     return 0

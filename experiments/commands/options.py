@@ -97,6 +97,11 @@ def add_command(
     return parser
 
 
+def add_force(parser: argparse.ArgumentParser, text: str = "replace files that exist") -> None:
+    """Add `--force`."""
+    parser.add_argument("--force", action="store_true", help=text)
+
+
 def add_house(parser: argparse.ArgumentParser) -> None:
     """Add `--house`."""
     parser.add_argument("--house", default="apartment", metavar="NAME", help=HOUSE_HELP)

@@ -60,6 +60,7 @@ def add_parser(commands: Any) -> None:
         metavar="OUT.json",
         help="plan nothing: check what --certificate wrote, - for standard input",
     )
+    parser.add_argument("--force", action="store_true", help="replace a certificate that exists")
     parser.set_defaults(run=run)
 
 
@@ -67,6 +68,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, solve, print; or check."""
     if arguments.check is not None:
         return _check(arguments.file, arguments.check)
+    if arguments.certificate is not None:
+        from experiments.run_directory import check_file  # loaded only where it is needed
+
+        check_file(arguments.certificate, replace=arguments.force)
     limit = _limit(arguments.planner, arguments.time_limit)
     problem = _read(arguments.file, problem_from_json)
     plan = solver(arguments.planner).solve(problem, limit=limit)

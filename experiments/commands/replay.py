@@ -1,22 +1,29 @@
 """`mjsim replay`: simulate a recorded run again, verify it, film it in another view."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
-from experiments.commands.options import add_command, add_frame, assistance_help, film_config, seconds
+from experiments.commands.options import (
+    add_command,
+    add_force,
+    add_frame,
+    assistance_help,
+    film_config,
+    seconds,
+)
+from experiments.commands.terminal import error_console, progress_bars
 from experiments.errors import ConfigError, ReplayError
 from experiments.replaying.external_view import CAMERAS, FIRST_PERSON
 from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
+from experiments.run_directory import check_file
 
 DESCRIPTION = """\
 Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one
-bit for bit. DIR is a run directory, or what a run left behind whose physics failed (OUT.failed). Prints the number of
-verified steps and exits with 0, or names the first step that differs and exits with 1.
+bit for bit. DIR is a run directory, however the run ended. Prints the number of verified steps and exits with 0, or
+names the first step that differs and exits with 1.
 
 With --video, the replay is filmed: as it was, or in another size, from another camera, with another HUD."""
 
@@ -59,6 +66,7 @@ def add_parser(commands: Any) -> None:
         help=f"show the HUD of another {assistance_help()} (default: as recorded)",
     )
     add_frame(parser)
+    add_force(parser, "replace a video that exists")
 
 
 def point(text: str) -> tuple[float, float, float]:
@@ -75,13 +83,15 @@ def point(text: str) -> tuple[float, float, float]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Replay with a progress bar; 1 if something differs from the record.
+    """Replay with a progress bar.
 
     Raises:
         ConfigError: A camera is given, but no film.
+        ReplayError: Something differs from the record.
     """
     film = None
     if arguments.video is not None:
+        check_file(arguments.video, replace=arguments.force)
         film = ReplayFilm(
             path=arguments.video,
             config=film_config(arguments),
@@ -93,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError("a camera needs a film; name the file with --video FILE.mp4")
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("steps"), TimeElapsedColumn())
     try:
-        with Progress("replay", *columns, console=Console(stderr=True)) as bars:
+        with progress_bars(error_console(), "replay", *columns) as bars:
             bar = bars.add_task("replay", total=None)
             report = replay(
                 arguments.directory,
@@ -105,8 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
     except ReplayError as error:
         for line in error.verdicts:
             print(line)
-        print(f"mjsim: {error}", file=sys.stderr)
-        return 1
+        raise
     print(_summary(report))
     if arguments.video is not None:
         as_run = "; its frames are those of the run's own video" if report.as_filmed else ""

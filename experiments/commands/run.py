@@ -1,15 +1,17 @@
 """`mjsim run`: one trial, filmed."""
 
 import argparse
+import signal
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from experiments.commands.options import (
     add_command,
+    add_force,
     add_frame,
     add_trial_options,
     assistance_help,
@@ -17,7 +19,10 @@ from experiments.commands.options import (
     given_options,
     trial_options,
 )
+from experiments.commands.terminal import error_console, progress_bars
+from experiments.endings import INTERRUPTED
 from experiments.session import Progress as SessionProgress
+from experiments.signals import exit_code
 from experiments.trial import run_trial
 from experiments.trial_config import TrialConfig
 
@@ -48,6 +53,8 @@ Run one trial: a simulated person tidies a disorganized apartment under an assis
   trajectory.npz   poses and actions, 25 per second  topdown.png    floor plan with planned and walked path
   recording.npz    hashes and states for replays     video.mp4      what the person saw
 Equal options and seeds give equal frames and files, except for the wall time in metrics.json.
+What is at --out already is not touched. However a run ends (Ctrl-C, SIGTERM, an error in a participant of your own),
+what was simulated until then is kept there, and "ended" in metrics.json says how.
 
 With --live the assistant plans in real time, as beside a human participant. Before the clock starts it plans the task
 and proves the plan optimal. After a deviation it shows a plan within about 50 ms and keeps looking for a shorter one in
@@ -71,7 +78,11 @@ def add_parser(commands: Any) -> None:
         "--live", action="store_true", help="plan in real time, with proofs in the background (see above)"
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run directory to write")
+    add_force(parser, "replace an earlier run at --out, and nothing else")
     parser.add_argument("--no-video", action="store_true", help="do not film; about 10 times faster")
+    parser.add_argument(
+        "--no-floor-plan", action="store_true", help="draw no floor plan; without video, no OpenGL is needed"
+    )
     add_frame(parser)
 
 
@@ -84,7 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
         **{"objects": OBJECTS, **given_options(arguments, ("objects", "user")), **trial_options(arguments)},
     )
     film = None if arguments.no_video else film_config(arguments)
-    console = Console(stderr=True)
+    console = error_console()
+    warnings: list[str] = []
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -92,7 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
         TextColumn("delivered, {task.fields[clock]:.0f} s simulated in"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console) as bars:
+    with progress_bars(console, *columns) as bars:
         bar = bars.add_task(f"{config.assistance}, {config.user}", total=config.objects, clock=0.0)
         last = SessionProgress(-PROGRESS_PERIOD, 0, 0)
 
@@ -102,9 +114,21 @@ def run(arguments: argparse.Namespace) -> int:
                 last = progress
                 bars.update(bar, completed=progress.delivered, clock=progress.time)
 
-        metrics = run_trial(config, arguments.out, film=film, on_progress=show)
+        metrics = run_trial(
+            config,
+            arguments.out,
+            film=film,
+            topdown=not arguments.no_floor_plan,
+            replace=arguments.force,
+            on_progress=show,
+            on_warning=warnings.append,
+        )
     _show_metrics(console, metrics, arguments.out)
-    return 130 if metrics["ended"] == "interrupted" else 0
+    for warning in warnings:
+        console.print(f"mjsim: {warning}; all else is in {arguments.out}", soft_wrap=True, markup=False)
+    if metrics["ended"] == INTERRUPTED:
+        return exit_code(signal.Signals[metrics["signal"]])
+    return 1 if warnings else 0
 
 
 def _show_metrics(console: Console, metrics: dict[str, Any], out: Path) -> None:

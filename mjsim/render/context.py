@@ -17,17 +17,15 @@ from types import ModuleType
 from typing import Any
 
 from mjsim.errors import RenderError
+from mjsim.gl_choice import BACKENDS, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
 
-EGL_PACKAGES = ("libegl1", "libgl1", "libgles2", "libegl-mesa0", "libgl1-mesa-dri")
 EGL_REMEDY = (
     f"install an EGL driver, on Debian or Ubuntu: apt-get install {' '.join(EGL_PACKAGES)}; "
     "`mjsim doctor` shows what is there"
 )
 TIMEOUT_VARIABLE = "MJSIM_GL_TIMEOUT"
 MAX_START_TIME = 60.0  # s; the slowest drivers take a few
-_BACKENDS = ("egl", "osmesa", "glfw", "cgl")
 _MAIN_THREAD_ONLY = ("glfw", "cgl")
-_DISABLED = ("disable", "disabled", "off", "false", "0")
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshader")
 
 
@@ -166,7 +164,7 @@ def _start() -> tuple[ModuleType, Any]:
         except Exception as error:  # drivers and PyOpenGL raise many unrelated types here
             answers.put(RenderError(f"no OpenGL context ({error}); {EGL_REMEDY}"))
 
-    if os.environ.get("MUJOCO_GL", "").lower().strip() in _MAIN_THREAD_ONLY:
+    if chosen_gl() in _MAIN_THREAD_ONLY:
         start()
     else:
         threading.Thread(target=start, name="gl-start", daemon=True).start()
@@ -194,10 +192,14 @@ def _time_limit() -> float:
 
 
 def _backend() -> ModuleType:
-    choice = os.environ.setdefault("MUJOCO_GL", "egl").lower().strip()
-    if choice in _DISABLED:
-        raise RenderError(f"MUJOCO_GL={choice!r} turns rendering off; unset it, or set it to 'egl'")
-    name = choice if choice in _BACKENDS else "egl"
+    name = chosen_gl()
+    if name in DISABLED:
+        raise RenderError(f"MUJOCO_GL={name!r} turns rendering off; unset it, or set it to 'egl'")
+    if name not in BACKENDS:
+        raise RenderError(
+            f"MUJOCO_GL={name!r} is no OpenGL backend; unset it, or set it to {' or '.join(BACKENDS)}"
+        )
+    os.environ.setdefault(VARIABLE, name)  # dm_control, if it is used, has to draw with the same
     try:
         return importlib.import_module(f"mujoco.{name}")
     except Exception as error:  # a missing library surfaces as ImportError, AttributeError or OSError

@@ -1,0 +1,59 @@
+"""Processes that run trials, and end with the process that they work for."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from experiments.signals import SIGNALS
+
+
+class _Pool(ProcessPoolExecutor):
+    """Its processes begin with signals blocked, and keep them so: what stops a batch is up to the parent."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Worker processes. Where the block raises, or this process is killed, they end at once, in the middle of work.
+
+    Raises:
+        ChildProcessError: A worker ended by itself.
+    """
+    # Spawned, not forked: a forked GL context or thread pool does not work.
+    context = multiprocessing.get_context("spawn")
+    end_of_work, work = context.Pipe(duplex=False)
+    pool = _Pool(count, mp_context=context, initializer=_end_with, initargs=(end_of_work,))
+    try:
+        yield pool
+        pool.shutdown()
+    except BrokenProcessPool as error:
+        raise ChildProcessError(
+            "a worker process was killed, perhaps for want of memory; the same command goes on, --workers sets how many"
+        ) from error
+    finally:
+        work.close()  # all workers see it
+        pool.shutdown(cancel_futures=True)
+        end_of_work.close()
+
+
+def _end_with(end_of_work: Connection) -> None:
+    """End this process when the other end of the connection is closed, by whatever."""
+
+    def watch() -> None:
+        wait([end_of_work])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
