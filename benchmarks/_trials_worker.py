@@ -43,8 +43,8 @@ PARTS = {
         "experiments.recording.Recording.append",
         "experiments.recording.Recording.extend",
         "experiments.recording.Recording.save",
-        "experiments.trial.save_arrays",
-        "experiments.trial.write_json",
+        "experiments.trial_record.save_arrays",
+        "experiments.trial_record.write_json",
         "mjsim.episode.Episode.save",
     ),
 }
