@@ -157,6 +157,16 @@ class End(Logged, frozen=True):
     error: str | None = None
 
 
+class Scroll(Logged, frozen=True):
+    """The person scrolled the task list.
+
+    Attributes:
+        rows: By how many rows, positive towards the list's end.
+    """
+
+    rows: int
+
+
 class Outcome(Logged, frozen=True):
     """Something happened in the world.
 
@@ -179,7 +189,7 @@ OUTCOMES = {
     EventKind.EJECTED: "an object was faster than anything could throw it (docs/health.md)",
     EventKind.TUNNELLED: "an object went through something solid (docs/health.md)",
 }
-TYPES: tuple[type[Logged], ...] = (Start, Familiarisation, Plan, Attempt, Visit, Regret, End)
+TYPES: tuple[type[Logged], ...] = (Start, Familiarisation, Plan, Attempt, Visit, Regret, Scroll, End)
 
 
 def _decoder() -> msgspec.json.Decoder[Any]:
