@@ -42,7 +42,7 @@ class Assistant:
         log: Where plans and visits are logged.
         regrets: Works out what alternatives cost; None for one whose answers repeat.
         log_regrets: Whether the regret of every visit is logged.
-        options: Rules of the world, for how far a person reaches.
+        options: Rules of the world, for how much a person carries.
 
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
@@ -228,9 +228,7 @@ class Assistant:
         self._begin_path(observation)
         replanned = self._planner.replans > replans
         if first:
-            bound = reach_bound(
-                round(self._route.plan.lower_bound, 6), self._house, self._episode, self._options
-            )
+            bound = reach_bound(round(self._route.plan.lower_bound, 6), self._house, self._episode)
             self._log_plan(observation, self._route, reach_bound_m=round(bound, 6))
         elif replanned:
             self._log_plan(observation, self._route)

@@ -33,7 +33,7 @@ class Start(Logged, frozen=True, forbid_unknown_fields=False):
         format: Format of the log.
         versions: Versions of mjsim, its physics code, MuJoCo and NumPy, and the machine's architecture.
         model: Fingerprint of the compiled house with its objects, without what is only drawn.
-        world: Options of the world: timestep, speeds, reaches, fidelity.
+        world: Options of the world: timestep, capacity, grip, fidelity.
         episode_sha256: SHA-256 of `episode.json`.
         order: Object names in the participant's own random order.
     """
@@ -48,6 +48,18 @@ class Start(Logged, frozen=True, forbid_unknown_fields=False):
     assistance: str
     house: str
     time_limit: Seconds
+
+
+class Participant(Logged, frozen=True):
+    """Second line: who took part.
+
+    Attributes:
+        user: The simulated participant.
+        person: Every value of the person that was drawn, by name; those of the hands under `motion` (docs/people.md).
+    """
+
+    user: str
+    person: dict[str, float | dict[str, float]]
 
 
 class Plan(Logged, frozen=True):
@@ -189,7 +201,17 @@ OUTCOMES = {
     EventKind.EJECTED: "an object was faster than anything could throw it (docs/health.md)",
     EventKind.TUNNELLED: "an object went through something solid (docs/health.md)",
 }
-TYPES: tuple[type[Logged], ...] = (Start, Familiarisation, Plan, Attempt, Visit, Regret, Scroll, End)
+TYPES: tuple[type[Logged], ...] = (
+    Start,
+    Participant,
+    Familiarisation,
+    Plan,
+    Attempt,
+    Visit,
+    Regret,
+    Scroll,
+    End,
+)
 
 
 def _decoder() -> msgspec.json.Decoder[Any]:

@@ -1,5 +1,6 @@
 """A house prepared once and used for many episodes: catalogue, navmesh, geodesics, rooms, receptacles."""
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,17 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.episode import Episode
-from mjsim.model.avatar import TRUNK_RADIUS
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.footprint import Footprint
 from mjsim.model.house import compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 from mjsim.model.sampling import POINTS, sample_episode
+from mjsim.person_parameters import PersonParameters
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
 VIEWPOINT_SPACING = 2.2  # m; from a viewpoint one sees what lies within it in spite of furniture
 VIEWPOINT_CANDIDATES = 3000
+WALL_GAP = 0.05  # m that planned paths keep from walls beyond the body's radius, so that corners can be cut
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,23 +30,29 @@ class House:
 
     Attributes:
         catalogue: Rooms, categories, receptacles and object models.
-        navmesh: Where a person can walk, by the compiled model's own geoms.
-        geodesics: Shortest paths on it, for planning and guidance: a little away from the walls.
+        sampling_floor: Where the usual person can walk, by the compiled model's own geoms: objects lie and people start
+            there, whoever takes part.
+        navmesh: Where this house's person can walk.
+        geodesics: Shortest paths on it, for planning and guidance: a little away from the walls. Objects may lie
+            off it, within the person's reach.
         rooms: Which room a point lies in.
         receptacles: Receptacle key -> geometry.
         bounds: (x_min, y_min, x_max, y_max) of the floor, m.
+        person: Whose size and reach count.
     """
 
     catalogue: Catalogue
+    sampling_floor: NavMesh
     navmesh: NavMesh
     geodesics: Geodesics
     rooms: RoomMap
     receptacles: Mapping[str, ReceptacleGeometry]
     bounds: tuple[float, float, float, float]
+    person: PersonParameters
 
     @classmethod
     def load(cls, name: str = "apartment") -> "House":
-        """Compile a house and compute where a person can walk.
+        """Compile a house and compute where the usual person can walk.
 
         Args:
             name: Name under `models/houses`, or the path of a `catalogue.toml`.
@@ -54,14 +63,30 @@ class House:
         catalogue = Catalogue.load(name)
         house = compiled_house(catalogue)
         floor = house.floor
-        navmesh = NavMesh.build(floor.obstacles, floor.bounds)
-        return cls(catalogue, navmesh, Geodesics(navmesh), house.rooms, house.receptacles, floor.bounds)
+        person = PersonParameters()
+        navmesh = _navmesh(floor, person.body_radius + WALL_GAP)
+        geodesics = Geodesics(navmesh, person.reach)
+        return cls(
+            catalogue, navmesh, navmesh, geodesics, house.rooms, house.receptacles, floor.bounds, person
+        )
+
+    def for_person(self, person: PersonParameters) -> "House":
+        """The same house, with the same episodes, for somebody of another size or reach."""
+        usual, size = PersonParameters(), (person.body_radius, person.reach)
+        if size == (self.person.body_radius, self.person.reach):
+            return self
+        navmesh = self.sampling_floor
+        if person.body_radius != usual.body_radius:
+            navmesh = _navmesh(compiled_house(self.catalogue).floor, person.body_radius + WALL_GAP)
+        return dataclasses.replace(
+            self, navmesh=navmesh, geodesics=Geodesics(navmesh, person.reach), person=person
+        )
 
     @cached_property
     def body_geodesics(self) -> Geodesics:
         """Shortest paths of a person whose trunk touches the walls; no actual walk is shorter."""
         floor = compiled_house(self.catalogue).floor
-        return Geodesics(NavMesh.build(floor.obstacles, floor.bounds, agent_radius=TRUNK_RADIUS))
+        return Geodesics(_navmesh(floor, self.person.body_radius))
 
     @cached_property
     def approaches(self) -> Mapping[str, NDArray[np.float64]]:
@@ -86,7 +111,11 @@ class House:
         Raises:
             SamplingError: `objects` is out of range, or the house is too small for the points.
         """
-        return sample_episode(self.catalogue, self.navmesh, objects=objects, seed=seed, points=points)
+        return sample_episode(self.catalogue, self.sampling_floor, objects=objects, seed=seed, points=points)
+
+
+def _navmesh(floor: Footprint, radius: float) -> NavMesh:
+    return NavMesh.build(floor.obstacles, floor.bounds, agent_radius=radius)
 
 
 def _farthest_points(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:

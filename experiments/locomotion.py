@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.participants.base import WalkAlong
-from experiments.path_following import Obstacles, follow, turn_towards
+from experiments.path_following import Obstacles, Pace, follow, turn_towards
 from mjsim.actions import IDLE, Action, Move, Pick, Place
 from mjsim.fidelity.body_state import HEADING, X, Y
 from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.fidelity.kinematics import walk as walk_body
 from mjsim.kernels import kernel
 from mjsim.observation import ObjectStatus, Observation
+from mjsim.person_parameters import PersonParameters
 from planner.polyline import distance, path_length, project, rest_of
 
 ARRIVED_WITHIN = 0.06  # m from the end of the path
@@ -42,6 +43,7 @@ class Walk(NamedTuple):
     face_goal: bool
     shown: bool
     tolerance: float
+    pace: Pace
 
 
 class Step(NamedTuple):
@@ -83,9 +85,9 @@ def next_step(
     at_the_end = distance(x, y, path[-1, 0], path[-1, 1]) < ARRIVED_WITHIN
     if distance(x, y, walk.goal[0], walk.goal[1]) > walk.stop_distance and not at_the_end:
         phase = WALKING if makes_progress(path, x, y, time, progress) else BLOCKED
-        forward, left, turn = follow(path, x, y, heading, obstacles)
+        forward, left, turn = follow(path, x, y, heading, obstacles, walk.pace)
         return Step(phase, forward, left, turn)
-    turn, error = turn_towards(heading, x, y, walk.goal[0], walk.goal[1])
+    turn, error = turn_towards(heading, x, y, walk.goal[0], walk.goal[1], walk.pace.turning_speed)
     if walk.face_goal and abs(error) > FACING_WITHIN:
         return Step(TURNING, 0.0, 0.0, turn)
     return Step(ARRIVED, 0.0, 0.0, 0.0)
@@ -124,13 +126,14 @@ class LocomotionController:
 
     Args:
         walls: Outline of the navigable floor, ends x, y, x, y of its edges, m, shape (e, 4).
+        person: Who walks.
 
     Attributes:
         blocked: Whether the walk makes no progress; until the first step after backing off.
     """
 
-    def __init__(self, walls: Floats) -> None:
-        self._walls = walls
+    def __init__(self, walls: Floats, person: PersonParameters) -> None:
+        self._walls, self._pace = walls, Pace.of(person)
         self._visit: Pick | Place | None = None
         self._progress = np.array([np.inf, 0.0])
         self._predicted = self._progress[None]
@@ -146,7 +149,7 @@ class LocomotionController:
             return BACK_OFF
         x, y = seen.position
         step = next_step(
-            _for_kernels(walk), x, y, seen.heading, seen.time, self._obstacles(seen), self._progress
+            self._for_kernels(walk), x, y, seen.heading, seen.time, self._obstacles(seen), self._progress
         )
         self.blocked = step.phase == BLOCKED
         if self.blocked:
@@ -178,7 +181,9 @@ class LocomotionController:
         moves, self._predicted = np.empty((limit, 4)), np.empty((limit + 1, 2))
         self._predicted[0] = self._progress
         start = state._replace(body=state.body.copy())
-        count = roll_out(_for_kernels(walk), start, seen.time, self._obstacles(seen), moves, self._predicted)
+        count = roll_out(
+            self._for_kernels(walk), start, seen.time, self._obstacles(seen), moves, self._predicted
+        )
         return moves[:count]
 
     def commit(self, steps: int) -> None:
@@ -207,7 +212,6 @@ class LocomotionController:
             self._is_obstacle = np.array(flags, np.bool_)
         return Obstacles(np.ascontiguousarray(seen.object_positions), self._is_obstacle, self._walls)
 
-
-def _for_kernels(walk: WalkAlong) -> Walk:
-    goal = (float(walk.goal[0]), float(walk.goal[1]))
-    return Walk(walk.path, goal, walk.stop_distance, walk.then is not None, walk.shown, walk.tolerance)
+    def _for_kernels(self, walk: WalkAlong) -> Walk:
+        goal, faces = (float(walk.goal[0]), float(walk.goal[1])), walk.then is not None
+        return Walk(walk.path, goal, walk.stop_distance, faces, walk.shown, walk.tolerance, self._pace)

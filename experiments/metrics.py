@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.health import summarise_health
-from experiments.records import Event
+from experiments.records import PARTICIPANT, Event
 
 REGRETFUL = 0.01  # m; smaller regrets are ties
 COSTLY = 0.1  # m; what a deviation must cost to count in `nd_regret_10cm`
 # Fields of the start event that say what was recorded, not how the trial was set up.
-PROVENANCE = frozenset({"t", "event", "format", "versions", "model", "world", "episode_sha256", "order"})
+PROVENANCE = frozenset(
+    {"t", "event", "format", "versions", "model", "world", "episode_sha256", "order", "person"}
+)
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ def measure(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict
     ending = {name: events[-1][name] for name in ("signal", "error") if name in events[-1]}
     return {
         **settings,
+        **_person(events),
         **asdict(compute_metrics(events, arrays["position"])),
         **summarise_health(events, arrays),
         "simulated_s": float(arrays["time"][-1]),
@@ -134,6 +137,12 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
         mean_suggestion_gap_m=sum(gaps.values()) / len(gaps) if gaps else None,
         max_suggestion_gap_m=max(gaps.values(), default=None),
     )
+
+
+def _person(events: Sequence[Event]) -> dict[str, Any]:
+    """The participant's values, but for those of the hands, as columns: `person_walking_speed` and so on."""
+    values: Mapping[str, Any] = next((e["person"] for e in events if e["event"] == PARTICIPANT), {})
+    return {f"person_{name}": value for name, value in values.items() if name != "motion"}
 
 
 def _count(events: Sequence[Event], *kinds: str) -> int:

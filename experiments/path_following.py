@@ -11,17 +11,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
+from mjsim.person_parameters import PersonParameters
 from planner.polyline import AT_THE_END, Path, distance, path_length, point_along, project
 
-CRUISE_SPEED = 1.3  # m/s, an unhurried indoor pace
 LOOK_AHEAD = 0.25  # m; longer cuts corners into the walls, shorter wobbles
 LOOK_BEYOND = 1.2  # m; farther than `SIDESTEP_RANGE`
 SIDESTEP_RANGE = 0.8  # m ahead
-CLEARANCE = 0.40  # m from the body's axis: its radius and half an object
+HALF_OBJECT = 0.20  # m; a walker keeps that and its own radius from an object's middle
 MIN_AHEAD = 0.6  # m ahead per metre aside on the way around an object's far side; with less one would dither
-BRAKING = 1.5  # m/s^2 planned for, half of what the body can do
+BRAKING = 0.5  # of what the body can do, for which a walker plans
 TURN_GAIN = 5.0  # 1/s
-MAX_TURN = 2.5  # rad/s
+
+
+class Pace(NamedTuple):
+    """How fast a person walks and turns, and how wide it is.
+
+    Attributes:
+        speed: Usual walk, m/s.
+        braking: Deceleration planned for, m/s^2.
+        turning_speed: Fastest turn, rad/s.
+        clearance: Distance kept from the middle of objects on the floor, m.
+    """
+
+    speed: float
+    braking: float
+    turning_speed: float
+    clearance: float
+
+    @classmethod
+    def of(cls, person: PersonParameters) -> "Pace":
+        """That of a person."""
+        braking = BRAKING * person.walking_acceleration
+        return cls(person.walking_speed, braking, person.turning_speed, person.body_radius + HALF_OBJECT)
 
 
 class Obstacles(NamedTuple):
@@ -45,10 +66,12 @@ def wrap_angle(angle: float) -> float:
 
 
 @kernel
-def turn_towards(heading: float, x: float, y: float, to_x: float, to_y: float) -> tuple[float, float]:
-    """Yaw rate (rad/s) that turns `heading` towards a point, and the angle still to turn (rad)."""
+def turn_towards(
+    heading: float, x: float, y: float, to_x: float, to_y: float, fastest: float
+) -> tuple[float, float]:
+    """Yaw rate (at most `fastest`, rad/s) that turns `heading` towards a point, and the angle still to turn (rad)."""
     error = wrap_angle(math.atan2(to_y - y, to_x - x) - heading)
-    return min(max(TURN_GAIN * error, -MAX_TURN), MAX_TURN), error
+    return min(max(TURN_GAIN * error, -fastest), fastest), error
 
 
 @kernel
@@ -70,6 +93,7 @@ def sidestep(
     target: tuple[float, float],
     beyond: tuple[float, float],
     obstacles: Obstacles,
+    clearance: float,
 ) -> tuple[float, float]:
     """Where to walk instead of straight to `target` so that objects on the floor stay beside the feet, m.
 
@@ -83,6 +107,7 @@ def sidestep(
         beyond: Farther along the path, m: it decides what is in the way and on which side, and keeps the person on
             that side, because it lies behind the object.
         obstacles: What to keep clear of.
+        clearance: By how much, m.
     """
     reach = distance(x, y, beyond[0], beyond[1])
     if reach < AT_THE_END:
@@ -94,7 +119,7 @@ def sidestep(
             continue
         dx, dy = obstacles.positions[k, 0] - x, obstacles.positions[k, 1] - y
         along, across = dx * ahead_x + dy * ahead_y, dy * ahead_x - dx * ahead_y
-        in_the_way = 0.0 < along < SIDESTEP_RANGE and abs(across) < CLEARANCE
+        in_the_way = 0.0 < along < SIDESTEP_RANGE and abs(across) < clearance
         nearer = along < nearest_along or (along == nearest_along and across < nearest_across)
         if in_the_way and nearer:
             nearest_along, nearest_across = along, across
@@ -103,7 +128,7 @@ def sidestep(
     gap = distance(x, y, target[0], target[1])
     side = -1.0 if nearest_across >= 0.0 else 1.0
     for sign in (side, -side):
-        out = nearest_across + sign * CLEARANCE
+        out = nearest_across + sign * clearance
         if sign != side and nearest_along < MIN_AHEAD * abs(out):
             break
         step_x = nearest_along * ahead_x - out * ahead_y
@@ -117,7 +142,7 @@ def sidestep(
 
 @kernel
 def follow(
-    path: Path, x: float, y: float, heading: float, obstacles: Obstacles
+    path: Path, x: float, y: float, heading: float, obstacles: Obstacles, pace: Pace
 ) -> tuple[float, float, float]:
     """One control step along `path`, stopping at its end: velocities forward and left (m/s), and yaw rate (rad/s).
 
@@ -130,12 +155,13 @@ def follow(
         y: Where the person is, m.
         heading: Where the person faces, rad.
         obstacles: What to keep clear of.
+        pace: How the person walks.
     """
     arc, gap = project(path, x, y)
     left = max(path_length(path) - arc, 0.0) + gap
     beyond = point_along(path, arc + LOOK_BEYOND)
-    target = sidestep(x, y, point_along(path, arc + LOOK_AHEAD), beyond, obstacles)
-    turn, error = turn_towards(heading, x, y, target[0], target[1])
+    target = sidestep(x, y, point_along(path, arc + LOOK_AHEAD), beyond, obstacles, pace.clearance)
+    turn, error = turn_towards(heading, x, y, target[0], target[1], pace.turning_speed)
     ahead = max(math.cos(error), 0.0)
-    pace = min(CRUISE_SPEED, math.sqrt(2.0 * BRAKING * left)) * ahead * ahead
-    return pace * math.cos(error), pace * math.sin(error), turn
+    speed = min(pace.speed, math.sqrt(2.0 * pace.braking * left)) * ahead * ahead
+    return speed * math.cos(error), speed * math.sin(error), turn

@@ -37,8 +37,10 @@ class SessionPercept(Percept):
         *,
         blocked: bool,
     ) -> None:
-        capacity = world.options.capacity
-        super().__init__(seen, world.scene.episode.targets, answer, blocked=blocked, capacity=capacity)
+        scene, capacity = world.scene, world.options.capacity
+        super().__init__(
+            seen, scene.episode.targets, answer, blocked=blocked, capacity=capacity, person=scene.person
+        )
         self._world, self._assistant, self._hud = world, assistant, hud
 
     def look(self) -> Mapping[str, Point]:

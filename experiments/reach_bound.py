@@ -7,10 +7,9 @@ import numpy as np
 from experiments.house import House
 from mjsim.episode import Episode
 from mjsim.model.receptacles import ReceptacleGeometry
-from mjsim.options import WorldOptions
 
 
-def reach_bound(tour: float, house: House, episode: Episode, options: WorldOptions) -> float:
+def reach_bound(tour: float, house: House, episode: Episode) -> float:
     """Least walk of any order of visits, m.
 
     A tour between the places of the visits is `tour` long at least. Who picks and places from a distance can save that
@@ -19,15 +18,15 @@ def reach_bound(tour: float, house: House, episode: Episode, options: WorldOptio
 
     Args:
         tour: A lower bound of all tours between the places, m.
-        house: The house.
+        house: The house, which knows how far its person reaches.
         episode: The disorganized house.
-        options: How far a person reaches.
     """
+    reach = house.person.reach
     places = [
-        options.place_reach + _extent(house.receptacles[key])
+        reach + _extent(house.receptacles[key])
         for key in (episode.targets[placed.name] for placed in episode.objects)
     ]
-    saved = 2 * (len(places) * options.pick_reach + sum(places)) - min(places, default=0.0)
+    saved = 2 * (len(places) * reach + sum(places)) - min(places, default=0.0)
     return max(0.0, tour - saved)
 
 

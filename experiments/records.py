@@ -20,9 +20,9 @@ from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.rollout import Rollout
 
-# 5: distances between places, ties, gaps of suggestions. 4: typed checkpoints. 3: untyped ones. 2: no health of the
-# physics. 1: neither state hashes nor checkpoints.
-LOG_FORMAT = 5
+# 6: the participant. 5: distances between places, ties, gaps of suggestions. 4: typed checkpoints. 3: untyped ones.
+# 2: no health of the physics. 1: neither state hashes nor checkpoints.
+LOG_FORMAT = 6
 FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
     "events.jsonl",
@@ -41,6 +41,7 @@ HEALTH = {
     "weld_error_rad": 2,
     "settle_s": 1,
 }
+PARTICIPANT = "participant"  # event with all values of the person
 STATUS_CODE = {ObjectStatus.LOOSE: 0, ObjectStatus.CARRIED: 1, ObjectStatus.DELIVERED: 2}
 
 _FIRST_CAPACITY = 4096  # rows of a trajectory; doubled when they are full

@@ -91,7 +91,7 @@ class Session:
         self._time_limit = time_limit
         self._viewer = viewer
         self._rollouts = rollouts and viewer is None and world.options.fidelity != "full"
-        self._controller = LocomotionController(walls)
+        self._controller = LocomotionController(walls, world.scene.person)
         self._answer: ActionResult | None = None
         self._hud: tuple[Observation, HudState] | None = None
         self._recorded_until = 0.0

@@ -17,6 +17,8 @@ from experiments.endings import INTERRUPTED
 from experiments.errors import ConfigError, UserCodeError
 from experiments.first_person import FilmConfig, TrialFilm
 from experiments.house import House
+from experiments.participants import participant
+from experiments.person_distribution import PersonDistribution
 from experiments.recording import Recording, provenance
 from experiments.records import EventLog
 from experiments.regrets import LiveRegrets, Regrets
@@ -30,13 +32,14 @@ from mjsim.episode import Episode
 from mjsim.errors import PhysicsError
 from mjsim.model.scene import Scene, compose
 from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 from planner.live import LiveReplanner
 from planner.replanner import Replanner
 from planner.solver import solver
 
 _SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
-_LIST_ORDER, _PERSON = 0, 1  # purposes of random numbers in a session
+_LIST_ORDER, _CHANCE, _PERSON = range(3)  # purposes of random numbers in a session
 FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock of a live trial starts
 
 
@@ -75,8 +78,9 @@ def run_trial(
     started = time.perf_counter()
     with signals_postponed() as signals:
         with run_directory(out, replace=replace) as folder:
-            house = house or House.load(config.house)
-            scene = compose(trial_episode(config, house), house.catalogue)
+            person = draw_person(config)
+            house = (house or House.load(config.house)).for_person(person)
+            scene = compose(trial_episode(config, house), house.catalogue, person=person)
             trial = _Trial(config, house, scene, folder, film)
 
             def progress(now: Progress) -> None:
@@ -100,6 +104,23 @@ def run_trial(
     if signals.number is not None and metrics["ended"] != INTERRUPTED:
         raise Stopped(signals.number)
     return metrics
+
+
+def draw_person(config: TrialConfig) -> PersonParameters:
+    """The participant of a trial, drawn by the person's seed.
+
+    What `config.person` does not describe is drawn as the participant's factory says in its attribute `person`, a
+    mapping as for `PersonDistribution.of`; what neither describes is usual.
+
+    Raises:
+        ConfigError: There is no such participant, or a value cannot be drawn.
+    """
+    factory = participant(config.user)
+    try:
+        of_participant = PersonDistribution.of(getattr(factory, "person", {}))
+    except ConfigError as error:
+        raise ConfigError(f"participant {config.user!r}: {error}") from error
+    return of_participant.updated(config.person).draw(_session_rng(config.person_seed, _PERSON))
 
 
 def trial_episode(config: TrialConfig, house: House) -> Episode:
@@ -186,8 +207,8 @@ def prepare_session(
 
     Args:
         config: The trial.
-        house: The house that it names.
-        scene: The composed episode.
+        house: The house that it names, for the scene's person (`House.for_person`).
+        scene: The composed episode, with the participant's body.
         log: Takes the events.
         viewer: Sees every control step, or None.
         replanner: Plans for the assistant; None for one whose plans repeat.
@@ -201,7 +222,7 @@ def prepare_session(
     session = Session(
         world,
         _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
-        make_participant(config.user, house, _session_rng(config.person_seed, _PERSON)),
+        make_participant(config.user, house, _session_rng(config.person_seed, _CHANCE)),
         Recording(world, log),
         walls=house.navmesh.outline,
         time_limit=config.limit,
@@ -213,7 +234,7 @@ def prepare_session(
 
 def _session_rng(seed: int, purpose: int) -> np.random.Generator:
     """The generator of one purpose in a session, apart from those of the house with the same seed."""
-    return np.random.default_rng(np.random.SeedSequence([seed, _SESSION]).spawn(2)[purpose])
+    return np.random.default_rng(np.random.SeedSequence([seed, _SESSION]).spawn(3)[purpose])
 
 
 def _log_start(config: TrialConfig, world: World, order: list[str], log: EventLog) -> None:
@@ -227,6 +248,7 @@ def _log_start(config: TrialConfig, world: World, order: list[str], log: EventLo
         episode_sha256=hashlib.sha256(episode).hexdigest(),
         order=order,
     )
+    log.append(0.0, records.PARTICIPANT, user=config.user, person=world.scene.person.as_dict())
 
 
 def _make_assistant(

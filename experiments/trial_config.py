@@ -2,12 +2,13 @@
 
 import dataclasses
 import math
-from dataclasses import InitVar, dataclass
+from dataclasses import InitVar, dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
+from experiments.person_distribution import PersonDistribution
 from mjsim.episode import CAPACITY, Episode
 from mjsim.model.sampling import POINTS
 from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions
@@ -45,6 +46,7 @@ class TrialConfig:
         points: Points of the house where objects may lie; levels of difficulty share them (PAPER section 4).
         capacity: How many objects are carried at most.
         episode: Path of an episode to run instead of sampling one; it is made absolute.
+        person: How speeds, reach, size and senses of the participant are distributed (docs/people.md).
 
     Raises:
         ConfigError: A value is unusable.
@@ -66,6 +68,7 @@ class TrialConfig:
     points: int = POINTS
     capacity: int = CAPACITY
     episode: str | None = None
+    person: PersonDistribution = field(default_factory=PersonDistribution)
 
     def __post_init__(self, seed: int | None) -> None:
         for name in SEEDS:
@@ -99,7 +102,7 @@ class TrialConfig:
 
     def settings(self) -> dict[str, Any]:
         """All of it by name, with the time limit filled in; JSON-ready."""
-        return {**dataclasses.asdict(self), "time_limit": self.limit}
+        return {**dataclasses.asdict(self), "time_limit": self.limit, "person": self.person.as_dict()}
 
 
 def episode_settings(path: Path) -> dict[str, Any]:

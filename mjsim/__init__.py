@@ -20,6 +20,7 @@ __all__ = [
     "MjsimError",
     "Move",
     "Observation",
+    "PersonParameters",
     "Pick",
     "Place",
     "Refusal",
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from mjsim.model.scene import Scene, compose
     from mjsim.observation import Observation
     from mjsim.options import WorldOptions
+    from mjsim.person_parameters import PersonParameters
     from mjsim.world import StepResult, World
 else:  # hidden from type checkers, which would otherwise accept any name
     _MODULES = {
@@ -57,6 +59,7 @@ else:  # hidden from type checkers, which would otherwise accept any name
         "model.scene": ("Scene", "compose"),
         "observation": ("Observation",),
         "options": ("WorldOptions",),
+        "person_parameters": ("PersonParameters",),
         "world": ("StepResult", "World"),
     }
 

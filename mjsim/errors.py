@@ -5,6 +5,7 @@
     ├── EpisodeError      an episode file does not describe a valid episode
     ├── SamplingError     no disorganized house satisfies the constraints
     ├── ActionError       an action's numbers are unusable (a refusal is not an error)
+    ├── PersonError       a value of a person is out of range
     ├── PhysicsError      MuJoCo warned, or a state is not finite
     ├── StateError        a saved state does not fit the world, or the world is in the middle of a motion
     └── RenderError       no GL context, or a frame cannot be drawn
@@ -31,6 +32,10 @@ class SamplingError(MjsimError):
 
 class ActionError(MjsimError):
     """An action's numbers are unusable."""
+
+
+class PersonError(MjsimError):
+    """A value of a person is out of range."""
 
 
 class PhysicsError(MjsimError):

@@ -14,17 +14,10 @@ REST_STEPS = 4  # control steps in a row below `settle_speed`, after which an ob
 
 @dataclass(frozen=True)
 class WorldOptions:
-    """Limits of walking, reach and grip, and the tier of fidelity.
+    """Time step, grip, rest and the tier of fidelity; what differs from person to person is in `PersonParameters`.
 
     Attributes:
         control_timestep: Duration of one `World.step`, s; a multiple of the model's timestep.
-        max_speed: Fastest walk, m/s.
-        max_turn: Fastest turn of the body, rad/s.
-        max_look: Fastest pitch of the head, rad/s.
-        acceleration: How fast the walking velocity changes, m/s^2.
-        turn_acceleration: How fast the turning rate changes, rad/s^2.
-        pick_reach: Farthest an object's centre may be from the body axis, horizontally, m.
-        place_reach: Farthest a receptacle's volume may be from the body axis, horizontally, m.
         grip_distance: A hand grips only within this distance of the grip site, m.
         grip_error: A weld stretched farther than this slips, m.
         grip_patience: For how long it may stay stretched, s.
@@ -41,13 +34,6 @@ class WorldOptions:
     """
 
     control_timestep: float = 0.04
-    max_speed: float = 1.4
-    max_turn: float = 2.5
-    max_look: float = 1.5
-    acceleration: float = 3.0
-    turn_acceleration: float = 15.0
-    pick_reach: float = 1.0
-    place_reach: float = 1.0
     grip_distance: float = 0.08
     grip_error: float = 0.009
     grip_patience: float = 0.1

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjsim.kernels import kernel
 from mjsim.model.scene import Scene
+from mjsim.person_parameters import PersonParameters
 
 DRAWN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # what the first-person view draws
 SKIP = 1e-4  # share of a ray that is skipped to get through a surface of the person
@@ -33,9 +34,14 @@ class FieldOfView:
         range: How far an object is noticed, m.
     """
 
-    horizontal: float = math.radians(80.0)
-    vertical: float = math.radians(65.0)
-    range: float = 8.0
+    horizontal: float
+    vertical: float
+    range: float
+
+    @classmethod
+    def of(cls, person: PersonParameters) -> "FieldOfView":
+        """What a person sees in a picture of 4:3."""
+        return cls(person.field_of_view, person.vertical_field, person.viewing_distance)
 
 
 class SightGeometry(NamedTuple):
@@ -98,13 +104,13 @@ def visible_objects(
         eye: Eye position, m, shape (3,).
         heading: Yaw of the gaze, rad, 0 along +x, counter-clockwise.
         pitch: Elevation of the gaze, rad, positive upwards.
-        field: Field of view; by default 80 by 65 degrees and 8 m.
+        field: Field of view; None for that of the scene's person.
         among: Instance names to look for; None for all. The fewer, the quicker.
     """
     sight = scene.once("sight", lambda: _sight_geometry(scene))
     names = scene.index.names
     wanted = np.array([among is None or name in among for name in names], np.bool_)
-    gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView())
+    gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
     owners, rays = open_rays(sight, data.geom_xpos, data.geom_xmat, wanted, gaze)
     seen: set[int] = set()
     for owner, ray in zip(owners.tolist(), rays, strict=True):

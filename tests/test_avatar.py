@@ -13,6 +13,7 @@ from mjsim.errors import AssetError
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import Scene, compose
+from mjsim.person_parameters import PersonParameters
 
 START = StartPose(1.2, 0.9, 0.7)
 
@@ -66,7 +67,7 @@ def test_the_eye_looks_ahead_and_slightly_down(small_scene: Scene, data: mujoco.
         -math.sin(down),
     )
     assert looks == pytest.approx(expected, abs=1e-9)
-    assert camera.xpos[2] == pytest.approx(avatar.EYE_HEIGHT, abs=0.02)
+    assert camera.xpos[2] == pytest.approx(1.6, abs=0.02)
     upright = camera.xmat.reshape(3, 3)[:, 1]
     assert upright[2] > 0.9
     data.qpos[joint_address(small_scene.model, "pitch")] = math.radians(30)
@@ -147,7 +148,7 @@ def test_incomplete_objects_are_named(change: Callable[[mujoco.MjSpec], None], m
     spec = mujoco.MjSpec()
     change(spec)
     with pytest.raises(AssetError, match=message):
-        avatar.attach_avatar(spec, ["c"], start=(0, 0, 0))
+        avatar.attach_avatar(spec, ["c"], start=(0, 0, 0), person=PersonParameters())
 
 
 def test_hands_mirror_each_other() -> None:

@@ -10,7 +10,7 @@ from mjsim.actions import Move, Pick, Place
 from mjsim.environments.control import Continuous
 from mjsim.environments.core import ObservationDict, Rearrangement
 from mjsim.environments.options import EnvironmentOptions, build
-from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 
 
 @pytest.fixture(scope="module")
@@ -74,10 +74,9 @@ def test_demonstrations_are_repeatable(core: Rearrangement, house: House) -> Non
 
 def test_actions_are_encoded_for_continuous_control(core: Rearrangement) -> None:
     """Control of an encoded action asks the world for the action itself, triggers for the attempt."""
-    options = WorldOptions()
     core.reset(0)
     for action in (Move(forward=0.7, left=-0.3, turn=1.1), Pick("object_00"), Place("object_00")):
-        asked = next(Continuous().steps(encode(action, options), core.state, options))
+        asked = next(Continuous().steps(encode(action, PersonParameters()), core.state, core.world))
         assert type(asked) is type(action)
         if isinstance(action, Move) and isinstance(asked, Move):
             assert (asked.forward, asked.left, asked.turn) == pytest.approx((0.7, -0.3, 1.1), abs=1e-6)

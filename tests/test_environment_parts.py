@@ -26,6 +26,7 @@ from mjsim.model import navigable
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.navigable import installed_builder
 from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 from planner.navmesh import NavMesh
 
@@ -130,7 +131,7 @@ def test_a_discrete_attempt_lasts_until_the_hands_are_done(small_catalogue: Cata
 
 def drive(control: Continuous, action: Sequence[float], core: Rearrangement) -> list[Any]:
     """What the world is asked for."""
-    steps = control.steps(np.array(action), core.state, WorldOptions())
+    steps = control.steps(np.array(action), core.state, core.world)
     asked = [next(steps)]
     while True:
         try:
@@ -231,7 +232,9 @@ def draw(catalogue: Catalogue, navmesh: NavMesh) -> Callable[[int], Episode]:
 
 
 def cache(catalogue: Catalogue, draw: Callable[[int], Episode], count: int | None = None) -> EpisodeCache:
-    return EpisodeCache(catalogue, draw, count=count, options=WorldOptions(), size=2)
+    return EpisodeCache(
+        catalogue, draw, count=count, options=WorldOptions(), person=PersonParameters(), size=2
+    )
 
 
 def test_compiled_episodes_are_reused_and_freed(catalogue: Catalogue, draw: Callable[[int], Episode]) -> None:

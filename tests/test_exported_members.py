@@ -19,6 +19,7 @@ PUBLIC = [
         "MjsimError",
         "Move",
         "Observation",
+        "PersonParameters",
         "Pick",
         "Place",
         "Refusal",

@@ -26,6 +26,7 @@ from mjsim.model.footprint import Footprint
 from mjsim.model.scene import Scene, compose
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import FIDELITIES, WorldOptions
+from mjsim.person_parameters import PersonParameters
 from mjsim.rollout import Rollout
 from mjsim.visibility import visible_objects
 from mjsim.world import World
@@ -234,7 +235,7 @@ def test_a_walk_without_physics_goes_where_the_physics_goes(
 
 @pytest.fixture(scope="module")
 def floor(house_model: mujoco.MjModel) -> Floor:
-    return Floor.of(house_model)
+    return Floor.of(house_model, PersonParameters().body_radius)
 
 
 @given(
@@ -252,7 +253,7 @@ def test_nobody_walks_into_or_through_a_wall(
 ) -> None:
     """Against the outlines of the apartment as polygons of another library: never nearer than the trunk is wide."""
     obstacles = shapely.union_all([shapely.Polygon(p) for p in house_footprint.obstacles])
-    gait = Gait.of(house.model, WorldOptions(max_speed=speed, acceleration=agility))
+    gait = Gait.of(house, WorldOptions())._replace(max_speed=speed, acceleration=agility)
     rng = np.random.default_rng(start)
     x0, y0, x1, y1 = house_footprint.bounds
     free = [
@@ -264,7 +265,7 @@ def test_nobody_walks_into_or_through_a_wall(
         kinematics.walk(body, forward, left, turn, look, gait, floor)
         trail.append(body[[X, Y]])
     gaps = shapely.distance(obstacles, shapely.points(np.array(trail)))
-    assert gaps.min() > avatar.TRUNK_RADIUS - 1e-6
+    assert gaps.min() > house.person.body_radius - 1e-6
     assert not shapely.LineString(trail).intersects(obstacles)
 
 
@@ -277,7 +278,7 @@ def test_the_person_slides_along_a_wall(house: Scene, fidelity: str) -> None:
     before = world.observation().position
     after = world.walk([[1.4, 0.0, 0.0, 0.0]] * 25).observation
     assert after.position[0] - before[0] == pytest.approx(1.4 * math.cos(after.heading), abs=0.02)
-    assert after.position[1] == pytest.approx(avatar.TRUNK_RADIUS, abs=1e-6)
+    assert after.position[1] == pytest.approx(house.person.body_radius, abs=1e-6)
 
 
 @given(points=st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=30))

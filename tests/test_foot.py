@@ -11,7 +11,7 @@ from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import compose
-from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 
 HALF = np.array([0.30, 0.10])  # of the box, m
@@ -31,7 +31,7 @@ def test_edges_push_back_straight(geom: str, shape: str) -> None:
         kind = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "box"}
     bit = avatar.STATIC_BIT if geom == avatar.TRUNK else avatar.OBJECT_BIT
     spec.worldbody.add_geom(name="box", pos=[0, 0, 0.3], contype=bit, conaffinity=bit, **kind)
-    avatar.attach_avatar(spec, (), start=(0.0, 0.0, 0.0))
+    avatar.attach_avatar(spec, (), start=(0.0, 0.0, 0.0), person=PersonParameters())
     model = spec.compile()
     data, rng = mujoco.MjData(model), np.random.default_rng(5)
     for _ in range(300):
@@ -39,7 +39,7 @@ def test_edges_push_back_straight(geom: str, shape: str) -> None:
         angle = rng.uniform(0.0, math.pi / 2)
         away = np.sign(nearest) * (math.cos(angle), math.sin(angle))
         depth = rng.uniform(0.002, 0.03)
-        place = nearest + (avatar.TRUNK_RADIUS - depth) * away
+        place = nearest + (PersonParameters().body_radius - depth) * away
         data.qpos[[model.joint(f"avatar/{axis}").qposadr[0] for axis in "xy"]] = place
         mujoco.mj_forward(model, data)
         assert data.ncon
@@ -57,7 +57,8 @@ def _runner(catalogue: Catalogue, model: str, speed: float, aside: float) -> Wor
     targets = {"thing": catalogue.categories[category].receptacle}
     start = StartPose(1.5, WALL - 1.3, math.pi / 2)
     episode = Episode(catalogue.name, 0, start, (placed,), tuple(catalogue.receptacles), targets)
-    return World(compose(episode, catalogue), WorldOptions(max_speed=speed, acceleration=12.0))
+    person = PersonParameters(walking_speed=speed * 13 / 14, walking_acceleration=12.0)
+    return World(compose(episode, catalogue, person=person))
 
 
 def _squeeze(world: World) -> float:

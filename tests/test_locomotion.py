@@ -7,10 +7,11 @@ import pytest
 
 from experiments.locomotion import BACK_OFF, BACK_OFF_TIME, PROGRESS_TIMEOUT, LocomotionController
 from experiments.participants.base import Moves, Percept, WalkAlong
-from experiments.participants.visit_executor import CLOSER, MIN_STOP_DISTANCE, STOP_DISTANCE, VisitExecutor
+from experiments.participants.visit_executor import CLOSER, MIN_STOP_DISTANCE, STOP_SHARE, VisitExecutor
 from mjsim.actions import ActionResult, Move, Pick, Refusal
 from mjsim.errors import ActionError
 from mjsim.observation import ObjectStatus, Observation
+from mjsim.person_parameters import PersonParameters
 from planner.plan import Visit, VisitKind
 
 STEP = 0.04  # s
@@ -41,16 +42,18 @@ def walk_to(x, then=None):
 
 def test_an_object_in_the_way_is_sidestepped_unless_the_visit_is_about_it():
     ahead = seen(objects=[(0.6, 0.1), (5.0, 5.0)])
-    straight = LocomotionController(NO_WALLS).step(walk_to(3.0, Pick("a")), ahead)
-    aside = LocomotionController(NO_WALLS).step(walk_to(3.0, Pick("b")), ahead)
+    straight = LocomotionController(NO_WALLS, PersonParameters()).step(walk_to(3.0, Pick("a")), ahead)
+    aside = LocomotionController(NO_WALLS, PersonParameters()).step(walk_to(3.0, Pick("b")), ahead)
     assert straight.turn == straight.left == 0.0
     assert aside.turn < 0.0
     carried = dataclasses.replace(ahead, object_status=(ObjectStatus.CARRIED, ObjectStatus.LOOSE))
-    assert LocomotionController(NO_WALLS).step(walk_to(3.0, Pick("b")), carried).turn == 0.0
+    assert (
+        LocomotionController(NO_WALLS, PersonParameters()).step(walk_to(3.0, Pick("b")), carried).turn == 0.0
+    )
 
 
 def test_at_the_end_of_a_walk_the_person_turns_to_the_goal_and_acts():
-    controller, walk = LocomotionController(NO_WALLS), walk_to(3.0, Pick("a"))
+    controller, walk = LocomotionController(NO_WALLS, PersonParameters()), walk_to(3.0, Pick("a"))
     turn = controller.step(walk, seen(position=(2.7, 0.0), heading=1.0))
     assert (turn.forward, turn.left) == (0.0, 0.0)
     assert turn.turn < 0.0
@@ -59,7 +62,7 @@ def test_at_the_end_of_a_walk_the_person_turns_to_the_goal_and_acts():
 
 
 def test_a_blocked_person_backs_off_on_the_way_to_a_visit():
-    controller, walk = LocomotionController(NO_WALLS), walk_to(3.0, Pick("a"))
+    controller, walk = LocomotionController(NO_WALLS, PersonParameters()), walk_to(3.0, Pick("a"))
     moves, blocked = [], []
     for k in range(round((PROGRESS_TIMEOUT + BACK_OFF_TIME) / STEP) + 3):  # and the person does not move
         moves.append(controller.step(walk, seen(time=k * STEP)))
@@ -72,7 +75,7 @@ def test_a_blocked_person_backs_off_on_the_way_to_a_visit():
 
 
 def test_a_blocked_person_who_only_walks_is_told_so_and_does_not_back_off():
-    controller, walk = LocomotionController(NO_WALLS), walk_to(3.0)
+    controller, walk = LocomotionController(NO_WALLS, PersonParameters()), walk_to(3.0)
     moves = [controller.step(walk, seen(time=k * STEP)) for k in range(60)]
     assert BACK_OFF not in moves
 
@@ -101,10 +104,11 @@ def test_refusals_bring_the_person_closer_and_a_new_visit_starts_afresh():
     executor, there = VisitExecutor(House()), {"a": np.array([3.0, 0.0]), "b": np.array([0.0, 3.0])}
     pick = Visit(VisitKind.PICK, "a")
     distances = [executor.act(percept(seen(), refused=k > 0), pick, there).stop_distance for k in range(6)]
-    assert distances[:3] == pytest.approx([STOP_DISTANCE, STOP_DISTANCE - CLOSER, STOP_DISTANCE - 2 * CLOSER])
+    first = STOP_SHARE * PersonParameters().reach
+    assert distances[:3] == pytest.approx([first, first - CLOSER, first - 2 * CLOSER])
     assert distances[-1] == MIN_STOP_DISTANCE
     other = executor.act(percept(seen()), Visit(VisitKind.PICK, "b"), there)
-    assert (other.stop_distance, other.then) == (STOP_DISTANCE, Pick("b"))
+    assert (other.stop_distance, other.then) == (first, Pick("b"))
 
 
 def test_a_path_is_kept_until_the_person_leaves_it_or_is_blocked():

@@ -1,5 +1,6 @@
 """One set of numbers moves the person in every tier of fidelity."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -10,7 +11,7 @@ from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES, WorldOptions
-from mjsim.person.motion_parameters import MOTION, MotionParameters
+from mjsim.person_parameters import MotionParameters, PersonParameters
 from mjsim.world import World
 
 CHANGED = MotionParameters(
@@ -29,12 +30,15 @@ CHANGED = MotionParameters(
     start_time=0.32,
     least_travel=5.0,
     travel_speed=0.3,
-    descent_speed=0.2,
+    descent_speed=0.25,
     hover_gap=0.1,
     hover_time=0.28,
     release_gap=0.02,
     withdraw_steps=2,
     withdraw_step=0.01,
+    posture_gain=3.0,
+    posture_speed=0.4,
+    posture_acceleration=3.0,
 )
 LATER = 5  # control steps, for the times that are 0.2 s longer in `CHANGED`
 LONGER = {
@@ -82,10 +86,9 @@ def test_every_tier_moves_by_the_same_numbers(
     scene: Scene,
     usual: dict[str, tuple[int, int, np.ndarray]],
     name: str,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    changed = MOTION._replace(**{name: getattr(CHANGED, name)})
-    monkeypatch.setattr("mjsim.person.person.MOTION", changed)
+    changed = scene.person.motion._replace(**{name: getattr(CHANGED, name)})
+    scene = dataclasses.replace(scene, person=PersonParameters(motion=changed))
     for fidelity, (pick, place, poses) in usual.items():
         other_pick, other_place, other_poses = transport(scene, fidelity)
         assert not np.array_equal(poses, other_poses), f"{fidelity} does not move by `{name}`"

@@ -1,6 +1,7 @@
 """Seeing by rays: walls and objects block, the field of view has edges, and a dense oracle agrees."""
 
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -10,10 +11,12 @@ from numpy.typing import NDArray
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import Scene, compose
+from mjsim.person_parameters import PersonParameters
 from mjsim.visibility import OFFSETS, FieldOfView, visible_objects
 from planner.navmesh import NavMesh
 
 EYE_HEIGHT = 1.6
+USUAL = FieldOfView.of(PersonParameters())
 
 
 Placed = list[tuple[str, float, float]]
@@ -123,14 +126,14 @@ def test_edges_of_the_field(small_catalogue: Catalogue, sign: int) -> None:
     wide, narrow = 2 * (off + half), 2 * (off - half)
     for axis in ("horizontal", "vertical"):
         turn = {"horizontal": (sign * off, 0.0), "vertical": (0.0, sign * off)}[axis]
-        assert _look(small_catalogue, cube, eye, *turn, FieldOfView(**{axis: wide})) == ("cube_0",)
-        assert _look(small_catalogue, cube, eye, *turn, FieldOfView(**{axis: narrow})) == ()
+        assert _look(small_catalogue, cube, eye, *turn, replace(USUAL, **{axis: wide})) == ("cube_0",)
+        assert _look(small_catalogue, cube, eye, *turn, replace(USUAL, **{axis: narrow})) == ()
 
 
 def test_range(small_catalogue: Catalogue) -> None:
     eye, cube = (0.5, 2.0, 0.05), [("cube", 2.5, 2.0)]
-    assert _look(small_catalogue, cube, eye, 0.0, 0.0, FieldOfView(range=2.1)) == ("cube_0",)
-    assert _look(small_catalogue, cube, eye, 0.0, 0.0, FieldOfView(range=1.9)) == ()
+    assert _look(small_catalogue, cube, eye, 0.0, 0.0, replace(USUAL, range=2.1)) == ("cube_0",)
+    assert _look(small_catalogue, cube, eye, 0.0, 0.0, replace(USUAL, range=1.9)) == ()
 
 
 def _unblocked_share(
@@ -204,7 +207,7 @@ def test_agrees_with_dense_rays(scene: Scene, navmesh: NavMesh) -> None:
     mujoco.mj_forward(scene.model, data)
     alone = scene.model.__copy__()
     rng = np.random.default_rng(2)
-    field = FieldOfView()
+    field = USUAL
     seen_count = open_count = 0
     for _ in range(30):
         eye = np.array([*navmesh.sample(rng), EYE_HEIGHT])

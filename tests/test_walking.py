@@ -8,16 +8,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from experiments.path_following import (
-    BRAKING,
-    CLEARANCE,
-    CRUISE_SPEED,
     LOOK_AHEAD,
     LOOK_BEYOND,
-    MAX_TURN,
     MIN_AHEAD,
     SIDESTEP_RANGE,
     TURN_GAIN,
     Obstacles,
+    Pace,
     follow,
     is_free,
     sidestep,
@@ -32,6 +29,7 @@ PATIENT = settings(deadline=None)  # the first case compiles
 coordinate = st.floats(-5, 5).map(lambda v: round(v, 3))
 spots = st.tuples(coordinate, coordinate)
 points = st.lists(spots, min_size=2, max_size=6).map(np.array)
+PACE = Pace(speed=1.3, braking=1.5, turning_speed=2.5, clearance=0.4)
 NOTHING = Obstacles(np.zeros((0, 3)), np.zeros(0, bool), np.zeros((0, 4)))
 
 
@@ -74,7 +72,7 @@ def test_projection_is_the_nearest_of_many_points_along_the_path(path, position)
 
 
 def test_turning_takes_the_short_way_round():
-    rate, error = turn_towards(np.pi - 0.1, 0.0, 0.0, -1.0, -0.1)
+    rate, error = turn_towards(np.pi - 0.1, 0.0, 0.0, -1.0, -0.1, PACE.turning_speed)
     assert rate > 0
     assert 0 < error < 0.3
 
@@ -92,7 +90,7 @@ def test_a_point_mass_arrives_and_stays_near_the_path(path):
     path = np.array(path, dtype=float)
     position, heading, strayed = path[0].copy(), 0.0, 0.0
     for _ in range(1000):
-        position, heading = moved(position, heading, follow(path, *position, heading, NOTHING))
+        position, heading = moved(position, heading, follow(path, *position, heading, NOTHING, PACE))
         strayed = max(strayed, project(path, *position)[1])
         if np.linalg.norm(position - path[-1]) < 0.05:
             break
@@ -106,7 +104,9 @@ def test_things_on_the_way_are_walked_around(across):
     path, thing = np.array([[0.0, 0.0], [4.0, 0.0]]), np.array([2.0, across])
     position, heading, nearest = np.zeros(2), 0.0, np.inf
     for _ in range(400):
-        position, heading = moved(position, heading, follow(path, *position, heading, among(ANYWHERE, thing)))
+        position, heading = moved(
+            position, heading, follow(path, *position, heading, among(ANYWHERE, thing), PACE)
+        )
         nearest = min(nearest, float(np.linalg.norm(position - thing)))
     assert nearest > 0.3
     assert np.linalg.norm(position - path[-1]) < 0.1
@@ -115,22 +115,22 @@ def test_things_on_the_way_are_walked_around(across):
 def test_a_thing_is_passed_on_its_free_side():
     target, beyond = (0.25, 0.0), (1.0, 0.0)
     south, north = floor_of(_box(-9, -9, 9, -0.2)), floor_of(_box(-9, -9, 9, -0.2), _box(-9, 0.2, 9, 9))
-    assert sidestep(0.0, 0.0, target, beyond, among(ANYWHERE, (0.5, 0.1)))[1] < 0
-    assert sidestep(0.0, 0.0, target, beyond, among(south, (0.5, 0.1)))[1] > 0
-    assert sidestep(0.0, 0.0, target, beyond, among(north, (0.5, 0.1))) == target
+    assert sidestep(0.0, 0.0, target, beyond, among(ANYWHERE, (0.5, 0.1)), PACE.clearance)[1] < 0
+    assert sidestep(0.0, 0.0, target, beyond, among(south, (0.5, 0.1)), PACE.clearance)[1] > 0
+    assert sidestep(0.0, 0.0, target, beyond, among(north, (0.5, 0.1)), PACE.clearance) == target
 
 
 @pytest.mark.parametrize("thing", [(-0.3, 0.0), (1.5, 0.0), (0.4, 0.6)])
 def test_what_is_not_in_the_way_bends_nothing(thing):
     target = (0.25, 0.0)
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), among(ANYWHERE, thing)) == target
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), among(ANYWHERE, thing), PACE.clearance) == target
 
 
 def test_what_is_sought_or_put_away_bends_nothing():
     target, obstacles = (0.25, 0.0), among(ANYWHERE, (0.4, 0.0))
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), obstacles) != target
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), obstacles, PACE.clearance) != target
     ignored = obstacles._replace(is_obstacle=np.array([False]))
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), ignored) == target
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), ignored, PACE.clearance) == target
 
 
 def _box(x0, y0, x1, y1):
@@ -170,16 +170,16 @@ def sidestep_in_numpy(position, target, beyond, things, is_free):
     in_the_way = [
         (r @ ahead, r @ left)
         for r in offsets
-        if 0.0 < r @ ahead < SIDESTEP_RANGE and abs(r @ left) < CLEARANCE
+        if 0.0 < r @ ahead < SIDESTEP_RANGE and abs(r @ left) < PACE.clearance
     ]
     if not in_the_way:
         return target
     along, across = min(in_the_way)
     side = -1.0 if across >= 0 else 1.0
     for sign in (side, -side):
-        if sign == -side and along < MIN_AHEAD * abs(across + sign * CLEARANCE):
+        if sign == -side and along < MIN_AHEAD * abs(across + sign * PACE.clearance):
             return target
-        step = along * ahead + (across + sign * CLEARANCE) * left
+        step = along * ahead + (across + sign * PACE.clearance) * left
         aside = position + step * (np.linalg.norm(target - position) / np.linalg.norm(step))
         if is_free(position + step) and is_free(aside):
             return aside
@@ -195,8 +195,12 @@ def follow_in_numpy(path, position, heading, things, is_free):
     assume(np.linalg.norm(offset) > 1e-6)
     error = (np.arctan2(offset[1], offset[0]) - heading + np.pi) % (2 * np.pi) - np.pi
     assume(abs(error) < np.pi - 1e-6)  # straight behind, rounding says which way to turn
-    pace = min(CRUISE_SPEED, np.sqrt(2 * BRAKING * left)) * max(np.cos(error), 0.0) ** 2
-    return pace * np.cos(error), pace * np.sin(error), np.clip(TURN_GAIN * error, -MAX_TURN, MAX_TURN)
+    pace = min(PACE.speed, np.sqrt(2 * PACE.braking * left)) * max(np.cos(error), 0.0) ** 2
+    return (
+        pace * np.cos(error),
+        pace * np.sin(error),
+        np.clip(TURN_GAIN * error, -PACE.turning_speed, PACE.turning_speed),
+    )
 
 
 def is_no_tie(path, position):
@@ -220,7 +224,7 @@ def test_kernels_agree_with_numpy(path, position, heading, things):
         (project(path, *position), nearest_in_numpy(path, there)),
         (point_along(path, 1.234), along_in_numpy(path, 1.234)),
         (
-            follow(path, *position, heading, among(walls.outline, *things)),
+            follow(path, *position, heading, among(walls.outline, *things), PACE),
             follow_in_numpy(path, there, heading, np.array(things), walls.is_navigable),
         ),
     ):

@@ -312,7 +312,7 @@ def test_walking_follows_the_commands(make: Make) -> None:
 def test_walls_stop_and_let_slide_but_never_let_through(make: Make, heading: float) -> None:
     world = make((1.5, 1.0, float(heading)))
     trail = [world.step(Move(forward=1.4)).observation.position for _ in range(100)]
-    margin = avatar.TRUNK_RADIUS - 0.04
+    margin = world.scene.person.body_radius - 0.04
     for x, y in trail:
         assert margin < y < 4.0 - margin
         assert margin < x
@@ -372,8 +372,8 @@ def test_unusable_arguments_are_named(make: Make, small_catalogue: Catalogue) ->
         world.step("jump")  # type: ignore[arg-type]
     with pytest.raises(PhysicsError, match=r"0\.03 s is not a whole multiple"):
         World(world.scene, WorldOptions(control_timestep=0.03))
-    with pytest.raises(ActionError, match=r"WorldOptions\.max_speed must be a positive number, got 0"):
-        WorldOptions(max_speed=0)
+    with pytest.raises(ActionError, match=r"WorldOptions\.settle_time must be a positive number, got 0"):
+        WorldOptions(settle_time=0)
     bare = compose(world.scene.episode, small_catalogue, avatar=False)
     with pytest.raises(AssetError, match="avatar=True"):
         World(bare)

@@ -38,7 +38,7 @@ class _Recorder:
 
     def camera(self, world: World) -> CameraView:
         """The eye camera."""
-        pose = camera_pose(world.model, world.data, "avatar/eye")
+        pose = camera_pose(world.model, world.data, "avatar/eye", SIZE[0] / SIZE[1])
         return CameraView(pose.position, pose.rotation, pose.fovy, *SIZE)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002

@@ -17,10 +17,9 @@ from experiments.house import House
 from mjsim.actions import IDLE, Move
 from mjsim.episode import Episode
 from mjsim.errors import PhysicsError
-from mjsim.model.avatar import TRUNK_RADIUS
 from mjsim.model.footprint import footprint
 from mjsim.model.scene import compose
-from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 from planner.errors import UnreachableError
 from planner.polyline import point_along
@@ -87,11 +86,14 @@ class _Session:
         self._rng = np.random.default_rng([SEED, number])
         self._found = WalkResult(number, float(self._rng.uniform(*SPEEDS)))
         self._heap = _free_place(house, self._rng)
-        scene = compose(_episode(house, number, self._heap, self._rng), house.catalogue)
+        # `fastest_walk` is what the session asks for.
+        person = PersonParameters(
+            walking_speed=self._found.speed * 13 / 14, walking_acceleration=ACCELERATION
+        )
+        scene = compose(_episode(house, number, self._heap, self._rng), house.catalogue, person=person)
         self._solid = shapely.union_all([shapely.Polygon(p) for p in footprint(scene.model).obstacles])
         shapely.prepare(self._solid)
-        options = WorldOptions(max_speed=self._found.speed, acceleration=ACCELERATION)
-        self._world = World(scene, options)
+        self._world = World(scene)
         self._position = self._world.observation().position
 
     def run(self, seconds: float) -> WalkResult:
@@ -159,7 +161,7 @@ class _Session:
         trail = shapely.LineString([self._position, o.position])
         found.tunnelled += bool(self._solid.intersects(trail))
         gap = self._solid.distance(shapely.Point(o.position))
-        found.overlap.append(max(0.0, TRUNK_RADIUS - gap))
+        found.overlap.append(max(0.0, self._world.scene.person.body_radius - gap))
         dofs = world.scene.index.dofs[:, None] + np.arange(3)
         found.fastest = max(found.fastest, float(np.linalg.norm(world.data.qvel[dofs], axis=1).max()))
         self._position = o.position

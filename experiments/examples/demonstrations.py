@@ -14,8 +14,9 @@ from experiments.participants.base import Percept, Point, WalkAlong, positions_o
 from experiments.participants.nearest import Nearest
 from mjsim.actions import IDLE, Action, ActionResult, Move, Pick
 from mjsim.environments.core import ObservationDict, Rearrangement
+from mjsim.model.scene import Scene
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 
 Policy = Callable[[ObservationDict], NDArray[np.float32]]
 
@@ -40,21 +41,27 @@ class Expert:
 
     Args:
         house: The house, which the participant knows.
-        targets: Object name -> receptacle key.
+        scene: The scene of the episode.
 
     Attributes:
         answer: Result of the last pick or place of the episode; to be set by the caller.
     """
 
-    def __init__(self, house: House, targets: Mapping[str, str]) -> None:
+    def __init__(self, house: House, scene: Scene) -> None:
         self._participant = Nearest(house)
-        self._controller = LocomotionController(house.navmesh.outline)
-        self._targets = targets
+        self._controller = LocomotionController(house.navmesh.outline, scene.person)
+        self._scene = scene
         self.answer: ActionResult | None = None
 
     def act(self, observation: Observation) -> Action:
         """What the participant would do now."""
-        percept = _Omniscient(observation, self._targets, self.answer, blocked=self._controller.blocked)
+        percept = _Omniscient(
+            observation,
+            self._scene.episode.targets,
+            self.answer,
+            blocked=self._controller.blocked,
+            person=self._scene.person,
+        )
         decision = self._participant.act(percept)
         if not isinstance(decision, WalkAlong):
             return IDLE
@@ -76,10 +83,10 @@ def _without_objects(observation: Observation) -> Observation:
     return dataclasses.replace(observation, object_names=(), object_status=(), object_positions=nothing)
 
 
-def encode(action: Action, options: WorldOptions) -> NDArray[np.float32]:
+def encode(action: Action, person: PersonParameters) -> NDArray[np.float32]:
     """An action of the world as one of continuous control: (forward, left, turn, trigger), -1 to 1, shape (4,)."""
     if isinstance(action, Move):
-        speed, turn = options.max_speed, options.max_turn
+        speed, turn = person.fastest_walk, person.turning_speed
         values = [action.forward / speed, action.left / speed, action.turn / turn, 0.0]
     else:
         values = [0.0, 0.0, 0.0, 1.0 if isinstance(action, Pick) else -1.0]
@@ -111,10 +118,10 @@ def demonstrate(
     delivered = total = 0
     for seed in seeds:
         seen, _ = core.reset(seed)
-        expert = Expert(house, core.world.scene.episode.targets)
+        expert = Expert(house, core.world.scene)
         is_over = False
         while not is_over:
-            advice = encode(expert.act(core.state), core.world.options)
+            advice = encode(expert.act(core.state), core.world.scene.person)
             action = advice if driver is None else driver(seen)
             if not core.world.busy:  # busy hands ignore the action
                 rows.append(seen)

@@ -15,11 +15,13 @@ from mjsim.actions import Action, ActionResult, Move, Pick, Place
 from mjsim.episode import CAPACITY
 from mjsim.errors import ActionError
 from mjsim.observation import ObjectStatus, Observation
+from mjsim.person_parameters import PersonParameters
 from planner.plan import Visit
 
 Point = NDArray[np.float64]
 
 NEARBY = 1.3  # m
+USUAL_PERSON = PersonParameters()
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,7 @@ class Percept:
         answer: The world's answer to the previous action, if that was a pick or place.
         blocked: Whether the walk makes no progress.
         capacity: How many objects the person carries at most.
+        person: The participant itself.
 
     Attributes:
         time: Simulated time, s.
@@ -80,6 +83,7 @@ class Percept:
         targets: As above, from the lists in the HUD.
         answer: As above.
         blocked: As above; until the person has backed off.
+        person: As above: own speeds, reach, eyes and times.
     """
 
     def __init__(
@@ -90,12 +94,14 @@ class Percept:
         *,
         blocked: bool = False,
         capacity: int = CAPACITY,
+        person: PersonParameters = USUAL_PERSON,
     ) -> None:
         self._seen = seen
         self.time, self.position, self.heading = seen.time, seen.position, seen.heading
         self.hands, self.busy = seen.hands, seen.busy
         self.hands_full = len(seen.carried) >= capacity
         self.targets, self.answer, self.blocked = targets, answer, blocked
+        self.person = person
 
     @property
     def carried(self) -> tuple[str, ...]:

@@ -5,8 +5,7 @@ import math
 from experiments.participants.base import Decision, Percept
 from mjsim.actions import Move
 
-LOOK_INTERVAL = 0.2  # s between two looks while walking
-RATE = 2.0  # rad/s
+TURNING = 0.8  # of the turning speed
 FULL_TURN = 2.0 * math.pi
 
 
@@ -24,4 +23,4 @@ class FullTurn:
         """Turn on; None once the turn is complete."""
         step = (percept.heading - self._heading + math.pi) % FULL_TURN - math.pi
         self._turned, self._heading = self._turned + step, percept.heading
-        return Move(turn=RATE) if self._turned < FULL_TURN else None
+        return Move(turn=TURNING * percept.person.turning_speed) if self._turned < FULL_TURN else None

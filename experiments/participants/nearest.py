@@ -5,7 +5,7 @@ import numpy as np
 from experiments.house import House
 from experiments.locomotion import TIME_TOLERANCE
 from experiments.participants.base import WAIT, Decision, Participant, Percept, Point
-from experiments.participants.looking import LOOK_INTERVAL, FullTurn
+from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor, nearest_visit
 from planner.plan import Visit, VisitKind
 
@@ -48,7 +48,7 @@ class Nearest:
         if refused and self._choice is not None and self._choice.object not in percept.flagpoles:
             self._known.pop(self._choice.object, None)
         if percept.time >= self._next_look - TIME_TOLERANCE:
-            self._next_look = percept.time + LOOK_INTERVAL
+            self._next_look = percept.time + percept.person.looking_interval
             self._known.update(percept.flagpoles)
 
     def _visit(self, percept: Percept) -> Decision:

@@ -5,7 +5,7 @@ import numpy as np
 from experiments.house import House
 from experiments.locomotion import TIME_TOLERANCE
 from experiments.participants.base import WAIT, Decision, Participant, Percept, Point
-from experiments.participants.looking import LOOK_INTERVAL, FullTurn
+from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor, estimated_distances, nearest_visit
 from mjsim.actions import IDLE
 from planner.plan import Visit, VisitKind
@@ -48,7 +48,7 @@ class Searcher:
             self._remembered.pop(name, None)
         if percept.time < self._next_look - TIME_TOLERANCE:
             return
-        self._next_look = percept.time + LOOK_INTERVAL
+        self._next_look = percept.time + percept.person.looking_interval
         self._remembered.update(percept.look())
 
     def _next_visit(self, percept: Percept) -> Visit | None:

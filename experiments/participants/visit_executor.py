@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
+from experiments.locomotion import TIME_TOLERANCE
 from experiments.participants.base import WAIT, Decision, Guidance, Percept, Point, WalkAlong
 from mjsim.actions import Pick, Place
 from planner.errors import PlannerError
 from planner.plan import Visit, VisitKind
 from planner.polyline import project
 
-STOP_DISTANCE = 0.72  # m from the goal: near enough to reach, far enough not to kick it
+STOP_SHARE = 0.72  # of the reach, from the goal: near enough to reach, far enough not to kick it
 CLOSER = 0.12  # m nearer after every refusal
 MIN_STOP_DISTANCE = 0.30  # m
 FAR = 1e6  # m
@@ -28,7 +29,8 @@ class VisitExecutor:
     def __init__(self, house: House) -> None:
         self._house = house
         self._visit: Visit | None = None
-        self._stop_distance = STOP_DISTANCE
+        self._stop_distance = MIN_STOP_DISTANCE
+        self._read_until = 0.0
         self._path: NDArray[np.float64] | None = None
         self._places: tuple[Visit, Point, Point] | None = None
 
@@ -45,8 +47,10 @@ class VisitExecutor:
         """
         if percept.busy:
             return WAIT
-        goal, stand = self._find_places(percept, visit, objects)
         self._take_up(percept, visit)
+        if self._is_reading(percept):
+            return WAIT
+        goal, stand = self._find_places(percept, visit, objects)
         path = self._path_to(percept, stand)
         return WalkAlong(path, goal, self._stop_distance, _action(visit), until)
 
@@ -55,6 +59,8 @@ class VisitExecutor:
         if percept.busy:
             return WAIT
         self._take_up(percept, guidance.visit)
+        if self._is_reading(percept):
+            return WAIT
         return WalkAlong(
             guidance.path,
             guidance.goal,
@@ -72,9 +78,15 @@ class VisitExecutor:
 
     def _take_up(self, percept: Percept, visit: Visit) -> None:
         if visit != self._visit:
-            self._visit, self._path, self._stop_distance = visit, None, STOP_DISTANCE
+            self._visit, self._path = visit, None
+            self._stop_distance = STOP_SHARE * percept.person.reach
+            self._read_until = percept.time + percept.person.reading_time
         if percept.answer is not None and not percept.answer.applied:
             self._stop_distance = max(self._stop_distance - CLOSER, MIN_STOP_DISTANCE)
+
+    def _is_reading(self, percept: Percept) -> bool:
+        """Whether the person still stands and reads what comes next."""
+        return percept.time < self._read_until - TIME_TOLERANCE
 
     def _path_to(self, percept: Percept, goal: Point) -> NDArray[np.float64]:
         """The path as it was, or a new one if that leads elsewhere, is blocked, or the person has left it; (k, 2)."""

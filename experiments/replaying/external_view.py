@@ -10,9 +10,9 @@ from experiments.first_person import FilmConfig
 from experiments.video import VideoWriter
 from hud.projection import CameraView
 from hud.state import HudState, Marker, Rgba, Vec3
-from mjsim.model.avatar import EYE_HEIGHT, TRUNK_RADIUS
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
+from mjsim.person_parameters import PersonParameters
 from mjsim.render import CameraPose, Renderer
 from mjsim.render.rasteriser import TOP_DOWN_GROUPS
 from mjsim.world import World
@@ -86,7 +86,7 @@ class ExternalViewer:
         self._renderer = Renderer(
             scene.model, width=film.width, height=film.height, profile=film.profile, groups=TOP_DOWN_GROUPS
         )
-        self._camera = camera
+        self._camera, self._person = camera, scene.person
         self._video = video
 
     def camera(self, world: World) -> CameraView | None:  # noqa: ARG002 - part of the protocol
@@ -95,7 +95,7 @@ class ExternalViewer:
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
         """Film one frame: house, person, and the world-locked markers of the HUD."""
-        markers = [*hud_state.markers, *figure(observation)]
+        markers = [*hud_state.markers, *figure(observation, self._person)]
         self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
 
     def close(self) -> None:
@@ -111,15 +111,14 @@ class ExternalViewer:
         self.close()
 
 
-def figure(observation: Observation) -> tuple[Marker, ...]:
+def figure(observation: Observation, person: PersonParameters) -> tuple[Marker, ...]:
     """Markers for the person: body, head, and a nose that shows the heading."""
     x, y = (float(v) for v in observation.position)
     c, s = math.cos(observation.heading), math.sin(observation.heading)
-    body = EYE_HEIGHT - 0.25
+    height, radius = person.eye_height, person.body_radius
+    body = height - 0.25
     return (
-        Marker(
-            "cylinder", (x, y, body / 2), (TRUNK_RADIUS, body / 2, 0.0), _BODY_COLOUR, "person", x_ray=True
-        ),
-        Marker("sphere", (x, y, EYE_HEIGHT), (0.14, 0.0, 0.0), _HEAD_COLOUR, "person"),
-        Marker("sphere", (x + 0.15 * c, y + 0.15 * s, EYE_HEIGHT), (0.06, 0.0, 0.0), _BODY_COLOUR, "person"),
+        Marker("cylinder", (x, y, body / 2), (radius, body / 2, 0.0), _BODY_COLOUR, "person", x_ray=True),
+        Marker("sphere", (x, y, height), (0.14, 0.0, 0.0), _HEAD_COLOUR, "person"),
+        Marker("sphere", (x + 0.15 * c, y + 0.15 * s, height), (0.06, 0.0, 0.0), _BODY_COLOUR, "person"),
     )

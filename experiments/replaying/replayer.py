@@ -46,8 +46,9 @@ class Replayer:
     """
 
     def __init__(self, record: RunRecord, house: House, *, start: float, assistance: str) -> None:
+        house = house.for_person(record.person)
         self.record, self.house = record, house
-        self.scene = compose(record.episode, house.catalogue)
+        self.scene = compose(record.episode, house.catalogue, person=record.person)
         try:
             self._world = World(self.scene, WorldOptions(**record.start["world"]))
         except (TypeError, ActionError) as error:

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,9 @@ from experiments.recording import Recorded, action_hashes
 from experiments.records import STATUS_CODE, Event, LogDigest, decode_action
 from mjsim.actions import Action, EventKind
 from mjsim.episode import Episode
-from mjsim.errors import EpisodeError
-from mjsim.model.avatar import EYE_HEIGHT
+from mjsim.errors import EpisodeError, PersonError
 from mjsim.observation import Observation
+from mjsim.person_parameters import PersonParameters
 
 STATUS = {code: status for status, code in STATUS_CODE.items()}
 WORLD_EVENTS = {kind.value: kind for kind in EventKind}
@@ -68,6 +68,7 @@ class RunRecord:
         directory: The run directory.
         start: The first event of the log: configuration, versions, fingerprints.
         events: The events up to the first line that cannot be read, each with the control step that logged it.
+        person: The participant, with every value that was drawn.
         episode: The disorganized house.
         arrays: The trajectory.
         recorded: Hashes and checkpoints.
@@ -77,6 +78,7 @@ class RunRecord:
     directory: Path
     start: Event
     events: tuple[tuple[int, Event], ...]
+    person: PersonParameters
     episode: Episode
     arrays: Mapping[str, NDArray[Any]]
     recorded: Recorded
@@ -122,7 +124,7 @@ class RunRecord:
             position=arrays["position"][step],
             heading=float(arrays["heading"][step]),
             pitch=float(arrays["pitch"][step]),
-            eye=np.array([*arrays["position"][step], EYE_HEIGHT]),
+            eye=np.array([*arrays["position"][step], self.person.eye_height]),
             velocity=np.zeros(2),
             object_names=names,
             object_positions=arrays["object_position"][step],
@@ -167,7 +169,7 @@ def load_run(directory: Path) -> RunRecord:
     events, malformed = _events(log, recorded.log_size)
     mismatches += [*malformed, *_check_settings(start, episode)]
     first = min(mismatches, key=lambda mismatch: mismatch.step, default=None)
-    return RunRecord(directory, start, tuple(events), episode, arrays, recorded, first)
+    return RunRecord(directory, start, tuple(events), _person(events), episode, arrays, recorded, first)
 
 
 def _layouts(objects: int) -> dict[str, Layout]:
@@ -176,6 +178,17 @@ def _layouts(objects: int) -> dict[str, Layout]:
         for name, (kind, row) in _ROWS.items()
     }
     return {**rows, "unknown_objects": (TEXT, (None,))}
+
+
+def _person(events: Sequence[tuple[int, Event]]) -> PersonParameters:
+    """The participant; the hashes of the log protect it."""
+    logged = next((event for _, event in events if event["event"] == records.PARTICIPANT), None)
+    try:
+        if logged is None:
+            raise PersonError("no event describes the participant")
+        return PersonParameters.from_dict(logged["person"])
+    except (PersonError, KeyError, TypeError) as error:
+        raise ReplayError(f"{records.EVENTS}: {error}; the first bad step is 0", 0) from error
 
 
 def _first_event(log: bytes) -> Event:

@@ -16,8 +16,7 @@ from mjsim.actions import IDLE, Action, Move, Pick, Place
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.errors import ActionError
 from mjsim.observation import Observation
-from mjsim.options import WorldOptions
-from mjsim.world import StepResult
+from mjsim.world import StepResult, World
 
 Steps = Generator[Action, StepResult, None]
 
@@ -29,13 +28,13 @@ class Control(Protocol):
         """Spec of an action of the agent."""
         ...
 
-    def steps(self, action: Any, observation: Observation, options: WorldOptions) -> Steps:
+    def steps(self, action: Any, observation: Observation, world: World) -> Steps:
         """Yield the actions of the world for one action of the agent, at least one.
 
         Args:
             action: Conforms to `spec`.
             observation: State before the action.
-            options: Limits of walking, reach and grip.
+            world: The world that will take them: who walks in it, and its time step; not to be changed.
 
         Raises:
             ActionError: The action does not conform.
@@ -47,7 +46,7 @@ class Control(Protocol):
 class Continuous:
     """Velocities and a trigger: (forward, left, turn, trigger), each clipped to [-1, 1].
 
-    Velocities are shares of the world's limits. A trigger above 0.5 picks the nearest object in reach, below -0.5
+    Velocities are shares of the person's limits. A trigger above 0.5 picks the nearest object in reach, below -0.5
     places a carried object; the first control step of such an action does not walk.
 
     Attributes:
@@ -67,7 +66,7 @@ class Continuous:
         """Float32, shape (4,), from -1 to 1."""
         return specs.BoundedArray((4,), np.float32, -1.0, 1.0, name="action")
 
-    def steps(self, action: Any, observation: Observation, options: WorldOptions) -> Steps:  # noqa: ARG002
+    def steps(self, action: Any, observation: Observation, world: World) -> Steps:  # noqa: ARG002
         """Yield `repeat` actions of the world.
 
         Raises:
@@ -79,7 +78,9 @@ class Continuous:
                 f"an action is (forward, left, turn, trigger), four finite numbers; got {action!r}"
             )
         forward, left, turn, trigger = np.clip(values, -1.0, 1.0).tolist()
-        move = Move(options.max_speed * forward, options.max_speed * left, options.max_turn * turn)
+        person = world.scene.person
+        speed = person.fastest_walk
+        move = Move(speed * forward, speed * left, person.turning_speed * turn)
         yield Pick() if trigger > 0.5 else Place() if trigger < -0.5 else move
         for _ in range(self.repeat - 1):
             yield move
@@ -113,7 +114,7 @@ class Discrete:
         """An integer: the index of the action in `MOVES`."""
         return specs.DiscreteArray(len(MOVES), dtype=np.int64, name="action")
 
-    def steps(self, action: Any, observation: Observation, options: WorldOptions) -> Steps:
+    def steps(self, action: Any, observation: Observation, world: World) -> Steps:
         """Yield as many actions of the world as the action takes.
 
         Raises:
@@ -124,14 +125,14 @@ class Discrete:
             raise ActionError(f"an action is a whole number below {len(MOVES)}, got {action!r}")
         move = MOVES[int(index)]
         if move == "forward":
-            return _walk(observation, self.stride, options)
+            return _walk(observation, self.stride, world)
         if move in ("turn_left", "turn_right"):
-            return _turn(observation, self.angle if move == "turn_left" else -self.angle, options)
+            return _turn(observation, self.angle if move == "turn_left" else -self.angle, world)
         return _pick_or_place(Pick() if move == "pick" else Place())
 
 
 _GAIN = 8.0  # 1/s, of the controller that ends a walk or a turn
-_BRAKING = 2.0  # m/s^2 planned for; the body can do 3
+_BRAKING = 2 / 3  # of what the body can do, for which walks are planned
 _DISTANCE_TOLERANCE = 0.002  # m
 _ANGLE_TOLERANCE = math.radians(0.1)
 _STANDING = 0.01  # m/s
@@ -140,32 +141,34 @@ _MAX_BLOCKED_STEPS = 4  # control steps without progress after which a walk ends
 _MAX_EXTRA_TIME = 2.0  # s for a walk that slides along an obstacle
 
 
-def _walk(observation: Observation, stride: float, options: WorldOptions) -> Steps:
+def _walk(observation: Observation, stride: float, world: World) -> Steps:
     """Walk straight ahead until the distance is covered or the way is blocked, then stand still."""
     start, heading = observation.position, observation.heading
     direction = np.array([math.cos(heading), math.sin(heading)])
     walked, blocked = 0.0, 0
-    for _ in range(math.ceil((_MAX_EXTRA_TIME + stride) / options.control_timestep)):
+    person, timestep = world.scene.person, world.control_timestep
+    fastest, braking = person.fastest_walk, _BRAKING * person.walking_acceleration
+    for _ in range(math.ceil((_MAX_EXTRA_TIME + stride / min(1.0, fastest)) / timestep)):
         if blocked == _MAX_BLOCKED_STEPS or stride - walked <= _DISTANCE_TOLERANCE:
             break
         left = stride - walked
-        delay = _BRAKING * options.control_timestep / 2  # braking begins a step late, and acts in steps
-        speed = min(options.max_speed, math.sqrt(2 * _BRAKING * left + delay**2) - delay, _GAIN * left)
+        delay = braking * timestep / 2  # braking begins a step late, and acts in steps
+        speed = min(fastest, math.sqrt(2 * braking * left + delay**2) - delay, _GAIN * left)
         step = yield Move(forward=speed)
         now = float((step.observation.position - start) @ direction)
         blocked = blocked + 1 if now - walked < _MIN_PROGRESS else 0
         walked = now
-    for _ in range(math.ceil(options.max_speed / (options.acceleration * options.control_timestep)) + 1):
+    for _ in range(math.ceil(fastest / (person.walking_acceleration * timestep)) + 1):
         step = yield IDLE
         if float(np.linalg.norm(step.observation.velocity)) < _STANDING:
             return
 
 
-def _turn(observation: Observation, angle: float, options: WorldOptions) -> Steps:
+def _turn(observation: Observation, angle: float, world: World) -> Steps:
     """Turn on the spot."""
     goal, error = observation.heading + angle, angle
-    max_time = abs(angle) / options.max_turn + 1.0
-    for _ in range(math.ceil(max_time / options.control_timestep)):
+    max_time = abs(angle) / world.scene.person.turning_speed + 1.0
+    for _ in range(math.ceil(max_time / world.control_timestep)):
         step = yield Move(turn=_GAIN * error)
         error = goal - step.observation.heading
         if abs(error) < _ANGLE_TOLERANCE:

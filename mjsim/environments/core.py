@@ -203,7 +203,7 @@ class Rearrangement:
         self, world: World, action: Any, before: Observation
     ) -> tuple[tuple[StepResult, ...], PhysicsError | None]:
         """The control steps of one action, until it or the episode ends, or the physics fails."""
-        commands = self.control.steps(action, before, world.options)
+        commands = self.control.steps(action, before, world)
         results: list[StepResult] = []
         command = next(commands)
         while True:

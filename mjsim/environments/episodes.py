@@ -13,6 +13,7 @@ from mjsim.model.navigable import NavigablePoints
 from mjsim.model.sampling import sample_episode
 from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 from mjsim.render import Labels, Renderer
 from mjsim.world import World
 
@@ -83,7 +84,8 @@ class EpisodeCache:
         catalogue: The house.
         make: Seed -> episode.
         count: Number of different episodes; seeds are taken modulo it. None for no limit.
-        options: Limits of walking, reach and grip.
+        options: Rules of the world.
+        person: Who walks in it.
         size: How many compiled episodes are kept, about 20 MB each.
     """
 
@@ -94,10 +96,11 @@ class EpisodeCache:
         *,
         count: int | None,
         options: WorldOptions,
+        person: PersonParameters,
         size: int,
     ) -> None:
         self._catalogue, self._make, self._count = catalogue, make, count
-        self._options, self._size = options, size
+        self._options, self._person, self._size = options, person, size
         self._compiled: OrderedDict[int, CompiledEpisode] = OrderedDict()
 
     def get(self, seed: int) -> CompiledEpisode:
@@ -111,7 +114,7 @@ class EpisodeCache:
         if key not in self._compiled:
             while len(self._compiled) >= self._size:
                 self._compiled.popitem(last=False)[1].close()
-            scene = compose(self._make(key), self._catalogue)
+            scene = compose(self._make(key), self._catalogue, person=self._person)
             self._compiled[key] = CompiledEpisode(World(scene, self._options))
         self._compiled.move_to_end(key)
         return self._compiled[key]

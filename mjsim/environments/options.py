@@ -18,6 +18,7 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigableBuilder
 from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 
 T = TypeVar("T")
 
@@ -40,7 +41,8 @@ class EnvironmentOptions:
             which makes resets fast; or a list of sampled episodes.
         slots: Rows of the arrays with a row per object; None for the largest number of objects of an episode.
         camera: Images of the eye camera.
-        world: Limits of walking, reach and grip.
+        person: Speeds, reach, size and eyes of the person.
+        world: Rules of the world.
         keep: How many compiled episodes are cached, about 20 MB each; None for all if `episodes` is a number, else 8.
         physics_errors: `raise`, or `truncate` so that training goes on: an error of the physics then truncates the
             episode, with the last valid observation and the error in `info["physics_error"]`.
@@ -59,6 +61,7 @@ class EnvironmentOptions:
     episodes: int | Sequence[Episode] | None = None
     slots: int | None = None
     camera: CameraOptions = field(default_factory=CameraOptions)
+    person: PersonParameters = field(default_factory=PersonParameters)
     world: WorldOptions = field(default_factory=WorldOptions)
     keep: int | None = None
     physics_errors: Literal["raise", "truncate"] = "raise"
@@ -139,11 +142,18 @@ def build(options: EnvironmentOptions) -> Rearrangement:
         receptacles=tuple(catalogue.receptacles),
         floor=floor,
         camera=options.camera,
-        max_speed=options.world.max_speed,
+        max_speed=options.person.fastest_walk,
         time_limit=options.time_limit or SECONDS_PER_OBJECT * max_objects,
     )
     return Rearrangement(
-        EpisodeCache(catalogue, make, count=count, options=options.world, size=options.keep or cache_size),
+        EpisodeCache(
+            catalogue,
+            make,
+            count=count,
+            options=options.world,
+            person=options.person,
+            size=options.keep or cache_size,
+        ),
         layout,
         sensors=sensors,
         control=control,

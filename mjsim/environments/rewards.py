@@ -11,7 +11,6 @@ from mjsim.episode import CAPACITY
 from mjsim.model.scene import Scene
 from mjsim.observation import ObjectStatus, Observation
 
-WALKING_SPEED = 1.3  # m/s
 HANDLING_TIME = 2.0  # s, about what a pick or a place takes
 
 
@@ -75,7 +74,7 @@ def potential(scene: Scene, observation: Observation) -> float:
     if loose.any() and carried.sum() < CAPACITY:
         walk += np.linalg.norm(objects - observation.position, axis=1)[loose].min()
     handling = HANDLING_TIME * (2 * loose.sum() + carried.sum())
-    return -float(walk / WALKING_SPEED + handling)
+    return -float(walk / scene.person.walking_speed + handling)
 
 
 REWARDS: dict[str, RewardFunction] = {"time": TimeReward(), "shaped": TimeReward(shaping=1.0)}

@@ -32,6 +32,7 @@ class EpisodeState:
     def __init__(self, scene: Scene, capacity: int) -> None:
         self._capacity = capacity
         self._index, self._targets = scene.index, scene.episode.targets
+        self._eye_height = scene.person.eye_height
         self.held: list[int | None] = [None, None]
         self.reset()
 
@@ -87,7 +88,7 @@ class EpisodeState:
             position=np.array([x, y]),
             heading=heading,
             pitch=pitch,
-            eye=np.array(avatar.eye_position(x, y, heading, pitch)),
+            eye=np.array(avatar.eye_position(x, y, heading, pitch, self._eye_height)),
             velocity=velocity.copy(),
             object_names=self._index.names,
             object_positions=objects[0],

@@ -52,6 +52,7 @@ class KinematicModel(NamedTuple):
         floor: Outlines that the trunk meets.
         grips: Pose of an object in the frame of the hand that holds it, by object and grip, shape (n, 2, 7).
         loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
+        posture_pace: As `Hands.pace`, shape (3,).
         postures: Where an empty left hand belongs (`REST`), and one that holds something while walking (`CARRY`),
             turning (`TUCKED`) or when the other hand reaches (`ASIDE`), m, shape (4, 3).
         clearance: Clearance at the heights of carried objects.
@@ -64,6 +65,7 @@ class KinematicModel(NamedTuple):
     floor: Floor
     grips: Floats
     loads: Floats
+    posture_pace: Floats
     postures: Floats
     clearance: ClearanceField
     timestep: float
@@ -96,7 +98,15 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
     targets, speeds = vector[HANDS:HAND_SPEEDS].reshape(2, 3), vector[HAND_SPEEDS:GRASPS].reshape(2, 3)
     update_hands(
         BodyMotion(body, body[FORWARD:], model.clearance),
-        Hands(targets, speeds, model.compliance, model.goals, model.postures[REST], model.loads),
+        Hands(
+            targets,
+            speeds,
+            model.compliance,
+            model.goals,
+            model.postures[REST],
+            model.loads,
+            model.posture_pace,
+        ),
         Holding(held_in(vector, 0), held_in(vector, 1), moving, model.postures[posture]),
         Contacts(_NO_GEOMS, _NO_FRAMES, _NO_OWNERS),
         model.gait.dt,

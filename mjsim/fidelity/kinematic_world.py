@@ -54,10 +54,11 @@ class KinematicWorld:
         self.state = KinematicState(np.zeros(STATE_SIZE), np.zeros((len(scene.index.names), 7)))
         self.asleep = np.zeros(scene.model.ntree, np.int32)
         self.model = KinematicModel(
-            gait=Gait.of(scene.model, options),
-            floor=compiled_house(scene.catalogue).once(("floor",), lambda: Floor.of(scene.model)),
+            gait=Gait.of(scene, options),
+            floor=_floor(scene),
             grips=_grip_poses(scene),
             loads=carrying.loads,
+            posture_pace=full.person.posture_pace,
             postures=np.array([avatar.REST, avatar.CARRY, avatar.TUCKED, avatar.ASIDE]),
             clearance=carrying.clearance,
             timestep=float(scene.model.opt.timestep),
@@ -181,6 +182,13 @@ class KinematicWorld:
         if not np.array_equal(np.sort(asleep[sleepers]), sleepers):
             raise StateError("the state's sleeping objects do not form rings; take it from a world's `state`")
         vector[:], poses[:], self.asleep[:] = new_vector, new_poses.reshape(-1, 7), asleep
+
+
+def _floor(scene: Scene) -> Floor:
+    """Outlines that the trunk meets, worked out once per house and radius."""
+    radius = scene.person.body_radius
+    house = compiled_house(scene.catalogue)
+    return house.once(("floor", radius), lambda: Floor.of(scene.model, radius))
 
 
 def _grip_poses(scene: Scene) -> NDArray[np.float64]:

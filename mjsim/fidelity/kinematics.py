@@ -8,7 +8,7 @@ A body is one array of `BODY_SIZE` numbers, laid out by the indices of `body_sta
             walk(body, 1.4, 0.0, 0.3, 0.0, gait, floor)  # forward m/s, left m/s, turn rad/s, look rad/s
 
     body = standing(x, y, heading, pitch)
-    ten_steps_ahead(body, Gait.of(model, options), Floor.of(model))
+    ten_steps_ahead(body, Gait.of(scene, WorldOptions()), Floor.of(scene.model, scene.person.body_radius))
 
 `walk` changes `body` in place and returns nothing. It slews the commands as `Person.walk` does, then lets the four
 servos follow them in steps of the physics, with the masses, gains and force limits of the compiled model. The trunk
@@ -40,6 +40,7 @@ from mjsim.fidelity.body_state import (
 from mjsim.fidelity.trunk_contact import Floor, is_free, slide
 from mjsim.kernels import kernel
 from mjsim.model import avatar
+from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person import rate_limits
 
@@ -48,7 +49,8 @@ class Gait(NamedTuple):
     """Limits of walking and the servos that carry it out; SI units.
 
     Attributes:
-        max_speed, max_turn, max_look, acceleration, turn_acceleration: As in `WorldOptions`.
+        max_speed, max_turn, max_look, acceleration, turn_acceleration: Those of the person: `fastest_walk`,
+            `turning_speed`, `looking_speed`, `walking_acceleration` and `turning_acceleration`.
         dt: Control step.
         substeps: Physics steps in it.
         mass, walk_gain, walk_force: What x and y move, the gain of their velocity servos, and their force limit.
@@ -56,6 +58,7 @@ class Gait(NamedTuple):
         head_inertia, head_stiffness, head_damping, head_force: Of the head's position servo.
         lowest, highest: Range of the head's pitch.
         radius: Radius of the trunk.
+        eye_height, eye_forward: Of the eye above the floor, and in front of the body's axis.
     """
 
     max_speed: float
@@ -78,10 +81,13 @@ class Gait(NamedTuple):
     lowest: float
     highest: float
     radius: float
+    eye_height: float
+    eye_forward: float
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, options: WorldOptions) -> "Gait":
+    def of(cls, scene: Scene, options: WorldOptions) -> "Gait":
         """Read a compiled scene with a person."""
+        model, person = scene.model, scene.person
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         inertia = np.zeros((model.nv, model.nv))
@@ -93,11 +99,11 @@ class Gait(NamedTuple):
         damping = [float(-servo.biasprm[2]) for servo in servos]
         force = [float(servo.forcerange[1]) for servo in servos]
         return cls(
-            max_speed=options.max_speed,
-            max_turn=options.max_turn,
-            max_look=options.max_look,
-            acceleration=options.acceleration,
-            turn_acceleration=options.turn_acceleration,
+            max_speed=person.fastest_walk,
+            max_turn=person.turning_speed,
+            max_look=person.looking_speed,
+            acceleration=person.walking_acceleration,
+            turn_acceleration=person.turning_acceleration,
             dt=options.control_timestep,
             substeps=round(options.control_timestep / model.opt.timestep),
             mass=moved[0],
@@ -112,7 +118,9 @@ class Gait(NamedTuple):
             head_force=force[2],
             lowest=avatar.PITCH_RANGE[0],
             highest=avatar.PITCH_RANGE[1],
-            radius=avatar.TRUNK_RADIUS,
+            radius=person.body_radius,
+            eye_height=person.eye_height,
+            eye_forward=avatar.EYE_FORWARD,
         )
 
 

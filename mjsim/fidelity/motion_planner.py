@@ -1,4 +1,4 @@
-"""Picks and places worked out without physics, with the times and speeds of `mjsim.person.motion_parameters`.
+"""Picks and places worked out without physics, with the times and speeds of `mjsim.person_parameters`.
 
 Only the fall of a released object is physics. Success is decided by the same test as in `mjsim.person.placing`.
 """
@@ -28,7 +28,7 @@ from mjsim.person.slots import LoadExtent, Slot, best_slot, object_corners
 
 Vector = NDArray[np.float64]
 
-_MAX_STEPS = 400  # control steps of a motion
+_USUAL_STEPS = 200  # control steps of a motion; room for more is made when it is needed
 _REACH_LAG = 2  # control steps that a hand lags behind at the end of a reach
 _SEATING = 1  # control step in which a load is drawn into a hand that closes firmly
 
@@ -174,7 +174,7 @@ class _Motion:
 
     def __init__(self, full: Full, kinematic: KinematicWorld, hand: int) -> None:
         self._person, self._kinematic, self.hand = full.person, kinematic, hand
-        self.trajectory = MotionTrajectory.empty(_MAX_STEPS, len(kinematic.state.poses))
+        self.trajectory = MotionTrajectory.empty(_USUAL_STEPS, len(kinematic.state.poses))
         self.steps = full.person.steps
 
     @property
@@ -192,6 +192,7 @@ class _Motion:
         """Stand still and turn to a point (3,) m, or to a heading unless that is NaN, rad."""
         motion, kinematic = self._person.motion, self._kinematic
         steps = self.steps(motion.turn_timeout)
+        self._make_room(steps)
         motion_primitives.face(
             kinematic.state, self.trajectory, point, heading, tolerance, steps, motion, kinematic.model
         )
@@ -208,6 +209,7 @@ class _Motion:
         """Move the hand to a goal (3,) m; see `HandMovement`. Without a gaze the head stays as it is."""
         kinematic = self._kinematic
         gaze = _towards(kinematic.pitch_target) if gaze is None else gaze
+        self._make_room(steps)
         movement = HandMovement(self.hand, goal, in_house, steps, order, gaze)
         motion_primitives.move_hand(
             kinematic.state, self.trajectory, movement, self._person.motion, kinematic.model
@@ -236,6 +238,7 @@ class _Motion:
     def withdraw(self, fall: Fall, pitch: float) -> None:
         """Withdraw the hand while the released object falls; the head looks to `pitch`, rad."""
         kinematic = self._kinematic
+        self._make_room(len(fall.poses))
         motion_primitives.withdraw(
             kinematic.state,
             self.trajectory,
@@ -249,7 +252,12 @@ class _Motion:
 
     def end(self) -> None:
         """The control step in which the motion has ended."""
+        self._make_room(1)
         motion_primitives.end(self._kinematic.state, self.trajectory, self._kinematic.model)
+
+    def _make_room(self, steps: int) -> None:
+        if self.length + steps > len(self.trajectory.vectors):
+            self.trajectory = self.trajectory.longer(steps)
 
     def _in_body(self, point: Vector) -> Vector:
         body = self._kinematic.body

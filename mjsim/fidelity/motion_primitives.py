@@ -23,9 +23,8 @@ from mjsim.fidelity.kinematic_steps import (
 )
 from mjsim.fidelity.kinematics import Gait
 from mjsim.kernels import kernel
-from mjsim.model.avatar import EYE_FORWARD, EYE_HEIGHT
 from mjsim.person.hand_path import progress
-from mjsim.person.motion_parameters import MotionParameters
+from mjsim.person_parameters import MotionParameters
 from mjsim.rollout import RolloutArrays
 
 Floats = NDArray[np.float64]
@@ -50,6 +49,14 @@ class MotionTrajectory(NamedTuple):
         return cls(
             np.empty((max_steps, STATE_SIZE)), np.empty((max_steps, objects, 7)), np.zeros(1, np.int64)
         )
+
+    def longer(self, steps: int) -> "MotionTrajectory":
+        """The same with room for this many more control steps at least."""
+        size, objects = len(self.vectors) + max(steps, len(self.vectors)), self.poses.shape[1]
+        longer, length = MotionTrajectory.empty(size, objects), int(self.length[0])
+        longer.vectors[:length], longer.poses[:length] = self.vectors[:length], self.poses[:length]
+        longer.length[0] = length
+        return longer
 
 
 class HandMovement(NamedTuple):
@@ -133,10 +140,10 @@ def _turn(
 @kernel
 def _glance(body: Floats, point: Floats, motion: MotionParameters, gait: Gait) -> None:
     """Move the head's pitch towards a point of the house."""
-    out = EYE_FORWARD * math.cos(body[PITCH])
+    out = gait.eye_forward * math.cos(body[PITCH])
     dx = point[0] - body[X] - out * math.cos(body[HEADING])
     dy = point[1] - body[Y] - out * math.sin(body[HEADING])
-    dz = point[2] - EYE_HEIGHT - EYE_FORWARD * math.sin(body[PITCH])
+    dz = point[2] - gait.eye_height - gait.eye_forward * math.sin(body[PITCH])
     _look_towards(body, math.atan2(dz, math.sqrt(dx * dx + dy * dy)), motion, gait)
 
 

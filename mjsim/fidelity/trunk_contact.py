@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from mjsim.fidelity.body_state import VX, VY, X, Y
 from mjsim.kernels import kernel
-from mjsim.model import avatar
 from mjsim.model.footprint import footprint
 
 _TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
@@ -45,8 +44,8 @@ class Floor(NamedTuple):
     columns: int
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, radius: float = avatar.TRUNK_RADIUS) -> "Floor":
-        """Outlines of the static geoms at the heights of the trunk.
+    def of(cls, model: mujoco.MjModel, radius: float) -> "Floor":
+        """Outlines of the static geoms at the heights of a trunk of this radius, m.
 
         Raises:
             AssetError: The house has no rooms, or a static geom's outline is not known.

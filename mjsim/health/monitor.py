@@ -61,7 +61,9 @@ class HealthMonitor:
         self._settling = SettleTimer(scene)
         self._flags, self._sample = np.zeros(len(index.names), np.uint8), np.zeros(6)
         self._extremes = np.zeros(4)
-        limits = np.array([CHECK_DISTANCE, _FALL + _KICK * options.max_speed, options.settle_speed]) ** 2
+        limits = (
+            np.array([CHECK_DISTANCE, _FALL + _KICK * scene.person.fastest_walk, options.settle_speed]) ** 2
+        )
         arrays = ScanArrays(
             qpos=data.qpos,
             qvel=data.qvel,

@@ -22,6 +22,7 @@ import mujoco
 import numpy as np
 
 from mjsim.errors import AssetError
+from mjsim.person_parameters import PersonParameters
 
 STATIC_BIT = 1
 OBJECT_BIT = 4
@@ -38,15 +39,12 @@ HANDS = ("left", "right")
 GRIPS = (0, 1)
 GENTLE, FIRM = "gentle", "firm"  # how a hand holds
 
-TRUNK_RADIUS = 0.20
 SIDES = 64  # of the prisms of trunk and foot
 # Contact of the foot: time constant, s, damping ratio and impedance. The low impedance limits the force to a multiple
 # of the object's weight, so that a person steps over an object which a wall holds back. The high damping ties the
 # force to speed, so that such an object neither pushes the person away nor flies off.
 _FOOT_CONTACT = (0.1, 3.0, 0.2)
-EYE_HEIGHT = 1.60
 EYE_FORWARD = 0.06
-FIELD_OF_VIEW = 70.0  # vertical, degrees
 START_PITCH = math.radians(-12.0)
 PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
 # Postures of a hand in the body frame: forward, to its own side, up; m.
@@ -79,15 +77,21 @@ def posture(hand: int, place: tuple[float, float, float]) -> tuple[float, float,
     return forward, side if hand == 0 else -side, up
 
 
-def eye_position(x: float, y: float, heading: float, pitch: float) -> tuple[float, float, float]:
-    """Eye position in the house, m, of a person at (x, y), m, with this heading and head pitch, rad."""
+def eye_position(
+    x: float, y: float, heading: float, pitch: float, eye_height: float
+) -> tuple[float, float, float]:
+    """Eye position in the house, m, of a person at (x, y), with heading and head pitch, rad; lengths in m."""
     out = EYE_FORWARD * math.cos(pitch)
-    height = EYE_HEIGHT + EYE_FORWARD * math.sin(pitch)
+    height = eye_height + EYE_FORWARD * math.sin(pitch)
     return x + out * math.cos(heading), y + out * math.sin(heading), height
 
 
 def attach_avatar(
-    spec: mujoco.MjSpec, object_names: Sequence[str], *, start: tuple[float, float, float]
+    spec: mujoco.MjSpec,
+    object_names: Sequence[str],
+    *,
+    start: tuple[float, float, float],
+    person: PersonParameters,
 ) -> None:
     """Add the person, and inactive welds between each hand and each object.
 
@@ -95,13 +99,14 @@ def attach_avatar(
         spec: House with objects attached under `<instance>/`; modified in place.
         object_names: Instance names.
         start: x and y in m, heading in rad.
+        person: Size and eyes.
 
     Raises:
         AssetError: An instance has no body `<instance>/object` or lacks a grip site.
     """
     _set_object_bits(spec, object_names)
-    body = _add_body(spec, start)
-    _add_head(spec, body)
+    body = _add_body(spec, start, person.body_radius)
+    _add_head(spec, body, person)
     for number, hand in enumerate(HANDS):
         _add_hand(spec, body, hand, posture(number, REST))
     _declare_welds(spec, object_names)
@@ -138,7 +143,7 @@ def _set_inertia(
     body.ipos = list(centre)
 
 
-def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
+def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: float) -> Any:
     x, y, heading = start
     # The base does not turn, because a contact off its axis would spin the body.
     base = spec.worldbody.add_body(name=BASE, pos=[x, y, 0.0])
@@ -159,7 +164,7 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
         priority=2,
         solref=[0.008, 1],
         solimp=[0.98, 0.995, 0.001, 0.5, 2],
-        **_prism(spec, TRUNK, 0.84),
+        **_prism(spec, TRUNK, radius, 0.84),
     )
     # Soft, and lower than any carried object: it pushes light objects along the floor without launching them. It
     # reaches below the floor, so that it touches flat objects with its side and never stands on them.
@@ -176,19 +181,19 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float]) -> Any:
         solref=list(_FOOT_CONTACT[:2]),
         solimp=[_FOOT_CONTACT[2], _FOOT_CONTACT[2], 0.001, 0.5, 2.0],
         friction=[0.3, 0.005, 0.0001],
-        **_prism(spec, FOOT, 0.48),
+        **_prism(spec, FOOT, radius, 0.48),
     )
     return body
 
 
-def _prism(spec: mujoco.MjSpec, name: str, half_height: float) -> dict[str, Any]:
+def _prism(spec: mujoco.MjSpec, name: str, radius: float, half_height: float) -> dict[str, Any]:
     """Arguments of a geom that is an upright prism of `SIDES` sides, nearly a cylinder.
 
     Cylinders of MuJoCo 3.17 (`multiccd`) have wrong contact normals where the round side touches the edge of a box;
     meshes do not.
     """
     angles = np.arange(SIDES) * (2.0 * math.pi / SIDES)
-    ring = TRUNK_RADIUS * np.column_stack((np.cos(angles), np.sin(angles)))
+    ring = radius * np.column_stack((np.cos(angles), np.sin(angles)))
     vertices = [(*point, z) for point in ring.tolist() for z in (-half_height, half_height)]
     spec.add_mesh(name=name, uservert=np.ravel(vertices))
     return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name, "group": 4, "contype": 0, "mass": 0.0}
@@ -215,10 +220,12 @@ def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, forc
     )
 
 
-def _add_head(spec: mujoco.MjSpec, body: Any) -> None:
+def _add_head(spec: mujoco.MjSpec, body: Any, person: PersonParameters) -> None:
     # The hinge's axis is -y, so that a positive pitch looks up.
     half = -START_PITCH / 2
-    head = body.add_body(name=HEAD, pos=[0, 0, EYE_HEIGHT], quat=[math.cos(half), 0, math.sin(half), 0])
+    head = body.add_body(
+        name=HEAD, pos=[0, 0, person.eye_height], quat=[math.cos(half), 0, math.sin(half), 0]
+    )
     head.gravcomp = 1.0
     _set_inertia(head, 4.0, (0.03, 0.03, 0.03))
     head.add_joint(
@@ -229,7 +236,8 @@ def _add_head(spec: mujoco.MjSpec, body: Any) -> None:
     )
     _add_actuator(spec, "pitch", kp=60.0, kv=3.0, force=30.0)
     # Camera axes: x to the person's right, y up, looking along -z.
-    head.add_camera(name=EYE, pos=[EYE_FORWARD, 0, 0], quat=[0.5, 0.5, -0.5, -0.5], fovy=FIELD_OF_VIEW)
+    fovy = round(math.degrees(person.vertical_field), 9)
+    head.add_camera(name=EYE, pos=[EYE_FORWARD, 0, 0], quat=[0.5, 0.5, -0.5, -0.5], fovy=fovy)
 
 
 def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, float, float]) -> None:

@@ -16,6 +16,7 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compile_errors, compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
+from mjsim.person_parameters import PersonParameters
 
 T = TypeVar("T")
 
@@ -102,6 +103,7 @@ class Scene:
         rooms: Which room a point is in.
         receptacles: Receptacle key -> geometry.
         spec: The editable description, for export.
+        person: Who walks in it.
     """
 
     model: mujoco.MjModel
@@ -111,6 +113,7 @@ class Scene:
     rooms: RoomMap
     receptacles: Mapping[str, ReceptacleGeometry]
     spec: mujoco.MjSpec
+    person: PersonParameters
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
     def once(self, key: str, make: Callable[[], T]) -> T:
@@ -120,12 +123,20 @@ class Scene:
         return cast(T, self._derived[key])
 
 
-def compose(episode: Episode, catalogue: Catalogue, *, avatar: bool = True, visuals: bool = True) -> Scene:
+def compose(
+    episode: Episode,
+    catalogue: Catalogue,
+    *,
+    person: PersonParameters | None = None,
+    avatar: bool = True,
+    visuals: bool = True,
+) -> Scene:
     """Compose and compile an episode: house, receptacles, objects in their poses, person at the start.
 
     Args:
         episode: What to compose.
         catalogue: Catalogue of the episode's house.
+        person: Who walks in it; None for the usual person.
         avatar: Whether to add the person's body.
         visuals: Whether to include what is only drawn; without it a scene moves the same and compiles faster.
 
@@ -134,6 +145,7 @@ def compose(episode: Episode, catalogue: Catalogue, *, avatar: bool = True, visu
         EpisodeError: The episode names an object model or a receptacle that the catalogue does not have.
     """
     _check_names(episode, catalogue)
+    person = person or PersonParameters()
     house = compiled_house(catalogue)
     spec = house.spec(visuals=visuals)
     spec.copy_during_attach = True
@@ -144,7 +156,7 @@ def compose(episode: Episode, catalogue: Catalogue, *, avatar: bool = True, visu
             _attach_object(spec, model, placed)
         if avatar:
             start = episode.start
-            attach_avatar(spec, names, start=(start.x, start.y, start.heading))
+            attach_avatar(spec, names, start=(start.x, start.y, start.heading), person=person)
         spec.dedup_assets()  # attaching copies a model's assets for every instance
         model = spec.compile()
     tighten(model)
@@ -156,6 +168,7 @@ def compose(episode: Episode, catalogue: Catalogue, *, avatar: bool = True, visu
         rooms=house.rooms,
         receptacles=house.receptacles,
         spec=spec,
+        person=person,
     )
 
 

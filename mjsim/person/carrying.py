@@ -66,6 +66,7 @@ class Carrying:
         self._body = (rig.pose, rig.motion, tuple(self.clearance))
         self._hands = (
             targets, person.hand_velocities, self._compliance, np.zeros((2, 3)), rest, self.loads,
+            person.posture_pace,
         )  # fmt: skip
         self._strained = np.zeros(2, np.int64)
 

@@ -35,7 +35,7 @@ def resolve_pick(
         return replace(answer, refusal=Refusal.ALREADY_DELIVERED)
     if not inventory.free_hands:
         return replace(answer, refusal=Refusal.HANDS_FULL)
-    if _object_distance(person, item) > person.options.pick_reach or not _object_in_sight(person, item):
+    if _object_distance(person, item) > person.parameters.reach or not _object_in_sight(person, item):
         return replace(answer, refusal=Refusal.OUT_OF_REACH)
     return answer
 
@@ -46,7 +46,7 @@ def _pick_nearest(
     if not inventory.free_hands:
         return ActionResult(action, Refusal.HANDS_FULL)
     loose = [i for i, s in enumerate(status) if s is ObjectStatus.LOOSE]
-    near = sorted((d, i) for i in loose if (d := _object_distance(person, i)) <= person.options.pick_reach)
+    near = sorted((d, i) for i in loose if (d := _object_distance(person, i)) <= person.parameters.reach)
     for _, item in near:
         if _object_in_sight(person, item):
             name = person.scene.index.names[item]
@@ -79,7 +79,7 @@ def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: 
 
 def reachable_receptacles(person: Person) -> tuple[str, ...]:
     """Receptacles within reach and in sight, in the episode's order."""
-    near = (k for k in person.scene.receptacles if _distance(person, k) <= person.options.place_reach)
+    near = (k for k in person.scene.receptacles if _distance(person, k) <= person.parameters.reach)
     return tuple(k for k in near if _receptacle_in_sight(person, k))
 
 
@@ -100,5 +100,5 @@ def _object_in_sight(person: Person, item: int) -> bool:
 
 
 def _receptacle_in_sight(person: Person, key: str) -> bool:
-    eye = np.array([*person.rig.position, avatar.EYE_HEIGHT])
+    eye = np.array([*person.rig.position, person.parameters.eye_height])
     return receptacle_in_sight(person.scene.model, person.data, eye, person.scene.receptacles[key])

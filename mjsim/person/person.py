@@ -15,11 +15,11 @@ from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person.grips import Grips
 from mjsim.person.hand_path import point_between
-from mjsim.person.motion_parameters import MOTION, MotionParameters
-from mjsim.person.postures import move_hand
+from mjsim.person.postures import move_hand, posture_pace
 from mjsim.person.rate_limits import change_pitch, change_turn_rate, change_velocity
 from mjsim.person.receptacle_heights import ReceptacleHeights
 from mjsim.person.rig import Rig
+from mjsim.person_parameters import MotionParameters, PersonParameters
 
 # A motion sets the servos, yields once per control step, and returns whether it succeeded.
 Motion = Generator[None, None, bool]
@@ -35,7 +35,7 @@ class Person:
         hand_velocities: How fast the hands' targets move where no motion moves them, m/s, shape (2, 3).
         moving_hand: Hand that a motion moves at present; the others keep their posture.
         receptacle_heights: Tells how full receptacles are.
-        motion: Times and speeds of picking and placing.
+        posture_pace: As in `mjsim.person.postures.Hands`.
     """
 
     scene: Scene
@@ -47,13 +47,30 @@ class Person:
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
     moving_hand: int | None = None
     receptacle_heights: ReceptacleHeights = field(init=False)
-    motion: MotionParameters = field(default_factory=lambda: MOTION)
+    posture_pace: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
-        o = self.options
-        limits = (o.max_speed, o.acceleration, o.max_turn, o.turn_acceleration, o.max_look)
-        self._limits = np.array([*limits, *avatar.PITCH_RANGE, o.control_timestep])
+        p = self.parameters
+        limits = (
+            p.fastest_walk,
+            p.walking_acceleration,
+            p.turning_speed,
+            p.turning_acceleration,
+            p.looking_speed,
+        )
+        self._limits = np.array([*limits, *avatar.PITCH_RANGE, self.dt])
+        self.posture_pace = posture_pace(p.motion)
+
+    @property
+    def parameters(self) -> PersonParameters:
+        """Whose body it is."""
+        return self.scene.person
+
+    @property
+    def motion(self) -> MotionParameters:
+        """Times and speeds of picking and placing."""
+        return self.scene.person.motion
 
     @property
     def dt(self) -> float:
@@ -82,7 +99,7 @@ class Person:
     def move_hand_to_rest(self, hand: int) -> None:
         """Move an empty hand's target towards its rest, by one control step."""
         rest = avatar.posture(hand, avatar.REST)
-        move_hand(self.rig.hand_targets, self.hand_velocities, hand, *rest, self.dt)
+        move_hand(self.rig.hand_targets, self.hand_velocities, hand, *rest, self.posture_pace, self.dt)
 
     def center(self, item: int) -> NDArray[np.float64]:
         """Centre of mass of object `item`, m, shape (3,)."""
@@ -98,26 +115,28 @@ class Person:
         return not self.data.tree_awake[self.scene.index.trees[item]]
 
     def walk(self, move: Move) -> None:
-        """Change the commanded velocities and pitch towards a move, within the limits of the options."""
+        """Change the commanded velocities and pitch towards a move, within the person's limits."""
         forward, left, turn, look = float(move.forward), float(move.left), float(move.turn), float(move.look)
         change_command(self.rig.motion, forward, left, turn, look, self._limits)
 
     def brake(self) -> None:
         """Bring the walk nearer to a stand, by one control step; turning and looking stay as they are."""
-        o, rig = self.options, self.rig
+        rig = self.rig
         size = math.hypot(rig.motion[0], rig.motion[1])
-        rig.motion[:2] *= max(0.0, size - o.acceleration * self.dt) / size if size else 0.0
+        rig.motion[:2] *= (
+            max(0.0, size - self.parameters.walking_acceleration * self.dt) / size if size else 0.0
+        )
 
     def turn_towards(self, error: float) -> None:
         """Change the yaw rate so that a heading error, rad, decays without overshoot."""
-        o, rig = self.options, self.rig
-        change = _clip(self.motion.turn_gain * error, o.max_turn) - rig.turn
-        rig.motion[2] += _clip(change, o.turn_acceleration * self.dt)
+        person, rig = self.parameters, self.rig
+        change = _clip(self.motion.turn_gain * error, person.turning_speed) - rig.turn
+        rig.motion[2] += _clip(change, person.turning_acceleration * self.dt)
 
     def glance(self, point: NDArray[np.float64]) -> None:
         """Move the head's pitch towards a point of the house frame, (3,) m."""
         x, y, z = point.tolist()
-        eye_x, eye_y, eye_z = avatar.eye_position(*self.rig.pose[:4].tolist())
+        eye_x, eye_y, eye_z = self.rig.eye.tolist()
         self.look_towards(math.atan2(z - eye_z, math.hypot(x - eye_x, y - eye_y)))
 
     def look_towards(self, pitch: float) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
 from mjsim.model.clearance import ClearanceField, clearance_at
+from mjsim.person_parameters import MotionParameters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -37,9 +38,6 @@ RELAX = 0.9  # 1/s
 MAX_COMPLIANCE = 0.15  # m
 UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
 
-POSTURE_GAIN = 7.0  # 1/s
-POSTURE_SPEED = 1.5  # m/s
-POSTURE_ACCELERATION = 8.0  # m/s^2
 _ARRIVED = 0.0005  # m
 
 
@@ -67,6 +65,7 @@ class Hands(NamedTuple):
         goals: Room for where the hands belong, m, shape (2, 3).
         rest: Where an empty left hand belongs, m, shape (3,).
         loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
+        pace: Gain, 1/s, fastest, m/s, and acceleration, m/s^2, of a hand on its way to a posture, shape (3,).
     """
 
     targets: Floats
@@ -75,6 +74,7 @@ class Hands(NamedTuple):
     goals: Floats
     rest: Floats
     loads: Floats
+    pace: Floats
 
 
 class Contacts(NamedTuple):
@@ -104,6 +104,11 @@ class Holding(NamedTuple):
     right: int
     moving: int
     posture: Floats
+
+
+def posture_pace(motion: MotionParameters) -> Floats:
+    """`Hands.pace` of a person, shape (3,)."""
+    return np.array([motion.posture_gain, motion.posture_speed, motion.posture_acceleration])
 
 
 @kernel
@@ -138,28 +143,28 @@ def update_hands(body: BodyMotion, hands: Hands, holding: Holding, contacts: Con
     for hand in range(2):
         if hand != holding.moving:
             goal = hands.goals[hand]
-            move_hand(hands.targets, hands.velocities, hand, goal[0], goal[1], goal[2], dt)
+            move_hand(hands.targets, hands.velocities, hand, goal[0], goal[1], goal[2], hands.pace, dt)
 
 
 @kernel
 def move_hand(
-    targets: Floats, velocities: Floats, hand: int, x: float, y: float, z: float, dt: float
+    targets: Floats, velocities: Floats, hand: int, x: float, y: float, z: float, pace: Floats, dt: float
 ) -> None:
     """Move a hand's target, a row of `targets` (2, 3), m, towards x, y, z in the body frame, slower as it comes near.
 
-    `velocities` (2, 3), m/s, change with it.
+    `velocities` (2, 3), m/s, change with it; `pace` is that of `Hands`.
     """
     dx, dy, dz = x - targets[hand, 0], y - targets[hand, 1], z - targets[hand, 2]
     gap = math.sqrt(dx * dx + dy * dy + dz * dz)
     if gap < _ARRIVED:
         velocities[hand, 0] = velocities[hand, 1] = velocities[hand, 2] = 0.0
         return
-    pace = min(POSTURE_GAIN * gap, POSTURE_SPEED) / gap
-    cx = dx * pace - velocities[hand, 0]
-    cy = dy * pace - velocities[hand, 1]
-    cz = dz * pace - velocities[hand, 2]
+    rate = min(pace[0] * gap, pace[1]) / gap
+    cx = dx * rate - velocities[hand, 0]
+    cy = dy * rate - velocities[hand, 1]
+    cz = dz * rate - velocities[hand, 2]
     size = math.sqrt(cx * cx + cy * cy + cz * cz)
-    share = min(1.0, POSTURE_ACCELERATION * dt / size) if size > 0.0 else 0.0
+    share = min(1.0, pace[2] * dt / size) if size > 0.0 else 0.0
     velocities[hand, 0] += cx * share
     velocities[hand, 1] += cy * share
     velocities[hand, 2] += cz * share

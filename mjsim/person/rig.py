@@ -51,6 +51,7 @@ class Rig:
 
     def __init__(self, scene: Scene, data: mujoco.MjData, control_timestep: float) -> None:
         self.model, self.data = scene.model, data
+        self._eye_height = scene.person.eye_height
         model = scene.model
         self._substeps = round(control_timestep / model.opt.timestep)
         self._dt = control_timestep
@@ -139,7 +140,8 @@ class Rig:
     @property
     def eye(self) -> Vector:
         """Eye camera in the house frame, m, shape (3,)."""
-        return np.array(avatar.eye_position(*self.pose[:4].tolist()))
+        x, y, heading, pitch = self.pose[:4].tolist()
+        return np.array(avatar.eye_position(x, y, heading, pitch, self._eye_height))
 
     def to_body(self, point: Vector) -> Vector:
         """A point of the house frame, (3,) m, in the body frame."""

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.errors import RenderError
+from mjsim.model.avatar import EYE
+from mjsim.person_parameters import PICTURE_ASPECT
 
 # Nearer than any surface gets to an eye inside a body of radius 0.2 m; farther than any view indoors.
 NEAR = 0.04
@@ -115,8 +117,17 @@ class View:
                 light.pos, light.dir = self.position, forward
 
 
-def camera_pose(model: Any, data: Any, camera: str | CameraPose) -> CameraPose:
+def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) -> CameraPose:
     """Pose of the camera called `camera`, or the pose itself.
+
+    The eye has the same horizontal field of view in pictures of any shape, that of the person; any other camera of the
+    model has its vertical one, as everywhere in MuJoCo.
+
+    Args:
+        model: Compiled model.
+        data: Its state.
+        camera: Name or pose.
+        aspect: Width of the picture divided by its height.
 
     Raises:
         RenderError: The model has no camera of that name.
@@ -128,4 +139,7 @@ def camera_pose(model: Any, data: Any, camera: str | CameraPose) -> CameraPose:
         names = [model.camera(i).name for i in range(model.ncam)]
         raise RenderError(f"the model has no camera {camera!r}; it has {names}")
     rotation = data.cam_xmat[index].reshape(3, 3).copy()
-    return CameraPose(data.cam_xpos[index].copy(), rotation, float(np.deg2rad(model.cam_fovy[index])))
+    fovy = float(np.deg2rad(model.cam_fovy[index]))
+    if camera == EYE and aspect != PICTURE_ASPECT:
+        fovy = 2.0 * float(np.arctan(np.tan(fovy / 2.0) * PICTURE_ASPECT / aspect))
+    return CameraPose(data.cam_xpos[index].copy(), rotation, fovy)

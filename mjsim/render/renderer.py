@@ -7,13 +7,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.model.avatar import EYE
 from mjsim.render import context
 from mjsim.render.cameras import CameraPose, View, camera_pose
 from mjsim.render.markers import MarkerLike
 from mjsim.render.profiles import RenderProfile, resolve_profile
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Rasteriser
-
-EYE = "avatar/eye"
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +153,7 @@ class Renderer:
         Raises:
             RenderError: As for `rgb`.
         """
-        poses = [camera_pose(self._model, data, camera) for camera in cameras]
+        poses = [camera_pose(self._model, data, camera, self.width / self.height) for camera in cameras]
         with context.current_context():
             self._rasteriser.update(data)
             return tuple(self._frame(pose, markers, rgb, depth, segmentation) for pose in poses)
@@ -174,11 +173,11 @@ class Renderer:
         Raises:
             RenderError: Unknown camera.
         """
-        return camera_pose(self._model, data, camera)
+        return camera_pose(self._model, data, camera, self.width / self.height)
 
     def _look(self, data: Any, camera: str | CameraPose) -> View:
         self._rasteriser.update(data)
-        return View.of(camera_pose(self._model, data, camera))
+        return View.of(camera_pose(self._model, data, camera, self.width / self.height))
 
     def close(self) -> None:
         """Free the GL resources; again does nothing."""

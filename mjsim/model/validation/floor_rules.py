@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
-from mjsim.model.avatar import EYE_HEIGHT, TRUNK_RADIUS
 from mjsim.model.clearance import ClearanceField
 from mjsim.model.navigable import NavigableFloor
 from mjsim.model.rays import SOLID, first_hit, receptacle_in_sight
@@ -18,13 +17,14 @@ from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 from mjsim.model.validation.compiled import Compiled
 from mjsim.model.validation.findings import Finding
+from mjsim.person_parameters import PersonParameters
 
 BODY_BAND = (0.05, 1.8)  # m, heights in which a person bumps into things
 PASSAGE = 0.70  # m, width below which people squeeze through
 LEAST_PASSAGE = 0.50  # m, width of the body with the planner's clearance
 ROOM_AREA = 0.25  # m^2 of floor to stand on
 FLOOR_GAP = 0.006  # m, between the floor and z = 0
-REACH = 1.0  # m, from the person to a receptacle's volume
+USUAL = PersonParameters()
 SNAP = 1.0  # m, from a receptacle's site `approach` to where a person can stand
 MAX_TOP = 1.4  # m, of a receptacle's volume
 ABOVE = 0.3  # m that an object needs on its way down into a receptacle
@@ -109,7 +109,7 @@ def _shell(floor: Floor) -> Iterator[Finding]:
     free = floor.clearance.distance > 0
     components, _ = label(free)
     _, nearest = floor.nearest_room
-    inside = components[(nearest <= 0) & (floor.clearance.distance > TRUNK_RADIUS)]
+    inside = components[(nearest <= 0) & (floor.clearance.distance > USUAL.body_radius)]
     outside = components[0, 0]
     if not len(inside) or np.bincount(inside).argmax() != outside:
         return
@@ -284,15 +284,17 @@ def _bin_use(floor: Floor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
     subject = _about(floor, receptacle)
     stand = floor.navigable.snap(receptacle.approach, math.inf)
     away, gap = float(np.hypot(*(stand - receptacle.approach))), receptacle.distance(stand)
-    if away > SNAP or gap > REACH:
+    if away > SNAP or gap > USUAL.reach:
         yield subject.error(
             "reach",
             f"the nearest place to stand, ({stand[0]:.2f}, {stand[1]:.2f}), is {away:.2f} m from its site "
             f"'approach' and {gap:.2f} m from its volume",
-            f"leave free floor in front of it: at most {SNAP} m from the site, {REACH} m from the volume",
+            f"leave free floor in front of it: at most {SNAP} m from the site, {USUAL.reach} m from the volume",
             (*receptacle.approach, 0.0),
         )
-    elif not receptacle_in_sight(compiled.model, compiled.data, np.array([*stand, EYE_HEIGHT]), receptacle):
+    elif not receptacle_in_sight(
+        compiled.model, compiled.data, np.array([*stand, USUAL.eye_height]), receptacle
+    ):
         yield subject.error(
             "reach",
             f"cannot be seen from ({stand[0]:.2f}, {stand[1]:.2f}), where a person stands to use it",
