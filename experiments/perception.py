@@ -11,7 +11,7 @@ from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
 from mjsim.actions import ActionResult
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.visibility import in_field_of_view, visible_objects
+from mjsim.visibility import FieldOfView, in_field_of_view, visible_objects
 from mjsim.world import World
 
 
@@ -70,7 +70,8 @@ class SessionPercept(Percept):
             return {}
         seen, state = self._seen, self._hud()
         parts = [marker for marker in state.markers if marker.role == FLAGPOLE]
-        shown = in_field_of_view([part.position for part in parts], seen.eye, seen.heading, seen.pitch)
+        field = FieldOfView.of(self.person)
+        shown = in_field_of_view([part.position for part in parts], seen.eye, seen.heading, seen.pitch, field)
         names = {part.object for part, is_shown in zip(parts, shown, strict=True) if is_shown}
         return {name: np.array(place) for name, place in flagpoles(state).items() if name in names}
 

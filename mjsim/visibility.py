@@ -122,7 +122,7 @@ def visible_objects(
 
 
 def in_field_of_view(
-    points: ArrayLike, eye: ArrayLike, heading: float, pitch: float = 0.0, *, field: FieldOfView | None = None
+    points: ArrayLike, eye: ArrayLike, heading: float, pitch: float, field: FieldOfView
 ) -> NDArray[np.bool_]:
     """Which points are inside the field of view, however far away and whatever stands in between; shape (n,).
 
@@ -131,9 +131,9 @@ def in_field_of_view(
         eye: Eye position, m, shape (3,).
         heading: Yaw of the gaze, rad, 0 along +x, counter-clockwise.
         pitch: Elevation of the gaze, rad, positive upwards.
-        field: Field of view, whose range does not count; by default 80 by 65 degrees.
+        field: Field of view, whose range does not count.
     """
-    gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView())
+    gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field)
     forward, left, up = gaze.axes @ (np.reshape(points, (-1, 3)) - gaze.eye).T
     return np.asarray((np.abs(left) <= forward * gaze.slopes[0]) & (np.abs(up) <= forward * gaze.slopes[1]))
 
