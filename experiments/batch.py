@@ -3,17 +3,16 @@
 import dataclasses
 import functools
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments import records
-from experiments.design import Design
-from experiments.endings import COMPLETE
+from experiments.batch_folder import folder_notes, read_trials, trial_key
+from experiments.batch_plan import BatchPlan, check_trials, plan_batch
+from experiments.design import Design, confounded
 from experiments.errors import ConfigError
-from experiments.files import read_json
 from experiments.house import House
 from experiments.run_directory import TRIALS, check_batch_folder
 from experiments.signals import signals_postponed
@@ -45,22 +44,14 @@ class BatchProgress:
     failure: str | None = None
 
 
-def trial_name(config: TrialConfig) -> str:
-    """Folder name of a trial; different configurations of one batch have different names."""
-    house = Path(config.house).parent.name if "/" in config.house else config.house
-    parts = [house, f"{config.objects:02d}", config.assistance, config.user, config.planner]
-    if config.fidelity != TrialConfig.fidelity:
-        parts.append(config.fidelity)
-    return "-".join([*parts, f"seed{config.house_seed:04d}"]).replace(":", ".").replace("/", ".")
-
-
 def run_batch(
     design: Design,
     out: Path,
     *,
     workers: int,
     on_progress: Callable[[BatchProgress], None] = lambda _: None,
-) -> list[dict[str, Any]]:
+    on_note: Callable[[str], None] = lambda _: None,
+) -> list[Mapping[str, Any]]:
     """Run every trial of the design that `out` does not hold yet, then write the tables.
 
     Args:
@@ -68,42 +59,61 @@ def run_batch(
         out: Folder of the batch; an earlier batch there is added to.
         workers: Processes.
         on_progress: Called at the start and after every trial.
+        on_note: Called with lines that a user should read: what is run again, what the tables leave out.
 
     Returns:
-        The metrics of every trial of the design that succeeded, in the design's order.
+        A row for every trial of the folder, those of the design first, in the design's order.
 
     Raises:
         ConfigError: `workers` is below 1.
+        ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run; nothing was run.
         OSError: A table cannot be written, or a worker was killed.
     """
     if workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
-    folders = {out / TRIALS / trial_name(config): config for config in design.trials}
+    inputs = check_trials(design.trials)
     check_batch_folder(out)
-    missing = [(path, config) for path, config in folders.items() if not _is_done(path)]
-    progress = BatchProgress(done=0, resumed=len(folders) - len(missing), failed=0, total=len(folders))
-    on_progress(progress)
+    plan = plan_batch(design.trials, inputs, out)
+    for note in filter(None, (*plan.notes, confounded(design.trials))):
+        on_note(note)
     try:
-        with worker_pool(max(1, min(workers, len(missing)))) as pool:
-            for failure in _results(pool, iter(missing), workers):
-                field = "done" if failure is None else "failed"
-                count = getattr(progress, field) + 1
-                progress = dataclasses.replace(progress, failure=failure, **{field: count})
-                on_progress(progress)
+        _run_missing(plan, workers, on_progress)
     finally:
         with signals_postponed() as signals:
             signals.save()
             remove_leftovers(out / TRIALS)
-            rows = [read_json(path / records.METRICS) for path in folders if _is_done(path)]
-            if rows:
-                write_tables(out, rows)
+            rows = _write_rows(design.trials, out, on_note)
     return rows
 
 
-def _is_done(path: Path) -> bool:
-    """Whether a trial was run to its end; one that failed or was interrupted is run again."""
-    metrics = path / records.METRICS
-    return metrics.is_file() and read_json(metrics).get("ended") in COMPLETE
+def _run_missing(plan: BatchPlan, workers: int, on_progress: Callable[[BatchProgress], None]) -> None:
+    done = len(plan.done)
+    progress = BatchProgress(done=0, resumed=done, failed=0, total=done + len(plan.missing))
+    on_progress(progress)
+    if not plan.missing:
+        return
+    with worker_pool(min(workers, len(plan.missing))) as pool:
+        for failure in _results(pool, iter(plan.missing.items()), workers):
+            field = "done" if failure is None else "failed"
+            count = getattr(progress, field) + 1
+            progress = dataclasses.replace(progress, failure=failure, **{field: count})
+            on_progress(progress)
+
+
+def _write_rows(
+    trials: Sequence[TrialConfig], out: Path, on_note: Callable[[str], None]
+) -> list[Mapping[str, Any]]:
+    """Write the tables of all trials that the folder holds."""
+    found, unusable = read_trials(out)
+    stored = [trial for trial in found if trial.complete]
+    order = {trial_key(trial.settings()): number for number, trial in enumerate(trials)}
+    stored.sort(key=lambda trial: order.get(trial_key(trial.settings), len(order)))
+    for note in folder_notes(found, unusable):
+        on_note(note)
+    rows = [trial.row for trial in stored]
+    if rows:
+        write_tables(out, rows)
+    return rows
 
 
 def _results(

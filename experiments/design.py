@@ -4,7 +4,7 @@ import itertools
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -136,7 +136,10 @@ def read_design(path: Path) -> Design:
             trials += _cell_trials(values, path.parent)
         except ConfigError as error:
             raise ConfigError(f"{path}: {error} - at `$.cells[{number}]`") from error
-    return Design(tuple(trials))
+    try:
+        return Design(tuple(trials))
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
 
 
 def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
@@ -207,7 +210,7 @@ def confounded(trials: Sequence[TrialConfig]) -> str | None:
     return confounded_rows([trial.settings() for trial in trials])
 
 
-def confounded_rows(rows: Sequence[dict[str, Any]]) -> str | None:
+def confounded_rows(rows: Sequence[Mapping[str, Any]]) -> str | None:
     """As `confounded`, of rows of a table."""
     faults = []
     for name in CONFOUNDERS:

@@ -4,7 +4,7 @@ import json
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,12 +35,15 @@ _DAMAGE = (
 )
 
 
-def read_arrays(path: Path, layouts: Mapping[str, Layout] | None = None) -> dict[str, NDArray[Any]]:
-    """Read every array of an NPZ.
+def read_arrays(
+    path: Path, layouts: Mapping[str, Layout] | None = None, *, only: Collection[str] | None = None
+) -> dict[str, NDArray[Any]]:
+    """Read the arrays of an NPZ.
 
     Args:
         path: The file.
         layouts: Type and shape of each array that must be there; None for no check.
+        only: Names of arrays to read; None for all.
 
     Returns:
         The arrays by name, of any shape.
@@ -50,7 +53,7 @@ def read_arrays(path: Path, layouts: Mapping[str, Layout] | None = None) -> dict
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+            arrays = {name: archive[name] for name in only or archive.files}
     except FileNotFoundError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
     except _DAMAGE as error:

@@ -14,7 +14,7 @@ from mjsim.model.footprint import Footprint
 from mjsim.model.house import compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
-from mjsim.model.sampling import POINTS, sample_episode
+from mjsim.model.sampling import POINTS, house_points, sample_episode
 from mjsim.person_parameters import PersonParameters
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
@@ -112,6 +112,14 @@ class House:
             SamplingError: `objects` is out of range, or the house is too small for the points.
         """
         return sample_episode(self.catalogue, self.sampling_floor, objects=objects, seed=seed, points=points)
+
+    def sample_points(self, *, seed: int, points: int = POINTS) -> NDArray[np.float64]:
+        """The points of a seed where objects may lie, m, shape (points, 2).
+
+        Raises:
+            SamplingError: The house is too small for them.
+        """
+        return house_points(self.catalogue, self.sampling_floor, seed=seed, points=points)
 
 
 def _navmesh(floor: Footprint, radius: float) -> NavMesh:

@@ -14,7 +14,7 @@ REGRETFUL = 0.01  # m; smaller regrets are ties
 COSTLY = 0.1  # m; what a deviation must cost to count in `nd_regret_10cm`
 # Fields of the start event that say what was recorded, not how the trial was set up.
 PROVENANCE = frozenset(
-    {"t", "event", "format", "versions", "model", "world", "episode_sha256", "order", "person"}
+    {"t", "event", "format", "versions", "model", "world", "inputs", "episode_sha256", "order", "person"}
 )
 
 

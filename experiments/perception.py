@@ -58,6 +58,11 @@ class SessionPercept(Percept):
         """What the HUD shows."""
         return self._hud()
 
+    @property
+    def shown_roles(self) -> frozenset[str]:
+        """Of the assistance condition."""
+        return self._assistant.shown_roles
+
     @cached_property
     def guidance(self) -> Guidance | None:
         """Where the condition shows the plan."""

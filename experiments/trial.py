@@ -15,6 +15,7 @@ from experiments.assistant import Assistant
 from experiments.conditions import TaskBoard
 from experiments.endings import INTERRUPTED
 from experiments.errors import ConfigError, UserCodeError
+from experiments.fingerprint import fingerprint, trial_inputs
 from experiments.first_person import FilmConfig, TrialFilm
 from experiments.house import House
 from experiments.participants import participant
@@ -218,7 +219,7 @@ def prepare_session(
     order_rng = _session_rng(config.order_seed, _LIST_ORDER)
     order = [scene.index.names[i] for i in order_rng.permutation(len(scene.index.names))]
     world = world or World(scene, WorldOptions(fidelity=config.fidelity, capacity=config.capacity))
-    _log_start(config, world, order, log)
+    _log_start(config, house, world, order, log)
     session = Session(
         world,
         _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
@@ -237,7 +238,8 @@ def _session_rng(seed: int, purpose: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence([seed, _SESSION]).spawn(3)[purpose])
 
 
-def _log_start(config: TrialConfig, world: World, order: list[str], log: EventLog) -> None:
+def _log_start(config: TrialConfig, house: House, world: World, order: list[str], log: EventLog) -> None:
+    inputs = trial_inputs(config, house.catalogue)
     episode = world.scene.episode.to_json().encode()
     log.append(
         0.0,
@@ -245,6 +247,8 @@ def _log_start(config: TrialConfig, world: World, order: list[str], log: EventLo
         format=records.LOG_FORMAT,
         **provenance(world),
         **config.settings(),
+        fingerprint=fingerprint(config, inputs),
+        inputs=inputs,
         episode_sha256=hashlib.sha256(episode).hexdigest(),
         order=order,
     )

@@ -9,11 +9,10 @@ import time
 import pyarrow.parquet as pq
 import pytest
 
-from experiments.batch import run_batch, trial_name
+from experiments.batch import run_batch
 from experiments.design import Design, factorial
 from experiments.errors import ConfigError
 from experiments.records import METRICS
-from experiments.trial_config import TrialConfig
 
 COMMAND = [
     sys.executable,
@@ -60,23 +59,12 @@ def test_a_killed_batch_goes_on_where_it_stopped(tmp_path):
 
 def test_one_failing_trial_does_not_stop_the_others(tmp_path):
     reports = []
-    design = factorial(objects=[6], assistance=["none", "optimal"], users=["nearest"], seeds=[0])
+    design = factorial(objects=[6], assistance=["none"], users=["nearest"], seeds=[0])
     shown = factorial(objects=[6], assistance=["highlight"], users=["nearest"], seeds=[0])
     rows = run_batch(Design(design.trials + shown.trials), tmp_path, workers=1, on_progress=reports.append)
     assert [row["assistance"] for row in rows] == ["highlight"]
-    assert (reports[-1].done, reports[-1].failed) == (1, 2)
+    assert (reports[-1].done, reports[-1].failed) == (1, 1)
     assert any("needs ['flagpole']" in (r.failure or "") for r in reports)
-
-
-def test_unlike_trials_have_unlike_names():
-    configs = list(
-        factorial(objects=[6, 12], assistance=["none", "optimal"], users=["follower"], seeds=range(3)).trials
-    )
-    configs.append(TrialConfig(objects=6, assistance="none", seed=0, user="my.users:lazy"))
-    configs.append(TrialConfig(objects=6, assistance="none", seed=0, planner="greedy"))
-    configs.append(TrialConfig(objects=6, assistance="none", seed=0, fidelity="event"))
-    assert len({trial_name(c) for c in configs}) == len(configs) == 15
-    assert not any("/" in trial_name(c) or ":" in trial_name(c) for c in configs)
 
 
 @pytest.mark.parametrize(

@@ -125,6 +125,9 @@ def run(arguments: argparse.Namespace) -> int:
             if progress.failure:
                 bars.console.print(f"failed: {progress.failure}", style="red", soft_wrap=True)
 
-        rows = run_batch(design, arguments.out, workers=arguments.workers, on_progress=show)
+        def note(line: str) -> None:
+            bars.console.print(line, style="yellow", soft_wrap=True)
+
+        rows = run_batch(design, arguments.out, workers=arguments.workers, on_progress=show, on_note=note)
     console.print(f"{len(rows)} trials in {arguments.out}/trials.parquet and .csv; {failed} failed")
     return 1 if failed else 0

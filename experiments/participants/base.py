@@ -123,6 +123,11 @@ class Percept:
         return None
 
     @property
+    def shown_roles(self) -> frozenset[str]:
+        """Roles of the markers that the HUD shows in this condition; the person knows it from the training."""
+        return frozenset()
+
+    @property
     def guidance(self) -> Guidance | None:
         """The step shown by the HUD, in conditions that show a path; None when all is done."""
         return None

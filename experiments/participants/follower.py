@@ -25,25 +25,25 @@ class BreadcrumbFollower:
 
 
 class Follower:
-    """Follows breadcrumbs where they are shown, goes for flagpoles as `nearest` does, and else is a `searcher`.
-
-    Guidance that was shown once is waited for: flagpoles are gone when the last object is in a hand.
-    """
+    """Follows breadcrumbs where the condition shows them, else flagpoles as `nearest` does, else it is a `searcher`."""
 
     needs: frozenset[str] = frozenset()
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
-        self._along_breadcrumbs = BreadcrumbFollower(house)
-        self._to_flagpoles = Nearest(house)
-        self._conduct: Participant = Searcher(house, rng)
+        self._house, self._rng = house, rng
+        self._conduct: Participant | None = None
 
     def act(self, percept: Percept) -> Decision:
-        """Do as the best guidance that was ever on display suggests."""
-        if percept.guidance is not None:
-            self._conduct = self._along_breadcrumbs
-        elif self._conduct is not self._along_breadcrumbs and percept.flagpoles:
-            self._conduct = self._to_flagpoles
+        """Do as the best guidance on display suggests."""
+        if self._conduct is None:
+            self._conduct = self._choose(percept.shown_roles)
         return self._conduct.act(percept)
+
+    def _choose(self, shown: frozenset[str]) -> Participant:
+        for conduct in (BreadcrumbFollower(self._house), Nearest(self._house)):
+            if conduct.needs <= shown:
+                return conduct
+        return Searcher(self._house, self._rng)
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:

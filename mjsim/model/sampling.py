@@ -72,8 +72,7 @@ def sample_episode(
     _check_arguments(objects, seed, points)
     if navigable is None:
         navigable = navigable_floor(catalogue)
-    centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
-    pool = sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
+    pool = house_points(catalogue, navigable, seed=seed, points=points)
     categories = _point_categories(catalogue, points, _rng(seed, _Purpose.CATEGORIES))[:objects]
     models = _point_models(catalogue, categories, _rng(seed, _Purpose.MODELS, objects))
     placed = tuple(
@@ -90,6 +89,18 @@ def sample_episode(
     )
     episode = _drop(episode, catalogue, _rng(seed, _Purpose.DROP, objects))
     return replace(episode, start=_start(episode, navigable, _rng(seed, _Purpose.START, objects)))
+
+
+def house_points(
+    catalogue: Catalogue, navigable: NavigablePoints, *, seed: int, points: int = POINTS
+) -> NDArray[np.float64]:
+    """The points of a seed that its levels share, m, shape (points, 2).
+
+    Raises:
+        SamplingError: They do not fit.
+    """
+    centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
+    return sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
 
 
 def sample_points(

@@ -1,0 +1,162 @@
+"""The folder of a batch: which trials it holds, how they were made, and what they say.
+
+OUT/trials/NAME      one run directory per trial
+OUT/outdated/NAME    trials that were run again because something that they depend on has changed
+OUT/trials.parquet, OUT/trials.csv    one row per trial
+"""
+
+import dataclasses
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments import records
+from experiments.checksums import read_checksums, sha256_of
+from experiments.design import confounded_rows
+from experiments.endings import COMPLETE
+from experiments.errors import RecordError
+from experiments.files import read_arrays, read_json
+from experiments.fingerprint import Inputs
+from experiments.metrics import measure
+from experiments.records import HEALTH, read_events
+from experiments.run_directory import TRIALS
+from experiments.trial_config import SEEDS, TrialConfig
+
+OUTDATED = "outdated"
+NOT_IN_THE_LOG = ("frames_sha256", "renderer", "wall_s")
+LONGEST_NAME = 120  # characters, without seeds and hash
+_SETTINGS = frozenset(field.name for field in dataclasses.fields(TrialConfig))
+
+
+@dataclass(frozen=True)
+class StoredTrial:
+    """A trial of a batch.
+
+    Attributes:
+        path: Its run directory.
+        settings: Fields of its configuration by name.
+        inputs: What else it depended on.
+        row: What its log and trajectory say, as in `metrics.json`.
+        as_measured: Whether `metrics.json` says the same.
+    """
+
+    path: Path
+    settings: Mapping[str, Any]
+    inputs: Inputs
+    row: Mapping[str, Any]
+    as_measured: bool
+
+    @property
+    def complete(self) -> bool:
+        """Whether it was run to its end; one that failed or was interrupted is run again."""
+        return self.row["ended"] in COMPLETE
+
+    def is_of(self, config: TrialConfig, inputs: Inputs) -> bool:
+        """Whether this is a trial of that configuration: in a house of the same content, or at the same place."""
+        same_house = self.inputs["house"] == inputs["house"] or self.settings["house"] == config.house
+        return same_house and trial_key(self.settings) == trial_key(config.settings())
+
+
+def trial_key(settings: Mapping[str, Any]) -> str:
+    """Equal for equal configurations, wherever the house lies."""
+    return json.dumps({name: settings[name] for name in sorted(settings) if name != "house"})
+
+
+def read_trial(path: Path) -> StoredTrial:
+    """Read a trial of a batch; what it says is worked out anew from its log and trajectory.
+
+    Raises:
+        RecordError: It lacks a file, is not as written, or was made by another version.
+    """
+    sums = read_checksums(path)
+    for name in (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING):
+        if sums.get(name) != sha256_of(path / name):
+            raise RecordError(f"{path / name} is not as written")
+    start, *_ = events = read_events(path / records.EVENTS)
+    if not set(start) >= _SETTINGS or "inputs" not in start:
+        raise RecordError(f"{path} was made by another version of mjsim")
+    arrays = read_arrays(path / records.TRAJECTORY, only=("time", "position", *HEALTH))
+    row = measure(events, arrays)
+    told = _metrics(path)
+    as_measured = all(told.get(name) == value for name, value in json.loads(json.dumps(row)).items())
+    row |= {name: told.get(name) for name in NOT_IN_THE_LOG}
+    settings = {name: start[name] for name in _SETTINGS}
+    return StoredTrial(path, settings, start["inputs"], row, as_measured)
+
+
+def _metrics(path: Path) -> Mapping[str, Any]:
+    try:
+        told = read_json(path / records.METRICS)
+    except RecordError:
+        return {}
+    return told if isinstance(told, dict) else {}
+
+
+def read_trials(out: Path) -> tuple[list[StoredTrial], dict[Path, str]]:
+    """Trials of a batch folder by name, and what is wrong with those that cannot be used."""
+    trials, unusable = [], {}
+    for path in sorted(p for p in (out / TRIALS).glob("[!.]*") if p.is_dir()):
+        try:
+            trials.append(read_trial(path))
+        except (RecordError, OSError, KeyError, TypeError, ValueError) as error:
+            unusable[path] = str(error)
+    return trials, unusable
+
+
+def put_aside(path: Path) -> None:
+    """Move a trial to the outdated ones of its batch; nothing there is replaced."""
+    folder = path.parents[1] / OUTDATED
+    folder.mkdir(exist_ok=True)
+    place, number = folder / path.name, 1
+    while place.exists():
+        number += 1
+        place = folder / f"{path.name}-{number}"
+    path.rename(place)
+
+
+def trial_name(config: TrialConfig, inputs: Inputs) -> str:
+    """Folder name of a trial: readable, and unlike that of any other configuration or house."""
+    own_house = config.house.endswith(".toml")
+    house = Path(config.house).parent.name if own_house else config.house
+    words = [house, f"{config.objects:02d}", config.assistance, config.user]
+    words += [word for word in (config.planner, config.fidelity) if word not in (TrialConfig.planner, "full")]
+    readable = re.sub(r"[^\w.+-]", ".", "-".join(words), flags=re.ASCII)[:LONGEST_NAME]
+    seeds = [getattr(config, name) for name in SEEDS]
+    numbers = f"{seeds[0]:04d}" if len(set(seeds)) == 1 else "-".join(f"{seed:04d}" for seed in seeds)
+    identity = trial_key(config.settings()) + (inputs["house"] if own_house else config.house)
+    return f"{readable}-seed{numbers}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
+
+
+def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) -> Iterator[str]:
+    """Lines on what the tables hold or leave out that nobody would expect."""
+    early = [trial for trial in trials if not trial.complete]
+    if early:
+        yield (
+            f"{len(early)} trials ended early and are left out of the tables, such as {early[0].path.name}: "
+            f"{early[0].row['ended']}"
+        )
+    trials = [trial for trial in trials if trial.complete]
+    edited = [trial.path.name for trial in trials if not trial.as_measured]
+    if edited:
+        yield (
+            f"{len(edited)} metrics.json are not what their logs say, such as that of {edited[0]}; "
+            "the tables hold what the logs say"
+        )
+    if unusable:
+        yield f"{len(unusable)} trials are left out of the tables: {next(iter(unusable.values()))}"
+    makes = {json.dumps({k: v for k, v in t.inputs.items() if not _is_of_the_design(k)}) for t in trials}
+    if len(makes) > 1:
+        yield (
+            f"the tables hold trials of {len(makes)} versions of mjsim or its libraries (column fingerprint); "
+            "run the whole design again to compare them"
+        )
+    if fault := confounded_rows([trial.row for trial in trials]):
+        yield fault
+
+
+def _is_of_the_design(name: str) -> bool:
+    return name in ("house", "episode") or name.startswith("module ")

@@ -1,0 +1,130 @@
+"""What a batch has to do: everything checked before the first trial, and compared with what its folder holds."""
+
+import functools
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.batch_folder import OUTDATED, StoredTrial, put_aside, read_trials, trial_name
+from experiments.errors import ConfigError
+from experiments.fingerprint import Inputs, changes, trial_inputs
+from experiments.house import House
+from experiments.participants import participant
+from experiments.run_directory import TRIALS
+from experiments.trial_config import TrialConfig
+from hud.conditions import condition
+from mjsim.episode import Episode
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.sampling import POINTS
+from planner.solver import solver
+
+SHOWN = 3  # names or reasons in a line
+
+
+@dataclass(frozen=True)
+class BatchPlan:
+    """What is there and what is to be run.
+
+    Attributes:
+        done: Trials of the design that the folder holds, as they would come out now.
+        missing: Folder and configuration of every other trial of the design.
+        notes: Lines that say what is done again, and why.
+    """
+
+    done: tuple[StoredTrial, ...]
+    missing: Mapping[Path, TrialConfig]
+    notes: tuple[str, ...]
+
+
+def plan_batch(trials: Sequence[TrialConfig], inputs: Sequence[Inputs], out: Path) -> BatchPlan:
+    """Compare a design with what a folder holds, and put aside what is out of date.
+
+    Args:
+        trials: The design.
+        inputs: What each of them depends on now.
+        out: Folder of the batch.
+    """
+    wanted = dict(zip(trials, inputs, strict=True))
+    stored, unusable = read_trials(out)
+    by_seed: dict[tuple[int, int, int], list[StoredTrial]] = {}
+    for found in stored:
+        by_seed.setdefault(_seeds(found.settings), []).append(found)
+    done, missing, reasons = [], {}, Counter[str]()
+    for trial, needed in wanted.items():
+        same = [s for s in by_seed.get(_seeds(trial.settings()), []) if s.is_of(trial, needed)]
+        current = [s for s in same if s.complete and s.inputs == needed]
+        path = out / TRIALS / trial_name(trial, needed)
+        for old in same:
+            if old not in current:
+                reasons.update([_why_again(old, needed)])
+            if old.complete and old not in current:
+                put_aside(old.path)
+        if current:
+            done.append(current[0])
+            continue
+        if path in unusable:
+            reasons.update([unusable.pop(path)])
+            put_aside(path)
+        missing[path] = trial
+    return BatchPlan(tuple(done), missing, tuple(_notes(reasons, out)))
+
+
+def _seeds(settings: Mapping[str, int]) -> tuple[int, int, int]:
+    return settings["house_seed"], settings["person_seed"], settings["order_seed"]
+
+
+def _why_again(trial: StoredTrial, inputs: Inputs) -> str:
+    if not trial.complete:
+        return f"ended early, {trial.row['ended']}"
+    return f"{', '.join(changes(trial.inputs, inputs))} changed"
+
+
+def _notes(reasons: Counter[str], out: Path) -> Iterable[str]:
+    if reasons:
+        why = "; ".join(f"{reason} ({count})" for reason, count in reasons.most_common(SHOWN))
+        yield f"{reasons.total()} trials are run again: {why}; what was complete is kept in {out / OUTDATED}"
+
+
+def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
+    """Check that every trial can be run, as far as that shows without running it; what each depends on.
+
+    Raises:
+        ConfigError: There is no such participant, or an episode does not fit its trial.
+        AssetError, EpisodeError, SamplingError: A house or an episode is unusable, or a house too small.
+        PlannerError, HudError: There is no such planner or assistance condition.
+    """
+    for check, names in (
+        (participant, {trial.user for trial in trials}),
+        (condition, {trial.assistance for trial in trials}),
+        (solver, {trial.planner for trial in trials}),
+    ):
+        for name in sorted(names):
+            check(name)
+    catalogue = functools.cache(Catalogue.load)
+    house = functools.cache(House.load)
+    for trial in dict.fromkeys(trials):
+        if trial.episode is not None:
+            _check_episode(trial, catalogue(trial.house))
+    for name, seed, points in dict.fromkeys(
+        (t.house, t.house_seed, t.points) for t in trials if _may_be_small(t)
+    ):
+        house(name).sample_points(seed=seed, points=points)
+    return [trial_inputs(trial, catalogue(trial.house)) for trial in trials]
+
+
+def _may_be_small(trial: TrialConfig) -> bool:
+    """The houses that come with the package have room for the usual points."""
+    return trial.episode is None and (trial.house.endswith(".toml") or trial.points > POINTS)
+
+
+def _check_episode(trial: TrialConfig, catalogue: Catalogue) -> None:
+    episode = Episode.load(Path(str(trial.episode)))
+    if len(episode.objects) != trial.objects:
+        raise ConfigError(f"objects is {trial.objects}, but {trial.episode} holds {len(episode.objects)}")
+    unknown = [placed.model for placed in episode.objects if placed.model not in catalogue.objects]
+    unknown += [key for key in episode.targets.values() if key not in catalogue.receptacles]
+    if unknown:
+        raise ConfigError(
+            f"{trial.episode} is of another house: {catalogue.name} has no {', '.join(map(repr, unknown[:SHOWN]))}"
+        )
