@@ -11,7 +11,7 @@ from experiments.failures import USAGE_ERROR, drop_output, end_with
 from experiments.signals import exit_code, signal_of, signals_raised
 from mjsim.gl_choice import postpone_gl
 
-COMMANDS = ("run", "replay", "batch", "plan", "house", "gallery", "bench", "doctor")
+COMMANDS = ("run", "replay", "batch", "plan", "house", "check", "gallery", "bench", "doctor")
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
@@ -27,6 +27,8 @@ examples:
       run a factorial design on all cores; the same command continues after an interruption
   mjsim house --objects 12 --seed 3 --out house.xml
       write a disorganized house as MJCF for stock MuJoCo
+  mjsim check my_house/catalogue.toml --picture faults.png
+      say what is wrong with a house, an object or an episode, and what to change
   mjsim plan problem.json
       solve a pickup-and-delivery problem, with a proof of optimality where possible
   mjsim doctor

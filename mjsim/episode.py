@@ -79,6 +79,8 @@ class Episode:
                 raise EpisodeError(
                     f"target of {name} is {receptacle!r}, which is none of the receptacles {list(self.receptacles)}"
                 )
+        if not all(math.isfinite(v) for v in (self.start.x, self.start.y, self.start.heading)):
+            raise EpisodeError(f"the start is not finite: {self.start}; give x and y in m, heading in rad")
         for placed in self.objects:
             if not all(math.isfinite(v) for v in (*placed.point, *placed.position, *placed.quaternion)):
                 raise EpisodeError(
@@ -105,7 +107,7 @@ class Episode:
             return msgspec.json.decode(text, type=cls)
         except msgspec.ValidationError as error:
             raise EpisodeError(f"episode is malformed: {error}; sample it anew") from error
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, RecursionError) as error:
             raise EpisodeError(f"episode is not JSON: {error}") from error
 
     def save(self, path: Path) -> None:
@@ -123,6 +125,10 @@ class Episode:
             return cls.from_json(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise EpisodeError(f"cannot read episode {path}: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise EpisodeError(
+                f"episode {path} is not UTF-8 at byte {error.start}; save it as UTF-8"
+            ) from error
         except EpisodeError as error:
             raise EpisodeError(f"{path}: {error}") from error
 

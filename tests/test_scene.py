@@ -98,7 +98,7 @@ def test_objects_stay_where_they_are_and_fall_asleep(episode: Episode, catalogue
 
 def test_every_model_of_the_catalogue_composes(catalogue: Catalogue) -> None:
     placed = [(model, 1.0 + i % 8, 1.0 + i // 8) for i, model in enumerate(catalogue.objects)]
-    composed = compose(small_episode(catalogue, *placed), catalogue)
+    composed = compose(small_episode(catalogue, *placed), catalogue, avatar=False)
     assert len(composed.index.names) == len(catalogue.objects)
     for name in composed.index.names:
         assert len(composed.index.geoms(name)) > 0
@@ -108,10 +108,9 @@ def test_every_model_of_the_catalogue_composes(catalogue: Catalogue) -> None:
 
 def test_instances_share_assets(catalogue: Catalogue) -> None:
     """Six of each model need no more meshes and textures than one of each."""
-    one = compose(small_episode(catalogue, *[(m, 1.0, 1.0) for m in catalogue.objects]), catalogue).model
-    many = compose(
-        small_episode(catalogue, *[(m, 1.0, 1.0) for m in catalogue.objects for _ in range(6)]), catalogue
-    ).model
+    each = [(m, 1.0, 1.0) for m in catalogue.objects]
+    one = compose(small_episode(catalogue, *each), catalogue, avatar=False).model
+    many = compose(small_episode(catalogue, *each * 6), catalogue, avatar=False).model
     assert (many.nmesh, many.ntex) == (one.nmesh, one.ntex)
     assert many.nbody > one.nbody
 

@@ -128,22 +128,41 @@ def sample_points(
     """
     best = 0
     for _ in range(PACKINGS):
-        taken = np.empty((len(keep_away) + count, 2))
-        taken[: len(keep_away)] = keep_away
-        filled = len(keep_away)
-        for _ in range(DRAWS):
-            point = navigable.sample(rng)
-            if (np.hypot(*(taken[:filled] - point).T) >= min_distance).all():
-                taken[filled] = point
-                filled += 1
-                if filled == len(taken):
-                    return taken[len(keep_away) :]
-        best = max(best, filled - len(keep_away))
+        points = _pack(navigable, keep_away, count, rng, min_distance)
+        if len(points) == count:
+            return points
+        best = max(best, len(points))
     raise SamplingError(
         f"only {best} of {count} points fit at least {min_distance} m from each other and from "
         f"{len(keep_away)} receptacles, after {PACKINGS * DRAWS - best} rejections; "
         "ask for fewer points (--points) or use a larger house"
     )
+
+
+def points_that_fit(navigable: NavigablePoints, keep_away: NDArray[np.float64], count: int = POINTS) -> int:
+    """How many points, `count` at most, one packing holds; arguments as in `sample_points`."""
+    return len(_pack(navigable, keep_away, count, np.random.default_rng(0), MIN_DISTANCE))
+
+
+def _pack(
+    navigable: NavigablePoints,
+    keep_away: NDArray[np.float64],
+    count: int,
+    rng: np.random.Generator,
+    min_distance: float,
+) -> NDArray[np.float64]:
+    """As many points as come in `DRAWS` draws, `count` at most, m, shape (k, 2)."""
+    taken = np.empty((len(keep_away) + count, 2))
+    taken[: len(keep_away)] = keep_away
+    filled = len(keep_away)
+    for _ in range(DRAWS):
+        if filled == len(taken):
+            break
+        point = navigable.sample(rng)
+        if (np.hypot(*(taken[:filled] - point).T) >= min_distance).all():
+            taken[filled] = point
+            filled += 1
+    return taken[len(keep_away) : filled]
 
 
 def _check_arguments(objects: int, seed: int, points: int) -> None:

@@ -1,6 +1,6 @@
 """Composition of a house, its receptacles and an episode's objects into one compiled model (MjSpec)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeVar, cast
 
@@ -16,6 +16,8 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compile_errors, compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
+from mjsim.model.validation.episode_rules import check_fit, check_overlaps, check_poses
+from mjsim.model.validation.findings import Finding, errors, one_line
 from mjsim.person_parameters import PersonParameters
 
 T = TypeVar("T")
@@ -142,9 +144,31 @@ def compose(
 
     Raises:
         AssetError: A model is malformed, or does not compile.
-        EpisodeError: The episode names an object model or a receptacle that the catalogue does not have.
+        EpisodeError: The episode does not fit the catalogue, or something starts outside of the house or inside of
+            something else.
     """
-    _check_names(episode, catalogue)
+    _require(check_fit(episode, catalogue), episode)
+    if avatar:  # without one, things are still to fall into place
+        _require(check_poses(episode, compiled_house(catalogue).rooms), episode)
+    scene = assemble(episode, catalogue, person=person, avatar=avatar, visuals=visuals)
+    if avatar:
+        _require(check_overlaps(episode, scene.model, scene.index.geom_owner), episode)
+    return scene
+
+
+def assemble(
+    episode: Episode,
+    catalogue: Catalogue,
+    *,
+    person: PersonParameters | None = None,
+    avatar: bool = True,
+    visuals: bool = True,
+) -> Scene:
+    """As `compose`, for an episode whose poses need not make sense.
+
+    Raises:
+        AssetError: A model is malformed, or does not compile.
+    """
     person = person or PersonParameters()
     house = compiled_house(catalogue)
     spec = house.spec(visuals=visuals)
@@ -172,19 +196,9 @@ def compose(
     )
 
 
-def _check_names(episode: Episode, catalogue: Catalogue) -> None:
-    for placed in episode.objects:
-        if placed.model not in catalogue.objects:
-            raise EpisodeError(
-                f"{placed.name} is a {placed.model!r}, which catalogue {catalogue.name!r} does not have; "
-                f"it has {sorted(catalogue.objects)}"
-            )
-    unknown = sorted(set(episode.receptacles) - set(catalogue.receptacles))
-    if unknown:
-        raise EpisodeError(
-            f"receptacles {unknown} of the episode are not in catalogue {catalogue.name!r}; "
-            f"it has {sorted(catalogue.receptacles)}"
-        )
+def _require(findings: Iterable[Finding], episode: Episode) -> None:
+    if found := errors(findings):
+        raise EpisodeError(one_line(found, f"episode {episode.seed} of {episode.house}"))
 
 
 def _attach_object(spec: mujoco.MjSpec, model: mujoco.MjSpec, placed: PlacedObject) -> None:

@@ -42,5 +42,5 @@ def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 def one_line(findings: Iterable[Finding], name: object) -> str:
     """The first error of what is called `name`, and how many more there are, for an exception."""
     first, *more = errors(findings)
-    rest = f"; {len(more)} more: mjsim check {name}" if more else ""
+    rest = f" ({len(more)} more; `mjsim check` lists them)" if more else ""
     return f"{name}: {' '.join(str(first).split())}{rest}"

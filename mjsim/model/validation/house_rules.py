@@ -42,7 +42,8 @@ def _options(compiled: Compiled) -> Iterator[Finding]:
             "options", f"its gravity is {option.gravity.tolist()} m/s^2", "leave it out of <option>, z is up"
         )
     if option.disableflags:
-        flags = [f.name for f in mujoco.mjtDisableBit if int(f) & option.disableflags and int(f) > 0]
+        bits = mujoco.mjtDisableBit.__members__.items()
+        flags = [name for name, bit in bits if int(bit) & option.disableflags]
         yield compiled.error("options", f"its <flag> disables {flags}", "remove <flag>")
     if np.any(option.wind) or option.density or option.viscosity:
         yield compiled.warning(

@@ -10,6 +10,7 @@ import mujoco
 
 from mjsim.errors import AssetError
 from mjsim.kernels import cache_base
+from mjsim.model.catalogue import Catalogue
 from mjsim.model.validation.findings import errors, one_line
 from mjsim.model.validation.validate import check_house
 
@@ -25,11 +26,16 @@ def require_usable(house: "CompiledHouse") -> None:
     Raises:
         AssetError: It cannot be used; the message gives the first error and what to change.
     """
-    mark = _folder() / house.catalogue.content
-    if mark.exists():
+    if (_folder() / house.catalogue.content).exists():
         return
     if found := errors(check_house(house)):
         raise AssetError(one_line(found, house.catalogue.name))
+    remember_usable(house.catalogue)
+
+
+def remember_usable(catalogue: Catalogue) -> None:
+    """Note on disk that the house of a catalogue was checked and can be used."""
+    mark = _folder() / catalogue.content
     try:
         mark.parent.mkdir(parents=True, exist_ok=True)
         mark.touch()

@@ -1,0 +1,72 @@
+"""Picture of a check: outlines of the house or the object, with every fault numbered where it is."""
+
+import textwrap
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from mjsim.files import replacing
+from mjsim.model.validation.findings import Finding
+from mjsim.model.validation.report import Report
+from mjsim.model.validation.views import View
+
+SIDE = 9.0  # inches of the longest side of a drawing
+LINES = 12  # findings below the drawing
+COLOURS = {"error": "#D55E00", "warning": "#E69F00"}
+
+
+def draw_check(path: Path, report: Report) -> None:
+    """Write a PNG with the views of a report and the numbers of its findings, as in its table.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    views = report.views or (View("nothing could be compiled", (0, 1), ()),)
+    listed = [f"{n}. {f}" for n, f in enumerate(report.findings[:LINES], 1)]
+    text = "\n".join(textwrap.fill(line, 130) for line in listed) or "no findings"
+    below = 0.3 + 0.17 * (text.count("\n") + 1)
+    figure = Figure(figsize=(SIDE * (1.0 if len(views) == 1 else 1.4), SIDE * 0.7 + below), dpi=100)
+    FigureCanvasAgg(figure)
+    base = below / figure.get_figheight()
+    for column, view in enumerate(views):
+        width = 1.0 / len(views)
+        axes = figure.add_axes((column * width + 0.03, base + 0.02, width - 0.05, 0.92 - base))
+        _draw_view(axes, view, report.findings)
+    figure.text(0.03, base - 0.01, text, va="top", fontsize=8, family="monospace")
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": "mjsim"})
+
+
+def _draw_view(axes: Axes, view: View, findings: tuple[Finding, ...]) -> None:
+    for label, corners in view.rooms:
+        axes.fill(*corners.T, facecolor="#EEF3F7", edgecolor="#9AA7B2", lw=0.8, zorder=0)
+        axes.annotate(label, corners.mean(axis=0), ha="center", va="center", color="#60707C", fontsize=8)
+    for outline in view.outlines:
+        axes.fill(*outline.T, facecolor="#B9BEC3", edgecolor="#6B7075", lw=0.4, alpha=0.8, zorder=1)
+    for name, point in view.marks.items():
+        axes.plot(*point, marker="o", ms=4, color="#0072B2", ls="", zorder=3)
+        axes.annotate(name, point, xytext=(4, 3), textcoords="offset points", fontsize=6, color="#0072B2")
+    drawn = [c for _, c in view.rooms] + list(view.outlines)
+    if drawn:
+        points = np.concatenate(drawn)
+        low, high = points.min(axis=0), points.max(axis=0)
+        margin = 0.05 * float((high - low).max()) + 1e-3
+        axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+    for number, finding in enumerate(findings, 1):
+        if finding.place is None or len(finding.place) <= max(view.axes):
+            continue
+        at = _within(axes, finding.place[view.axes[0]], finding.place[view.axes[1]])
+        box = {"boxstyle": "circle,pad=0.15", "fc": COLOURS[finding.severity], "ec": "white"}
+        axes.annotate(
+            str(number), at, ha="center", va="center", color="white", fontsize=8, bbox=box, zorder=4
+        )
+    axes.set(title=f"{view.title}, m", aspect="equal")
+    axes.tick_params(labelsize=7)
+
+
+def _within(axes: Axes, x: float, y: float) -> tuple[float, float]:
+    """The point of the drawing nearest to a place."""
+    return float(np.clip(x, *axes.get_xlim())), float(np.clip(y, *axes.get_ylim()))

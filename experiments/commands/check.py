@@ -1,0 +1,81 @@
+"""`mjsim check`: what is wrong with a house, an object or an episode, and what to change."""
+
+import argparse
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from experiments.commands.options import HOUSE_HELP, add_command
+from mjsim.model.validation.report import Report, check_path
+
+UNUSABLE = 2
+
+DESCRIPTION = """\
+Check a house, an object, a receptacle or an episode against every convention of docs/models.md, and say what to change.
+A house is also sampled once. The exit code is 0 where it can be used, warnings or not, and 2 where it cannot.
+Loading refuses by the same rules."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands, "check", run, summary="check a house, an object or an episode", description=DESCRIPTION
+    )
+    parser.add_argument(
+        "path",
+        metavar="PATH",
+        help="catalogue.toml of a house, its folder or its name; MJCF file of an object or a receptacle; episode.json",
+    )
+    parser.add_argument("--house", metavar="NAME", help=f"house of an episode, if not its own: {HOUSE_HELP}")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
+    parser.add_argument(
+        "--picture", type=Path, metavar="FILE.png", help="draw it, with every finding numbered where it is"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Check, print, draw."""
+    report = check_path(arguments.path, arguments.house)
+    if arguments.json:
+        print(json.dumps(as_json(report), indent=2))
+    else:
+        _print(report)
+    if arguments.picture is not None:
+        from experiments.analysis.check_picture import draw_check  # matplotlib takes a while to load
+
+        draw_check(arguments.picture, report)
+    return 0 if report.usable else UNUSABLE
+
+
+def as_json(report: Report) -> dict[str, Any]:
+    """The report without its drawings, as JSON values."""
+    return {
+        "path": report.path,
+        "kind": report.kind,
+        "usable": report.usable,
+        "facts": dict(report.facts),
+        "findings": [dataclasses.asdict(finding) for finding in report.findings],
+    }
+
+
+def _print(report: Report) -> None:
+    console = Console(highlight=False)
+    for name, fact in report.facts.items():
+        console.print(f"{name}: {fact}", markup=False)
+    if report.findings:
+        table = Table(show_lines=True)
+        for column in ("", "severity", "rule", "where", "what", "what to change"):
+            table.add_column(column, overflow="fold")
+        for number, found in enumerate(report.findings, 1):
+            where = f"{found.subject} ({found.file})" if found.file else found.subject
+            cells = (str(number), found.severity, found.rule, where, found.message, found.remedy)
+            table.add_row(*(cell.replace("[", r"\[") for cell in cells))
+        console.print(table)
+    bad = sum(finding.severity == "error" for finding in report.findings)
+    verdict = "can be used" if report.usable else "cannot be used"
+    text = f"{report.kind} {report.path} {verdict}: {bad} errors, {len(report.findings) - bad} warnings"
+    console.print(text, markup=False, soft_wrap=True)

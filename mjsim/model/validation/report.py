@@ -1,0 +1,181 @@
+"""The report that `mjsim check` gives of a house, a receptacle, an object or an episode."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from mjsim.episode import Episode
+from mjsim.errors import AssetError, EpisodeError, PhysicsError, SamplingError
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.house import CompiledHouse, compiled_house
+from mjsim.model.model_files import elements
+from mjsim.model.sampling import POINTS, points_that_fit, sample_episode
+from mjsim.model.scene import assemble
+from mjsim.model.validation.compiled import Compiled, compile_model
+from mjsim.model.validation.episode_rules import check_fit, check_overlaps, check_poses, check_reach
+from mjsim.model.validation.findings import Finding, errors
+from mjsim.model.validation.object_rules import check_object
+from mjsim.model.validation.receptacle_rules import check_receptacle
+from mjsim.model.validation.validate import check_house
+from mjsim.model.validation.verdicts import remember_usable
+from mjsim.model.validation.views import View, floor_view, side_views
+
+CATALOGUE = "catalogue.toml"
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What a check found.
+
+    Attributes:
+        kind: `house`, `receptacle`, `object` or `episode`.
+        path: What was checked.
+        findings: Every fault, errors first.
+        facts: What is good to know: name -> text.
+        views: Drawings, for a picture; empty where nothing could be compiled.
+    """
+
+    kind: str
+    path: str
+    findings: tuple[Finding, ...]
+    facts: Mapping[str, str] = field(default_factory=dict)
+    views: tuple[View, ...] = ()
+
+    def __post_init__(self) -> None:
+        ordered = sorted(self.findings, key=lambda f: f.severity != "error")
+        object.__setattr__(self, "findings", tuple(ordered))
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is no error."""
+        return not errors(self.findings)
+
+
+def check_path(name: str, house: str | None = None) -> Report:
+    """Recognise what a path leads to, and check it.
+
+    Args:
+        name: A `catalogue.toml`, its folder, the name of a house, the MJCF file of an object, a receptacle or a house,
+            or an episode's JSON.
+        house: House of the episode; None for the one that it names.
+
+    Raises:
+        AssetError: It is none of these.
+    """
+    path = Path(name)
+    if path.suffix == ".json":
+        return check_episode_file(path, house)
+    if path.suffix == ".xml":
+        return _check_model(path)
+    if path.is_dir() and not (path / CATALOGUE).is_file():
+        raise AssetError(f"no {CATALOGUE} in {path}; give a house's folder, or one of its files")
+    return check_house_name(str(path / CATALOGUE) if path.is_dir() else name)
+
+
+def check_house_name(name: str) -> Report:
+    """Check a house with its receptacles and objects, and sample it."""
+    try:
+        catalogue = Catalogue.load(name)
+    except AssetError as error:
+        return Report("house", name, (_unreadable("catalogue", error),))
+    house = CompiledHouse(catalogue)
+    found = check_house(house)
+    if errors(found):
+        return Report("house", name, tuple(found), views=_partial_view(catalogue))
+    remember_usable(catalogue)
+    fits, more = _check_sampling(house)
+    xmin, ymin, xmax, ymax = house.rooms.bounds
+    facts = {
+        "size": f"{xmax - xmin:.1f} x {ymax - ymin:.1f} m",
+        "rooms": str(len(catalogue.rooms)),
+        "receptacles": str(len(catalogue.receptacles)),
+        "object models": str(len(catalogue.objects)),
+        "points that fit": f"{fits}{' or more' if fits == POINTS else ''}",
+    }
+    compiled = Compiled.of("house", catalogue.house_path, house.model)
+    view = floor_view(compiled, house.rooms, house.receptacles)
+    return Report("house", name, (*found, *more), facts, (view,))
+
+
+def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
+    """How many points fit, and what goes wrong when objects are dropped there."""
+    keep_away = np.array([r.center[:2] for r in house.receptacles.values()])
+    fits = points_that_fit(house.navigable, keep_away)
+    found = []
+    if fits < POINTS:
+        found.append(
+            Finding(
+                "points",
+                "house",
+                f"{fits} of {POINTS} points fit at least 1 m from each other and from the receptacles",
+                f"sample it with --points {max(fits - 2, 1)}, or enlarge it",
+                "warning" if fits else "error",
+            )
+        )
+    if fits:
+        pool = max(1, fits - 2 if fits < POINTS else fits)
+        objects = min(pool, len(house.catalogue.objects), POINTS)
+        try:
+            sample_episode(house.catalogue, house.navigable, objects=objects, seed=0, points=pool)
+        except (SamplingError, PhysicsError) as error:
+            found.append(
+                Finding("sampling", "house", f"{objects} objects cannot be dropped: {error}", "see there")
+            )
+    return fits, found
+
+
+def check_episode_file(path: Path, house: str | None = None) -> Report:
+    """Check an episode against its house, or against another one."""
+    try:
+        episode = Episode.load(path)
+    except EpisodeError as error:
+        return Report("episode", str(path), (_unreadable("episode", error),))
+    try:
+        catalogue = Catalogue.load(house or episode.house)
+        built = compiled_house(catalogue)
+    except AssetError as error:
+        return Report("episode", str(path), (_unreadable("house", error),))
+    found = [*check_fit(episode, catalogue), *check_poses(episode, built.rooms)]
+    compiled = Compiled.of("house", catalogue.house_path, built.model)
+    view = floor_view(compiled, built.rooms, built.receptacles, episode)
+    if not errors(found):
+        scene = assemble(episode, catalogue)
+        found += check_overlaps(episode, scene.model, scene.index.geom_owner)
+        found += check_reach(episode, built.navigable)
+    facts = {"house": catalogue.name, "objects": str(len(episode.objects)), "seed": str(episode.seed)}
+    return Report("episode", str(path), tuple(found), facts, (view,))
+
+
+def _check_model(path: Path) -> Report:
+    """Check an MJCF file by the body that it has."""
+    if not path.is_file():
+        raise AssetError(f"no file {path}; give a {CATALOGUE}, an object's .xml or an episode's .json")
+    bodies = {e.get("name") for e in elements(path) if e.tag == "body"}
+    if "receptacle" in bodies:
+        findings, kind = check_receptacle(path), "receptacle"
+    elif "object" in bodies or not path.with_name(CATALOGUE).is_file():
+        findings, kind = check_object(path), "object"
+    else:
+        return check_house_name(str(path.with_name(CATALOGUE)))
+    compiled = compile_model(kind, path)
+    if not isinstance(compiled, Compiled) or not len(compiled.solid):
+        return Report(kind, str(path), tuple(findings))
+    size = np.ptp(compiled.extent(compiled.solid), axis=0)
+    facts = {
+        "size": " x ".join(f"{s:.3f}" for s in size) + " m",
+        "mass": f"{compiled.model.body_mass.sum():.3g} kg",
+        "parts": f"{len(compiled.solid)} collide, {len(compiled.shown)} are seen",
+    }
+    return Report(kind, str(path), tuple(findings), facts, side_views(compiled))
+
+
+def _partial_view(catalogue: Catalogue) -> tuple[View, ...]:
+    compiled = compile_model("house", catalogue.house_path)
+    return (floor_view(compiled),) if isinstance(compiled, Compiled) else ()
+
+
+def _unreadable(subject: str, error: Exception) -> Finding:
+    message, _, remedy = " ".join(str(error).split()).rpartition("; ")
+    return Finding("file", subject, message or remedy, remedy if message else "correct the file")

@@ -1,0 +1,250 @@
+"""Every convention of a house and its receptacles: what breaks it, made from a good one by one change, is told."""
+
+from pathlib import Path
+
+import pytest
+
+from mjsim.errors import AssetError
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.house import CompiledHouse, compiled_house
+from mjsim.model.validation.findings import Finding, errors
+from mjsim.model.validation.receptacle_rules import check_receptacle
+from mjsim.model.validation.validate import check_house
+
+DOOR = '<body name="door" pos="3 2 1"><joint name="hinge" axis="0 0 1"/><geom type="box" size=".02 .4 1"/></body>'
+END = "</worldbody>"
+EAST = '<geom name="east" class="wall" pos="6.1 2 1.25" size="0.1 2 1.25"/>'
+SOUTH = '<geom name="partition_south" class="wall" pos="3 0.75 1.25" size="0.05 0.75 1.25"/>'
+LINTEL = '<geom name="lintel" class="wall" pos="3 2 2.25" size="0.05 0.5 0.25"/>'
+FLOOR = '<geom name="floor" type="plane" size="5 5 0.1" pos="3 2 0"/>'
+TRAY = 'mount:tray" pos="5.7 3.6 0"'
+BOTTOM = '<geom pos="0 0 0.02" size="0.25 0.25 0.02"/>'
+
+# File, what is replaced, by what; then the rule and a word by which the finding tells it.
+BROKEN = {
+    "hinged door": ("house.xml", END, DOOR + END, "joints", "'hinge' of body 'door'"),
+    "moving furniture": (
+        "house.xml",
+        END,
+        '<body name="cart" pos="1 1 1"><freejoint/><geom size=".1"/></body>' + END,
+        "joints",
+        "'cart'",
+    ),
+    "a mocap body": ("house.xml", END, '<body name="ghost" mocap="true"/>' + END, "contents", "mocap"),
+    "NaN wall": ("house.xml", 'pos="6.1 2 1.25"', 'pos="nan 2 1.25"', "finite", "pos=nan"),
+    "infinite wall": ("house.xml", 'pos="6.1 2 1.25"', 'pos="inf 2 1.25"', "finite", "pos=inf"),
+    "negative size": ("house.xml", 'size="0.1 2 1.25"', 'size="0.1 -2 1.25"', "file", "does not compile"),
+    "missing mesh": (
+        "house.xml",
+        "<worldbody>",
+        '<asset><mesh name="m" file="no.obj"/></asset><worldbody>',
+        "file",
+        "no.obj",
+    ),
+    "missing texture": (
+        "house.xml",
+        "<worldbody>",
+        '<asset><texture name="t" type="2d" file="no.png"/></asset><worldbody>',
+        "file",
+        "no.png",
+    ),
+    "two of a name": ("house.xml", END, '<geom name="east" size="1"/>' + END, "file", "east"),
+    "a name of a scene": ("house.xml", END, '<site name="tray/volume"/>' + END, "names", "tray/volume"),
+    "a name of the person": ("house.xml", END, '<body name="avatar/base"/>' + END, "names", "avatar/base"),
+    "no gravity": ("house.xml", "<worldbody>", '<option gravity="0 0 0"/><worldbody>', "options", "gravity"),
+    "no contacts": (
+        "house.xml",
+        "<worldbody>",
+        '<option><flag contact="disable"/></option><worldbody>',
+        "options",
+        "CONTACT",
+    ),
+    "no room site": ("house.xml", 'name="room:west" ', 'name="west" ', "rooms", "west"),
+    "a room too many": ("house.xml", '"room:west"', '"room:attic"', "rooms", "attic"),
+    "a round room": (
+        "house.xml",
+        '"room:west" type="box"',
+        '"room:west" type="sphere"',
+        "rooms",
+        "room:west",
+    ),
+    "12 km": ("house.xml", 'size="1.5 2 1"', 'size="6000 2 1"', "size", "span"),
+    "no mount": ("house.xml", '"mount:tray"', '"mount:trays"', "mounts", "mount:tray"),
+    "a tilted mount": (
+        "house.xml",
+        TRAY + ' quat="0.70710678 0 0 -0.70710678"',
+        TRAY + ' euler="0.3 0 0"',
+        "mounts",
+        "tilted",
+    ),
+    "no outer wall": ("house.xml", EAST, "", "shell", "open over"),
+    "a gap in the wall": (
+        "house.xml",
+        EAST,
+        EAST.replace('2 1.25" size="0.1 2', '2.2 1.25" size="0.1 1.8'),
+        "shell",
+        "open over",
+    ),
+    "walls of glass": (
+        "house.xml",
+        EAST,
+        EAST.replace("/>", ' group="2" contype="0" conaffinity="0"/>'),
+        "shell",
+        "open",
+    ),
+    "walls that nobody meets": ("house.xml", EAST, EAST.replace("/>", ' contype="2"/>'), "contact", "'east'"),
+    "a walled-up door": (
+        "house.xml",
+        LINTEL,
+        LINTEL.replace("2.25", "1.25").replace("0.25", "1.25"),
+        "rooms",
+        "nobody can walk into",
+    ),
+    "a door of 0.45 m": ("house.xml", SOUTH, SOUTH.replace("0.75", "1.025"), "rooms", "nobody can walk into"),
+    "no floor": ("house.xml", FLOOR, "", "floor", "missing"),
+    "a floor too low": ("house.xml", FLOOR, FLOOR.replace("3 2 0", "3 2 -0.2"), "floor", "z = -0.200"),
+    "a step": (
+        "house.xml",
+        END,
+        '<geom type="box" pos="1.5 1 0" size="0.4 0.4 0.03"/>' + END,
+        "floor",
+        "z = 0.030",
+    ),
+    "bin 3 m up": ("house.xml", TRAY, TRAY.replace('3.6 0"', '3.6 3"'), "reach", "above the floor"),
+    "bin below the floor": (
+        "house.xml",
+        TRAY,
+        TRAY.replace('3.6 0"', '3.6 -0.5"'),
+        "reach",
+        "below the floor",
+    ),
+    "bin outside": ("house.xml", TRAY, TRAY.replace("5.7", "9.7"), "rooms", "no room"),
+    "bin in the other room": ("house.xml", TRAY, TRAY.replace("5.7", "2.7"), "rooms", "'west'"),
+    "bin under a shelf": (
+        "house.xml",
+        END,
+        '<geom type="box" pos="5.7 3.6 0.6" size="0.3 0.3 0.02"/>' + END,
+        "reach",
+        "over it or in it",
+    ),
+    "bin in a cage": (
+        "house.xml",
+        END,
+        '<geom type="box" pos="4.6 3.2 1" size="0.03 0.8 1"/><geom type="box" pos="5.3 2.4 1" size="0.7 0.03 1"/>'
+        + END,
+        "reach",
+        "",
+    ),
+    "hidden bin": (
+        "house.xml",
+        END,
+        '<geom type="box" pos="5.28 3.6 1" size="0.05 0.4 1"/>' + END,
+        "reach",
+        "cannot be seen",
+    ),
+    "no volume": ("tray.xml", 'name="volume"', 'name="space"', "sites", "'volume'"),
+    "no approach": ("tray.xml", 'name="approach"', 'name="spot"', "sites", "'approach'"),
+    "a round volume": (
+        "tray.xml",
+        'name="volume" type="box"',
+        'name="volume" type="sphere"',
+        "sites",
+        "no box",
+    ),
+    "a bin with a joint": (
+        "tray.xml",
+        '<body name="receptacle">',
+        '<body name="receptacle"><joint name="lid"/>',
+        "joints",
+        "'lid'",
+    ),
+    "a bin without a floor": ("tray.xml", BOTTOM, "", "container", "no floor"),
+    "a bin with a lid": (
+        "tray.xml",
+        BOTTOM,
+        BOTTOM + '<geom pos="0 0 0.31" size="0.25 0.25 0.01"/>',
+        "container",
+        "closes it",
+    ),
+    "a bin without a wall": (
+        "tray.xml",
+        '<geom pos="0.24 0 0.15" size="0.01 0.25 0.15"/>',
+        "",
+        "container",
+        "no wall",
+    ),
+    "a bin too deep for its site": (
+        "tray.xml",
+        'pos="0 0 0.2" size="0.24 0.24 0.16"',
+        'pos="0 0 0.3" size="0.24 0.24 0.16"',
+        "container",
+        "no floor",
+    ),
+    "a giant bin": ("tray.xml", 'size="0.24 0.24 0.16"', 'size="2.4 0.24 0.16"', "size", "4.8"),
+    "approach inside": (
+        "tray.xml",
+        'name="approach" pos="0 -0.6 0"',
+        'name="approach" pos="0 0 0"',
+        "approach",
+        "inside",
+    ),
+    "an object for no bin": ("tray.xml", "0.24", "0.055", "capacity", "does not fit"),
+    "a heavy object": ("ball.xml", 'mass="0.1"', 'mass="1000"', "mass", "1000 kg"),
+}
+SURPRISING = {
+    "a door of 0.6 m": ("house.xml", SOUTH, SOUTH.replace("0.75", "0.95"), "passages", "0.6"),
+    "rooms that overlap": (
+        "house.xml",
+        'pos="1.5 2 1" size="1.5 2 1"',
+        'pos="1.6 2 1" size="1.6 2 1"',
+        "rooms",
+        "overlap",
+    ),
+    "a mount for nothing": ("house.xml", END, '<site name="mount:sink"/>' + END, "mounts", "mount:sink"),
+    "wind": ("house.xml", "<worldbody>", '<option wind="5 0 0"/><worldbody>', "options", "wind"),
+    "a bin in the air": ("house.xml", TRAY, TRAY.replace('3.6 0"', '3.6 0.5"'), "reach", "hangs 0.50 m"),
+    "a bin that bounces": ("tray.xml", 'condim="6"', 'condim="3"', "container", "condim 3"),
+}
+
+
+def broken_house(catalogue: Path, name: str, old: str, new: str) -> Catalogue:
+    path = catalogue.with_name(name)
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return Catalogue.load(str(catalogue))
+
+
+def findings(catalogue: Catalogue) -> list[Finding]:
+    return check_house(CompiledHouse(catalogue))
+
+
+def test_good_houses_have_no_findings(small_catalogue: Catalogue, catalogue: Catalogue) -> None:
+    assert findings(small_catalogue) == []
+    assert findings(catalogue) == []
+
+
+@pytest.mark.parametrize("change", BROKEN)
+def test_a_house_that_breaks_a_convention_is_refused_by_that_rule(change: str, fresh_house: Path) -> None:
+    *edit, rule, word = BROKEN[change]
+    spoiled = broken_house(fresh_house, *edit)
+    found = errors(findings(spoiled))
+    assert any(f.rule == rule and word in str(f) for f in found), [str(f) for f in found]
+    with pytest.raises(AssetError) as refused:
+        compiled_house(spoiled)
+    assert "\n" not in str(refused.value) and str(fresh_house) in str(refused.value)
+
+
+@pytest.mark.parametrize("change", SURPRISING)
+def test_what_only_surprises_is_a_warning(change: str, fresh_house: Path) -> None:
+    *edit, rule, word = SURPRISING[change]
+    spoiled = broken_house(fresh_house, *edit)
+    found = findings(spoiled)
+    assert not errors(found), [str(f) for f in errors(found)]
+    assert any(f.rule == rule and word in str(f) for f in found), [str(f) for f in found]
+    compiled_house(spoiled)
+
+
+@pytest.mark.parametrize("key", list(Catalogue.load().receptacles))
+def test_shipped_receptacles_have_no_findings(key: str) -> None:
+    assert check_receptacle(Catalogue.load().receptacles[key].path) == []
