@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import gc
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -135,8 +136,10 @@ def _results(
 
 @functools.cache
 def _house(name: str) -> House:
-    """Loaded once per process."""
-    return House.load(name)
+    """Loaded once per process; the garbage collector need not look at it, or at what was imported, again."""
+    house = House.load(name)
+    gc.freeze()
+    return house
 
 
 def _run(config: TrialConfig, out: Path) -> str | None:

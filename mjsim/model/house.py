@@ -92,7 +92,8 @@ class CompiledHouse:
             AssetError: The file is malformed or has no top-level body `object`.
         """
         prepare = separate_visuals if visuals else remove_visuals
-        return self.once((path, visuals), lambda: prepare(read_model(path, body="object")))
+        read = self.once(path, lambda: read_model(path, body="object"))
+        return self.once((path, visuals), lambda: prepare(read.copy()))
 
     def once(self, key: Any, compute: Callable[[], T]) -> T:
         """What `compute` returned at the first call with `key`."""

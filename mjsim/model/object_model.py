@@ -8,18 +8,9 @@ VISUAL_BODY = "looks"  # body of an object's visual geoms
 
 
 def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Remove what has no effect on motion, in place: massless geoms that meet nothing, materials, textures, meshes.
-
-    Geoms of the static world need no mass.
-    """
-    for geom in spec.geoms:
-        if _is_visual(geom) or (geom.parent == spec.worldbody and not (geom.contype or geom.conaffinity)):
-            spec.delete(geom)
-        else:
-            geom.material = ""
-    used = {geom.meshname for geom in spec.geoms}
-    for asset in (*spec.materials, *spec.textures, *(m for m in spec.meshes if m.name not in used)):
-        spec.delete(asset)
+    """Remove what has no effect on motion, in place: geoms that meet nothing, materials, textures, unused meshes."""
+    spec.compiler.discardvisual = True
+    spec.compile()
     return spec
 
 

@@ -116,16 +116,17 @@ def cast_down(
     heights = np.full(len(points), -math.inf)
     start, along = np.empty(3), np.empty(3)
     for geom in geoms:
-        centre, bound = positions[geom], shapes.bounds[geom]
+        x, y, dz = positions[geom, 0], positions[geom, 1], top - positions[geom, 2]
+        bound, axes = shapes.bounds[geom] ** 2, rotations[geom]  # columns of the rotation are the geom's axes
+        size, is_box = shapes.sizes[geom], shapes.types[geom] == _BOX
+        along[0], along[1], along[2] = -axes[6], -axes[7], -axes[8]
         for k in range(len(points)):
-            dx, dy, dz = points[k, 0] - centre[0], points[k, 1] - centre[1], top - centre[2]
-            if dx * dx + dy * dy > bound * bound:
+            dx, dy = points[k, 0] - x, points[k, 1] - y
+            if dx * dx + dy * dy > bound:
                 continue
-            for axis in range(3):  # columns of the rotation are the geom's axes
-                rx, ry, rz = rotations[geom, axis], rotations[geom, 3 + axis], rotations[geom, 6 + axis]
-                start[axis] = rx * dx + ry * dy + rz * dz
-                along[axis] = -rz
-            depth = _into_geom(start, along, geom, shapes)
+            for axis in range(3):
+                start[axis] = axes[axis] * dx + axes[3 + axis] * dy + axes[6 + axis] * dz
+            depth = _into_box(start, along, size) if is_box else _into_geom(start, along, geom, shapes)
             if depth >= 0.0:
                 heights[k] = max(heights[k], top - depth)
     return heights
@@ -133,10 +134,8 @@ def cast_down(
 
 @kernel
 def _into_geom(start: Floats, along: Floats, geom: int, shapes: Shapes) -> float:
-    """Where a ray enters a geom, in its own frame; -1 if it misses."""
+    """Where a ray enters a geom that is no box, in its own frame; -1 if it misses."""
     kind, size = shapes.types[geom], shapes.sizes[geom]
-    if kind == _BOX:
-        return _into_box(start, along, size)
     if kind != _MESH:
         return _into_round(start, along, size, kind)
     mesh = shapes.meshes[geom]
