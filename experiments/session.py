@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,9 +180,13 @@ class Session:
         if not (self._rollouts and self._roll_out(decision)):
             self._step(self._action(decision))
 
+    def note(self, event: str, **fields: Any) -> None:
+        """Log something that came from outside of the simulation, in the present state."""
+        self._log.append(self._now.time, event, **fields)
+
     def scroll(self, rows: int) -> None:
         """Scroll the task list by so many rows, positive towards its end; logged, so that a replay shows the same."""
-        self._log.append(self._now.time, "scroll", rows=rows)
+        self.note("scroll", rows=rows)
         self._assistant.scroll(rows)
         self._hud = None
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mjsim.actions import Action, ActionResult, WorldEvent
+from mjsim.actions import Action, ActionResult, Pick, Place, WorldEvent
 from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.fidelity import make_tier
 from mjsim.fidelity.kinematics import LocomotionState
@@ -137,6 +137,14 @@ class World:
         """
         result = self._tier.step(action)
         return StepResult(self._tier.observation(), result, tuple(self._tier.episode_state.events))
+
+    def answer(self, action: Pick | Place) -> ActionResult:
+        """What `step` would answer to a pick or place now; nothing changes.
+
+        Raises:
+            ActionError: `action` is neither.
+        """
+        return self._tier.answer(action)
 
     def walk(self, moves: ArrayLike) -> Rollout:
         """Take one control step per row, as `step(Move(*row))` would; stop early after a step with events.

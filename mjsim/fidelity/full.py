@@ -111,6 +111,13 @@ class Full(Tier):
         self.advance(action if isinstance(action, Move) else IDLE)
         return result
 
+    def answer(self, action: Pick | Place) -> ActionResult:
+        """What the answer to a pick or place would be now."""
+        result = self.resolve(action, busy=self.busy)
+        if result is None:
+            raise ActionError(f"expected a Pick or Place, got {action!r}")
+        return result
+
     def resolve(self, action: Action, *, busy: bool) -> ActionResult | None:
         """Decide on a pick or place from the state of the physics; None for a move.
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import IDLE, Action, ActionResult, Move, WorldEvent
+from mjsim.actions import IDLE, Action, ActionResult, Move, Pick, Place, Refusal, WorldEvent
 from mjsim.fidelity.body_state import PITCH, VX, VY, X
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_world import KinematicWorld
@@ -75,6 +75,13 @@ class KinematicTier(Tier):
             self._kinematic.write(self._full.data)
             self._in_step = True
         return self._full.data
+
+    def answer(self, action: Pick | Place) -> ActionResult:
+        """What the answer to a pick or place would be now."""
+        if self.busy:
+            return ActionResult(action, Refusal.BUSY, action.object)
+        _ = self.data  # the decision reads them
+        return self._full.answer(action)
 
     @property
     def time(self) -> float:

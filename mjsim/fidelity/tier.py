@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import IDLE, Action, ActionResult, Move
+from mjsim.actions import IDLE, Action, ActionResult, Move, Pick, Place
 from mjsim.fidelity.episode_state import EpisodeState
 from mjsim.health.values import HealthSample
 from mjsim.observation import Observation
@@ -35,6 +35,10 @@ class Tier(ABC):
     @abstractmethod
     def step(self, action: Action) -> ActionResult | None:
         """Advance by one control step; its events are in `episode_state` afterwards."""
+
+    @abstractmethod
+    def answer(self, action: Pick | Place) -> ActionResult:
+        """What the answer to a pick or place would be now; nothing changes."""
 
     @abstractmethod
     def observation(self) -> Observation:

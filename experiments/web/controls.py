@@ -1,0 +1,143 @@
+"""From what a person presses to the action of a control step.
+
+Inputs come numbered, whenever they come; the control step takes all that have come since the one before, so that a tap
+between two steps counts. The mouse sets a target angle that body and head follow within their limits.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+import msgspec
+
+from mjsim.actions import Action, ActionResult, Move, Pick, Place, Refusal
+from mjsim.observation import Observation
+from mjsim.options import WorldOptions
+
+Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # of the highest speed
+Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # rad
+Press = Literal["act", "left hand", "right hand"]
+MAX_PITCH = 1.2  # rad that the mouse can look up or down
+MAX_TURN_AHEAD = 2.8  # rad that the mouse can be ahead of the body
+
+
+class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What changed at the keyboard, the mouse, a gamepad or a touch screen.
+
+    Attributes:
+        number: 1 for the first input of a session, then one more each.
+        forward: How fast to walk, from -1 (back) to 1, from now on.
+        left: How fast to walk to the left, from -1 to 1, from now on.
+        turn: How fast to turn, from -1 (right) to 1 (left), from now on.
+        look: How fast to look up, from -1 (down) to 1, from now on.
+        yaw: Add so much to the heading to turn to, rad, counter-clockwise.
+        pitch: Add so much to the pitch to look to, rad, upwards.
+        press: The action key, or a hand's own key, was pressed.
+        scroll: Scroll the task list by so many rows, positive towards its end.
+    """
+
+    number: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
+    forward: Share = 0.0
+    left: Share = 0.0
+    turn: Share = 0.0
+    look: Share = 0.0
+    yaw: Angle = 0.0
+    pitch: Angle = 0.0
+    press: Press | None = None
+    scroll: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
+
+
+Answer = Callable[[Pick | Place], ActionResult]
+
+
+@dataclass(frozen=True)
+class Controls:
+    """What is held down, what was pressed, and where body and head turn to.
+
+    Attributes:
+        held: The latest input.
+        heading: Heading to turn to, rad, or None where the mouse asks for none.
+        pitch: Pitch to look to, rad, or None.
+        presses: Keys that were pressed and not yet acted on.
+    """
+
+    held: Input | None = None
+    heading: float | None = None
+    pitch: float | None = None
+    presses: tuple[Press, ...] = ()
+
+    def take(self, inputs: Sequence[Input], seen: Observation) -> "Controls":
+        """The controls after further inputs."""
+        heading, pitch = self.heading, self.pitch
+        for new in inputs:
+            if new.yaw:
+                ahead = 0.0 if heading is None else _gap(heading, seen.heading)
+                heading = seen.heading + min(max(ahead + new.yaw, -MAX_TURN_AHEAD), MAX_TURN_AHEAD)
+            if new.pitch:
+                pitch = (seen.pitch if pitch is None else pitch) + new.pitch
+                pitch = min(max(pitch, -MAX_PITCH), MAX_PITCH)
+            heading = None if new.turn else heading
+            pitch = None if new.look else pitch
+        presses = (*self.presses, *(new.press for new in inputs if new.press is not None))
+        return Controls(inputs[-1] if inputs else self.held, heading, pitch, presses)
+
+
+def control_step(
+    before: Controls, inputs: Sequence[Input], seen: Observation, answer: Answer, options: WorldOptions
+) -> tuple[Action, Controls]:
+    """The action of a control step, and the controls after it.
+
+    The action key places what belongs into a receptacle in reach; else it picks the nearest object in reach. The key of
+    a hand places what that hand holds; if it is empty, it picks. What is impossible is attempted all the same, so that
+    the message bar says why.
+
+    Args:
+        before: Controls after the last control step.
+        inputs: What came since then, in order.
+        seen: State of the world.
+        answer: What the world would answer to a pick or place now.
+        options: The person's limits.
+    """
+    controls = before.take(inputs, seen)
+    if not controls.presses:
+        return _move(controls, inputs, seen, options), controls
+    press, *later = controls.presses
+    return _attempt(press, seen, answer), replace(controls, presses=tuple(later))
+
+
+def _attempt(press: Press, seen: Observation, answer: Answer) -> Action:
+    if press != "act":
+        held = seen.hands[0 if press == "left hand" else 1]
+        return Pick() if held is None else Place(held)
+    place = answer(Place())
+    at_another_receptacle = place.refusal is Refusal.NOT_THE_RECEPTACLE
+    if place.applied or (at_another_receptacle and not answer(Pick()).applied):
+        return Place()
+    return Pick()
+
+
+def _move(controls: Controls, inputs: Sequence[Input], seen: Observation, options: WorldOptions) -> Move:
+    """The fastest walk that was asked for since the last step, and the turn towards where the mouse points."""
+    asked = inputs if controls.held is None else (*inputs, controls.held)
+
+    def fastest(name: str) -> float:
+        return max((float(getattr(new, name)) for new in asked), key=abs, default=0.0)
+
+    forward, left = fastest("forward"), fastest("left")
+    speed = options.max_speed / max(1.0, math.hypot(forward, left))  # walking diagonally is not faster
+    turn, look = fastest("turn") * options.max_turn, fastest("look") * options.max_look
+    if controls.heading is not None and not turn:
+        turn = _rate(_gap(controls.heading, seen.heading), options.max_turn, options)
+    if controls.pitch is not None and not look:
+        look = _rate(controls.pitch - seen.pitch, options.max_look, options)
+    return Move(forward * speed, left * speed, turn, look)
+
+
+def _gap(angle: float, start: float) -> float:
+    """The shorter turn from one heading to another, rad."""
+    return (angle - start + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def _rate(gap: float, limit: float, options: WorldOptions) -> float:
+    return min(max(gap / options.control_timestep, -limit), limit)
