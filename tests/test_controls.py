@@ -11,9 +11,11 @@ from experiments.web.controls import MAX_PITCH, Controls, Input, control_step
 from mjsim.actions import IDLE, Action, ActionResult, EventKind, Move, Pick, Place, Refusal
 from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 
 OPTIONS = WorldOptions(fidelity="event")
+PERSON = PersonParameters()
 SHARE = st.floats(-1.0, 1.0)
 INPUTS = st.lists(
     st.builds(
@@ -44,7 +46,7 @@ def steps(world: World, seen, controls: Controls, *batches, answer=nothing):
     """Actions for batches of inputs, one batch a control step."""
     actions = []
     for inputs in batches:
-        action, controls = control_step(controls, inputs, seen, answer, world.options)
+        action, controls = control_step(controls, inputs, seen, answer, PERSON, world.control_timestep)
         seen = world.step(action).observation
         actions.append(action)
     return actions, controls, seen
@@ -54,7 +56,7 @@ def test_a_tap_between_two_control_steps_counts_for_one(scene):
     world = World(scene, OPTIONS)
     tap = (Input(number=1, forward=1.0), Input(number=2))
     actions, *_ = steps(world, world.reset(), Controls(), tap, ())
-    assert actions == [Move(forward=OPTIONS.max_speed), IDLE]
+    assert actions == [Move(forward=PERSON.walking_speed), IDLE]
 
 
 def test_a_key_that_is_held_down_counts_until_it_is_released(scene):
@@ -62,13 +64,13 @@ def test_a_key_that_is_held_down_counts_until_it_is_released(scene):
     actions, *_ = steps(
         world, world.reset(), Controls(), (Input(number=1, left=-1.0),), (), (), (Input(number=2),), ()
     )
-    assert [a.left for a in actions] == [-OPTIONS.max_speed] * 3 + [0.0, 0.0]
+    assert [a.left for a in actions] == [-PERSON.walking_speed] * 3 + [0.0, 0.0]
 
 
 def test_walking_diagonally_is_not_faster(scene):
     world = World(scene, OPTIONS)
     (action,), *_ = steps(world, world.reset(), Controls(), (Input(number=1, forward=1.0, left=1.0),))
-    assert math.hypot(action.forward, action.left) == pytest.approx(OPTIONS.max_speed)
+    assert math.hypot(action.forward, action.left) == pytest.approx(PERSON.walking_speed)
 
 
 @pytest.mark.parametrize("yaw", [-2.5, -0.3, 0.02, 1.0, 2.5])
@@ -78,7 +80,7 @@ def test_the_body_turns_to_where_the_mouse_points_within_its_limits(scene, yaw):
     target = seen.heading + yaw
     actions, _, seen = steps(world, seen, Controls(), (Input(number=1, yaw=yaw),), *[()] * 60)
     assert math.cos(seen.heading - target) == pytest.approx(1.0, abs=1e-3)
-    assert all(abs(a.turn) <= OPTIONS.max_turn for a in actions)
+    assert all(abs(a.turn) <= PERSON.turning_speed for a in actions)
 
 
 @settings(max_examples=100, deadline=None)
@@ -87,8 +89,8 @@ def test_no_input_exceeds_the_limits(scene, batches):
     world = World(scene, OPTIONS)
     actions, controls, _ = steps(world, world.reset(), Controls(), *batches)
     for action in actions:
-        assert math.hypot(action.forward, action.left) <= OPTIONS.max_speed * (1 + 1e-12)
-        assert abs(action.turn) <= OPTIONS.max_turn and abs(action.look) <= OPTIONS.max_look
+        assert math.hypot(action.forward, action.left) <= PERSON.walking_speed * (1 + 1e-12)
+        assert abs(action.turn) <= PERSON.turning_speed and abs(action.look) <= PERSON.looking_speed
     assert controls.pitch is None or abs(controls.pitch) <= MAX_PITCH
 
 
@@ -98,7 +100,7 @@ def pressed(key: str, answers: dict[type, ActionResult], hands=(None, None)) -> 
 
     Seen.hands = hands
     press = (Input(number=1, press=key),)
-    action, controls = control_step(Controls(), press, Seen, lambda a: answers[type(a)], OPTIONS)
+    action, controls = control_step(Controls(), press, Seen, lambda a: answers[type(a)], PERSON, 0.04)
     assert controls.presses == ()
     return action
 

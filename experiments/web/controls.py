@@ -13,7 +13,7 @@ import msgspec
 
 from mjsim.actions import Action, ActionResult, Move, Pick, Place, Refusal
 from mjsim.observation import Observation
-from mjsim.options import WorldOptions
+from mjsim.person_parameters import PersonParameters
 
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # of the highest speed
 Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # rad
@@ -84,7 +84,12 @@ class Controls:
 
 
 def control_step(
-    before: Controls, inputs: Sequence[Input], seen: Observation, answer: Answer, options: WorldOptions
+    before: Controls,
+    inputs: Sequence[Input],
+    seen: Observation,
+    answer: Answer,
+    person: PersonParameters,
+    duration: float,
 ) -> tuple[Action, Controls]:
     """The action of a control step, and the controls after it.
 
@@ -97,11 +102,12 @@ def control_step(
         inputs: What came since then, in order.
         seen: State of the world.
         answer: What the world would answer to a pick or place now.
-        options: The person's limits.
+        person: How fast this person walks, turns and looks.
+        duration: Of the control step, s.
     """
     controls = before.take(inputs, seen)
     if not controls.presses:
-        return _move(controls, inputs, seen, options), controls
+        return _move(controls, inputs, seen, person, duration), controls
     press, *later = controls.presses
     return _attempt(press, seen, answer), replace(controls, presses=tuple(later))
 
@@ -117,7 +123,9 @@ def _attempt(press: Press, seen: Observation, answer: Answer) -> Action:
     return Pick()
 
 
-def _move(controls: Controls, inputs: Sequence[Input], seen: Observation, options: WorldOptions) -> Move:
+def _move(
+    controls: Controls, inputs: Sequence[Input], seen: Observation, person: PersonParameters, duration: float
+) -> Move:
     """The fastest walk that was asked for since the last step, and the turn towards where the mouse points."""
     asked = inputs if controls.held is None else (*inputs, controls.held)
 
@@ -125,12 +133,12 @@ def _move(controls: Controls, inputs: Sequence[Input], seen: Observation, option
         return max((float(getattr(new, name)) for new in asked), key=abs, default=0.0)
 
     forward, left = fastest("forward"), fastest("left")
-    speed = options.max_speed / max(1.0, math.hypot(forward, left))  # walking diagonally is not faster
-    turn, look = fastest("turn") * options.max_turn, fastest("look") * options.max_look
+    speed = person.walking_speed / max(1.0, math.hypot(forward, left))  # walking diagonally is not faster
+    turn, look = fastest("turn") * person.turning_speed, fastest("look") * person.looking_speed
     if controls.heading is not None and not turn:
-        turn = _rate(_gap(controls.heading, seen.heading), options.max_turn, options)
+        turn = _rate(_gap(controls.heading, seen.heading) / duration, person.turning_speed)
     if controls.pitch is not None and not look:
-        look = _rate(controls.pitch - seen.pitch, options.max_look, options)
+        look = _rate((controls.pitch - seen.pitch) / duration, person.looking_speed)
     return Move(forward * speed, left * speed, turn, look)
 
 
@@ -139,5 +147,5 @@ def _gap(angle: float, start: float) -> float:
     return (angle - start + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def _rate(gap: float, limit: float, options: WorldOptions) -> float:
-    return min(max(gap / options.control_timestep, -limit), limit)
+def _rate(rate: float, limit: float) -> float:
+    return min(max(rate, -limit), limit)
