@@ -13,6 +13,7 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from experiments.errors import ConfigError
+from experiments.person_distribution import PersonDistribution
 from experiments.trial_config import SEEDS, TrialConfig, episode_settings
 
 T = TypeVar("T")
@@ -20,7 +21,17 @@ T = TypeVar("T")
 LONGEST_LIST = 1_000_000  # numbers
 PATHS = ("house", "episode")  # relative to the design's file
 # What may differ by accident between the conditions of a comparison.
-CONFOUNDERS = ("user", "objects", "house", "planner", "fidelity", "points", "capacity", "time_limit")
+CONFOUNDERS = (
+    "user",
+    "objects",
+    "house",
+    "planner",
+    "fidelity",
+    "points",
+    "capacity",
+    "time_limit",
+    "person",
+)
 
 
 @dataclass(frozen=True)
@@ -103,6 +114,7 @@ class _Cell(msgspec.Struct, forbid_unknown_fields=True):
     regret: bool | UnsetType = UNSET
     points: _Count | UnsetType = UNSET
     capacity: _Count | UnsetType = UNSET
+    person: dict[str, Any] | UnsetType = UNSET
 
     def given(self) -> dict[str, Any]:
         """The values that are there, by name."""
@@ -155,6 +167,8 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
             )
         settings = {**episode_settings(Path(settings["episode"])), **settings}
         seeds = [{n: s for n, s in person.items() if n != "house_seed"} for person in seeds]
+    if "person" in settings:
+        settings["person"] = PersonDistribution.of(settings["person"])
     missing = [name for name in ("objects", "assistance") if name not in settings]
     if missing:
         raise ConfigError(f"{' and '.join(missing)} must be given")

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.errors import ConfigError
 from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import Footprint
@@ -21,6 +22,7 @@ from planner.navmesh import NavMesh
 
 VIEWPOINT_SPACING = 2.2  # m; from a viewpoint one sees what lies within it in spite of furniture
 VIEWPOINT_CANDIDATES = 3000
+ARRIVED_WITHIN = 0.06  # m from the end of its path, a walk is over
 WALL_GAP = 0.05  # m that planned paths keep from walls beyond the body's radius, so that corners can be cut
 
 
@@ -71,16 +73,27 @@ class House:
         )
 
     def for_person(self, person: PersonParameters) -> "House":
-        """The same house, with the same episodes, for somebody of another size or reach."""
+        """The same house, with the same episodes, for somebody of another size or reach.
+
+        Raises:
+            ConfigError: A receptacle is out of reach from where this person would stand.
+        """
         usual, size = PersonParameters(), (person.body_radius, person.reach)
         if size == (self.person.body_radius, self.person.reach):
             return self
         navmesh = self.sampling_floor
         if person.body_radius != usual.body_radius:
             navmesh = _navmesh(compiled_house(self.catalogue).floor, person.body_radius + WALL_GAP)
-        return dataclasses.replace(
+        house = dataclasses.replace(
             self, navmesh=navmesh, geodesics=Geodesics(navmesh, person.reach), person=person
         )
+        for key, receptacle in house.receptacles.items():
+            needed = receptacle.distance(house.approaches[key]) + ARRIVED_WITHIN
+            if needed > person.reach:
+                raise ConfigError(
+                    f"a reach of {person.reach:.2f} m is too short for {key!r}, which needs {needed:.2f} m"
+                )
+        return house
 
     @cached_property
     def body_geodesics(self) -> Geodesics:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.house import ARRIVED_WITHIN
 from experiments.participants.base import WalkAlong
 from experiments.path_following import Obstacles, Pace, follow, turn_towards
 from mjsim.actions import IDLE, Action, Move, Pick, Place
@@ -20,7 +21,6 @@ from mjsim.observation import ObjectStatus, Observation
 from mjsim.person_parameters import PersonParameters
 from planner.polyline import distance, path_length, project, rest_of
 
-ARRIVED_WITHIN = 0.06  # m from the end of the path
 FACING_WITHIN = 0.25  # rad
 MIN_PROGRESS = 0.05  # m
 PROGRESS_TIMEOUT = 2.0  # s without progress until the person is blocked

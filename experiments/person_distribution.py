@@ -52,9 +52,9 @@ class Distribution:
     highest: float = math.inf
 
     def __post_init__(self) -> None:
-        numbers = [self.first, self.second]
+        numbers = [self.first] if self.shape == "constant" else [self.first, self.second]
         if not all(map(math.isfinite, numbers)) or math.isnan(self.lowest) or math.isnan(self.highest):
-            raise ConfigError(f"{self.shape} takes finite numbers, got {numbers}")
+            raise ConfigError(f"{', '.join(f'{n:g}' for n in numbers)}: every number must be finite")
         if self.shape == "uniform" and not self.first <= self.second:
             raise ConfigError(f"uniform takes the lowest value, then the highest; got {numbers}")
         if self.shape in ("normal", "lognormal") and not self.second > 0:
@@ -122,7 +122,9 @@ class PersonDistribution:
     def __post_init__(self) -> None:
         for name, _ in self.parameters:
             if name not in _NAMES:
-                raise ConfigError(f"a person has no {name!r}; it has {', '.join(_NAMES)}")
+                raise ConfigError(
+                    f"a person has no {name!r}; it has {', '.join(RANGES)}, and motion (docs/people.md)"
+                )
         self._quantiles({name: 0.5 for name, _ in self.parameters})
 
     @classmethod

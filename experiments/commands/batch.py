@@ -24,6 +24,7 @@ from experiments.commands.options import (
     text_list,
     trial_options,
 )
+from experiments.commands.person_options import PERSON_OPTIONS
 from experiments.commands.terminal import error_console, progress_bars
 from experiments.design import Design, factorial, read_design
 from experiments.errors import ConfigError
@@ -87,7 +88,7 @@ def add_parser(commands: Any) -> None:
 def _design(arguments: argparse.Namespace) -> Design:
     """The design's file, or the factorial of the options."""
     if arguments.design is not None:
-        names = ("objects", "assistance", "seeds", "user", "episode", *TRIAL_OPTIONS)
+        names = ("objects", "assistance", "seeds", "user", "episode", *TRIAL_OPTIONS, *PERSON_OPTIONS)
         if given := given_options(arguments, names):
             options = ", ".join(f"--{name.replace('_', '-')}" for name in given)
             raise ConfigError(f"{arguments.design} says what to run; leave out {options}, or write it there")

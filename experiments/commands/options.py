@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from experiments.commands.person_options import add_person_options, person_options
 from experiments.design import numbers
 from experiments.errors import ConfigError
 from experiments.first_person import FilmConfig
@@ -170,6 +171,7 @@ def add_trial_options(parser: argparse.ArgumentParser, *, several_users: bool = 
     for name, what in SEEDS.items():
         option = f"--{name.replace('_', '-')}"
         parser.add_argument(option, type=int, metavar="S", help=f"seed of {what} (default: the seed)")
+    add_person_options(parser)
 
 
 TRIAL_OPTIONS = ("house", "planner", "fidelity", "regret", "time_limit", "points", "capacity", *SEEDS)
@@ -184,10 +186,10 @@ def trial_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """The options of `add_trial_options` that are given, but for the user, as arguments of `TrialConfig`.
 
     Raises:
-        ConfigError: An episode is given together with what it decides.
+        ConfigError: An episode is given together with what it decides, or no such person is possible.
         EpisodeError: The episode cannot be read.
     """
-    options = given_options(arguments, TRIAL_OPTIONS)
+    options = {**given_options(arguments, TRIAL_OPTIONS), **person_options(arguments)}
     if arguments.episode is None:
         return options
     if arguments.objects is not None or arguments.house_seed is not None or arguments.points is not None:
