@@ -14,7 +14,13 @@ from experiments.files import TEXT, Layout, read_arrays, save_arrays
 from experiments.records import EventLog
 from mjsim.observation import Observation
 from mjsim.world import World
-from mjsim.world_state import CHECKPOINT_PERIOD, WorldState, engine_versions, hash64, model_fingerprint
+from mjsim.world_state import (
+    CHECKPOINT_PERIOD,
+    WorldState,
+    checkpoint_hash,
+    engine_versions,
+    model_fingerprint,
+)
 
 _LAYOUTS: dict[str, Layout] = {
     "state_hash": ("u8", (None,)),
@@ -99,6 +105,7 @@ class Recording:
         count = len(actions)  # an interruption can fall between recording a step and its action
         kept = {step: state for step, state in self.checkpoints.items() if step < count}
         states = [state.physics for state in kept.values()]
+        details = [state.details_json() for state in kept.values()]
         arrays = {
             "state_hash": np.array(self._state_hash[:count], np.uint64),
             "action_hash": action_hashes(actions),
@@ -106,8 +113,10 @@ class Recording:
             "log_hash": np.array([*self._log_hash[:count], self.log.hash], np.uint64),
             "checkpoint_step": np.array(list(kept), np.int64),
             "checkpoint_physics": np.array(states) if states else np.zeros((0, 0)),
-            "checkpoint_details": np.array([state.details_json() for state in kept.values()], np.str_),
-            "checkpoint_hash": np.array([state.hash for state in kept.values()], np.uint64),
+            "checkpoint_details": np.array(details, np.str_),
+            "checkpoint_hash": np.array(
+                [checkpoint_hash(*pair) for pair in zip(states, details, strict=True)], np.uint64
+            ),
         }
         save_arrays(path, arrays)
 
@@ -165,8 +174,8 @@ class Recorded:
 
     def checkpoint_is_intact(self, number: int) -> bool:
         """Whether the `number`-th checkpoint is the one that was recorded."""
-        content = self.checkpoint_physics[number].tobytes() + str(self.checkpoint_details[number]).encode()
-        return hash64(content) == int(self.checkpoint_hash[number])
+        state = self.checkpoint_physics[number], str(self.checkpoint_details[number])
+        return checkpoint_hash(*state) == int(self.checkpoint_hash[number])
 
 
 def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:

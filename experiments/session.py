@@ -64,7 +64,7 @@ class Session:
         walls: Outline of the navigable floor, ends x, y, x, y of its edges, m, shape (e, 4).
         time_limit: Simulated time after which the session ends, s.
         viewer: Sees every control step, or None.
-        rollouts: Take many control steps at once where nobody watches them and the fidelity is not `full`. The run is
+        rollouts: Take many control steps at once where nobody watches them and they can be foreseen. The run is
             the same without.
 
     Attributes:
@@ -90,7 +90,7 @@ class Session:
         self._log = recording.log
         self._time_limit = time_limit
         self._viewer = viewer
-        self._rollouts = rollouts and viewer is None and world.options.fidelity != "full"
+        self._rollouts = rollouts and viewer is None
         self._controller = LocomotionController(walls, world.scene.person)
         self._answer: ActionResult | None = None
         self._hud: tuple[Observation, HudState] | None = None

@@ -162,7 +162,7 @@ class _Trial:
     def run(self, on_progress: OnProgress) -> SessionResult:
         """Run the session; log and video are complete in the folder afterwards."""
         result = self._run_once(on_progress, rollouts=True)
-        if isinstance(result.error, PhysicsError) and self.config.fidelity != "full":
+        if isinstance(result.error, PhysicsError):
             # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
             for path in self.folder.iterdir():
                 path.unlink()

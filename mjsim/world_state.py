@@ -99,7 +99,7 @@ class WorldState:
     @property
     def hash(self) -> int:
         """64 bits that differ whenever two states do (up to chance)."""
-        return hash64(self.physics.tobytes() + self.details_json().encode())
+        return checkpoint_hash(self.physics, self.details_json())
 
     def details_json(self) -> str:
         """The details as JSON, in which numbers keep their full precision."""
@@ -117,6 +117,11 @@ class WorldState:
             return cls(physics, msgspec.convert(values, StateDetails, dec_hook=lambda _, a: np.array(a)))
         except (ValueError, TypeError) as error:  # of JSON, of msgspec and of arrays
             raise StateError(f"the state's details do not fit this version's worlds: {error}") from error
+
+
+def checkpoint_hash(physics: NDArray[np.float64], details: str) -> int:
+    """Hash of a state of `physics`, shape (n,), and `WorldState.details_json`."""
+    return hash64(physics.tobytes() + details.encode())
 
 
 class StateHash:
