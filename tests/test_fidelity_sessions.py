@@ -83,6 +83,14 @@ def test_rollouts_are_what_stepping_gives(house, fidelity, assistance, user):
     assert singles < (0.6 if searches else 0.2) * steps
 
 
+def test_waiting_in_full_physics_is_what_stepping_gives(house):
+    config = TrialConfig(objects=2, assistance="optimal", seed=1)
+    rolled_out, singles, steps = played(house, config, rollouts=True)
+    stepped, *_ = played(house, config, rollouts=False)
+    assert {name for name in stepped if stepped[name] != rolled_out[name]} == set()
+    assert singles < 0.8 * steps
+
+
 @pytest.mark.parametrize("start", [0.0, 15.0])
 def test_a_run_without_physics_replays_from_anywhere(event_run, house, start):
     report = replay(event_run, start=start, house=house)
