@@ -142,6 +142,20 @@ class PersonParameters:
         """Every value by name, JSON-ready; those of the hands under `motion`."""
         return {**{name: getattr(self, name) for name in RANGES}, "motion": self.motion._asdict()}
 
+    def unusual(self) -> str:
+        """The values that are not the usual person's, in words; empty if all are."""
+        usual = PersonParameters()
+        others = [
+            (name, unit)
+            for name, (_, _, unit) in RANGES.items()
+            if getattr(self, name) != getattr(usual, name)
+        ]
+        words = [f"{name.replace('_', ' ')} {getattr(self, name):.4g} {unit}" for name, unit in others]
+        hands = self.motion._asdict().items() - usual.motion._asdict().items()
+        return ", ".join(
+            [*words, *(f"{name.replace('_', ' ')} {value:.4g}" for name, value in sorted(hands))]
+        )
+
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "PersonParameters":
         """The person whose `as_dict` this is.

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments import records
+from experiments.cli import main
 from experiments.design import read_design
 from experiments.errors import ConfigError, ReplayError
 from experiments.house import House
@@ -103,6 +105,16 @@ def test_a_description_comes_back_from_what_is_logged() -> None:
     assert PersonDistribution.of(json.loads(json.dumps(people.as_dict()))) == people
 
 
+def test_the_page_about_people_says_what_holds() -> None:
+    """Its table lists every value, and its example can be read."""
+    page = (Path(__file__).parents[1] / "docs" / "people.md").read_text(encoding="utf-8")
+    for name, (low, high, unit) in RANGES.items():
+        usual = getattr(PersonParameters(), name)
+        assert f"| `{name}` | {usual:.4g} | {low:.4g} to {high:.4g} | {unit} |" in page
+    example = page.split("```toml\n")[1].split("```")[0]
+    assert len(PersonDistribution.of(tomllib.loads(example)).parameters) == 5
+
+
 def test_a_design_says_who_takes_part(tmp_path: Path) -> None:
     file = tmp_path / "design.toml"
     file.write_text(
@@ -158,8 +170,13 @@ def test_every_value_that_was_drawn_is_logged_and_measured(run: Path) -> None:
     }
 
 
-def test_a_replay_is_of_the_person_that_was_logged(run: Path, house: House) -> None:
-    assert replay(run, house=house).ended == "all delivered"
+def test_a_replay_is_of_the_person_that_was_logged(
+    run: Path, house: House, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert replay(run, house=house).person == load_run(run).person
+    assert main(["replay", str(run)]) == 0
+    shown = capsys.readouterr().out
+    assert "field of view 1.2 rad" in shown and "eye height" not in shown
 
 
 def test_a_replay_of_somebody_else_is_refused(run: Path, house: House, tmp_path: Path) -> None:

@@ -130,6 +130,8 @@ def _summary(report: ReplayReport) -> str:
     text += f"; the run ended with {report.ended!r}"
     if report.failure:
         text += f", and so does the replay: {report.failure}"
+    if unusual := report.person.unusual():
+        text += f"\nthe participant: {unusual}"
     for difference in report.differences:
         text += f"\nwithout effect: {difference}"
     return text

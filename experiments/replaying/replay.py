@@ -17,6 +17,7 @@ from experiments.replaying.verdicts import Verdict, all_mismatches, verdicts
 from experiments.session import Viewer
 from experiments.video import VideoWriter
 from mjsim.files import replacing
+from mjsim.person_parameters import PersonParameters
 
 Point = tuple[float, float, float]
 
@@ -58,6 +59,7 @@ class ReplayReport:
         steps: Number of verified control steps.
         ended: Why the run ended.
         failure: Error of the physics that ended run and replay, or None.
+        person: Who took part.
         differences: Versions and models that differ from those of the recording, without effect.
         verdicts: What was checked of each file.
         frames_sha256: Hash of the filmed frames, or None.
@@ -68,6 +70,7 @@ class ReplayReport:
     steps: int
     ended: str
     failure: str | None
+    person: PersonParameters
     differences: tuple[str, ...]
     verdicts: tuple[Verdict, ...]
     frames_sha256: str | None
@@ -119,6 +122,7 @@ def replay(
         steps=record.steps - replayer.first,
         ended=record.reason or "",
         failure=replayer.failure,
+        person=record.person,
         differences=replayer.differences,
         verdicts=found,
         frames_sha256=frames,
