@@ -13,7 +13,7 @@ from hud.state import HudState, Marker, Rgba, Vec3
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.person_parameters import PersonParameters
-from mjsim.render import CameraPose, Renderer
+from mjsim.render import CameraPose, LayeredRenderer
 from mjsim.render.rasteriser import TOP_DOWN_GROUPS
 from mjsim.world import World
 
@@ -83,7 +83,7 @@ class ExternalViewer:
     """
 
     def __init__(self, scene: Scene, film: FilmConfig, camera: CameraPath, video: VideoWriter) -> None:
-        self._renderer = Renderer(
+        self._renderer = LayeredRenderer(
             scene.model, width=film.width, height=film.height, profile=film.profile, groups=TOP_DOWN_GROUPS
         )
         self._camera, self._person = camera, scene.person

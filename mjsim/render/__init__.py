@@ -4,6 +4,7 @@ from mjsim.render.cameras import CameraPose
 from mjsim.render.context import GlInfo, gl_info
 from mjsim.render.floorplan import FloorPlan, render_floorplan, render_house_map
 from mjsim.render.labels import Labels
+from mjsim.render.layered import LayeredRenderer
 from mjsim.render.markers import MarkerLike
 from mjsim.render.pictures import render_picture, render_pictures
 from mjsim.render.profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
@@ -19,6 +20,7 @@ __all__ = [
     "Frame",
     "GlInfo",
     "Labels",
+    "LayeredRenderer",
     "MarkerLike",
     "RenderProfile",
     "Renderer",

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import cv2
 import mujoco
@@ -40,6 +40,18 @@ class DirectionalLight:
     direction: tuple[float, float, float]
     diffuse: float
     ambient: float = 0.0
+
+
+class Layer(NamedTuple):
+    """Part of a scene as it was drawn, rows from the bottom, before it is reduced to the size of a frame.
+
+    Attributes:
+        colour: uint8, shape (h, w, 3).
+        depth: Reversed depth, 1 at the near plane, 0 where nothing was drawn, shape (h, w).
+    """
+
+    colour: NDArray[np.uint8]
+    depth: NDArray[np.float32]
 
 
 class Rasteriser:
@@ -176,6 +188,42 @@ class Rasteriser:
         packed = cv2.flip(self._ids, 0).astype(np.int32)
         ids = table[packed[..., 0] | packed[..., 1] << 8 | packed[..., 2] << 16]
         return ids, np.asarray(cv2.flip(self._depth, 0), dtype=np.float32)
+
+    def layer(
+        self,
+        view: View,
+        markers: Sequence[MarkerLike] = (),
+        *,
+        hidden: NDArray[np.bool_],
+        lowest: bool = False,
+    ) -> Layer:
+        """The scene as last updated without some of its geoms.
+
+        Args:
+            view: Where it is seen from.
+            markers: World-locked objects to draw.
+            hidden: Geoms that are left out, shape (ngeom,).
+            lowest: Whether this is the lowest layer, which has the sky and the dark spots under objects.
+        """
+        scene, model_geoms = self._scene, self._scene.ngeom
+        _set_flags(scene, self._profile)
+        scene.flags[_Flag.mjRND_SKYBOX] &= lowest
+        view.aim(scene)
+        layer = Layer(np.empty_like(self._colour), np.empty(self._colour.shape[:2], np.float32))
+        try:
+            if lowest and self._shadows is not None:
+                far = np.where(hidden[:, None], np.inf, self._positions)
+                self._shadows.add(scene, view, self._aspect, far, self._rotations)
+            add_markers(scene, in_view(view, self._aspect, markers))
+            with without(scene, hidden | self._unseen(view, self._profile)):
+                self._draw(scene, self._drawn, layer.colour, layer.depth)
+        finally:
+            scene.ngeom = model_geoms
+        return layer
+
+    def reduced(self, drawn: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """A drawing (h, w, 3) with rows from the bottom as a frame (height, width, 3) with rows from the top."""
+        return reduced(drawn, self._size)
 
     @property
     def _aspect(self) -> float:

@@ -1,0 +1,124 @@
+"""Films from outside: while the camera stands still, what stands still is drawn once."""
+
+from collections.abc import Collection, Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.render import context
+from mjsim.render.cameras import CameraPose, View
+from mjsim.render.markers import MarkerLike, blend_hidden
+from mjsim.render.profiles import RenderProfile, resolve_profile
+from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Layer, Rasteriser
+
+REST = 25  # frames without movement after which something counts as standing still again
+
+
+class LayeredRenderer:
+    """Draws a model off screen, several times as fast as a `Renderer` while the camera stands still.
+
+    What moves, and the markers, are drawn over a picture of the rest by their depth; what comes to rest joins the rest.
+    Profiles with shadow maps, mirrors or multisampling are drawn in full, as everything changes everything there; so
+    is whatever one can see through, as it has no depth. Moving parts behind something are shown faintly, as those
+    of x-ray markers are. Use as a context manager.
+
+    Args:
+        model: Compiled model.
+        width: Of the frames, pixels.
+        height: Of the frames, pixels.
+        profile: `draft`, `fast`, `quality` or a profile of your own.
+        groups: Geom groups that are shown (docs/models.md).
+
+    Raises:
+        RenderError: No OpenGL context can be made, or the size or profile is unusable.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        *,
+        width: int = 640,
+        height: int = 480,
+        profile: str | RenderProfile = "fast",
+        groups: Collection[int] = FIRST_PERSON_GROUPS,
+    ) -> None:
+        settings = resolve_profile(profile)
+        self._layered = not (settings.shadow_size or settings.reflections or settings.samples)
+        self._rasteriser = Rasteriser(model, width, height, settings, groups)
+        self._camera: CameraPose | None = None
+        self._translucent = _translucent(model)
+        self._still = np.full(model.ngeom, REST)  # frames since each geom moved
+        self._poses = np.full((model.ngeom, 12), np.nan)
+        self._moving: NDArray[np.bool_] | None = None
+        self._rest: Layer | None = None
+
+    def rgb(self, data: Any, camera: CameraPose, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
+        """Colour image (height, width, 3), rows from the top.
+
+        Args:
+            data: State of the model.
+            camera: Where it is seen from; the camera stands still as long as this is the same object.
+            markers: World-locked objects to draw.
+
+        Raises:
+            RenderError: Unusable marker, foreign data, or the renderer is closed.
+        """
+        with context.current_context():
+            self._rasteriser.update(data)
+            view, still = View.of(camera), camera is self._camera
+            self._camera = camera
+            clear = any(marker.rgba[3] < 1.0 for marker in markers)
+            if (
+                not (self._layered and still)
+                or clear
+                or np.any(self._note_movement(data) & self._translucent)
+            ):
+                self._rest = None
+                return self._rasteriser.colour(view, markers)
+            rest = self._background(view)
+            front = self._rasteriser.layer(view, markers, hidden=~self._moves)
+            frame = rest.colour.copy()
+            nearer = front.depth > rest.depth
+            frame[nearer] = front.colour[nearer]
+            blend_hidden(frame, front.colour, rest.depth, front.depth)
+            return self._rasteriser.reduced(frame)
+
+    @property
+    def _moves(self) -> NDArray[np.bool_]:
+        return self._still < REST
+
+    def _note_movement(self, data: Any) -> NDArray[np.bool_]:
+        """Which geoms move, or moved a moment ago, shape (ngeom,)."""
+        poses = np.hstack([data.geom_xpos, data.geom_xmat])
+        moved = np.any(poses != self._poses, axis=1) & ~np.isnan(self._poses[:, 0])
+        self._still = np.where(moved, 0, np.minimum(self._still + 1, REST))
+        self._poses = poses
+        return self._moves
+
+    def _background(self, view: View) -> Layer:
+        """All that stands still; drawn anew when something begins or ceases to."""
+        moving = self._moves
+        if self._rest is None or self._moving is None or np.any(moving != self._moving):
+            self._moving = moving
+            self._rest = self._rasteriser.layer(view, hidden=moving, lowest=True)
+        return self._rest
+
+    def close(self) -> None:
+        """Free the GL resources; again does nothing."""
+        self._rasteriser.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _translucent(model: Any) -> NDArray[np.bool_]:
+    """Which geoms one can see through, shape (ngeom,); they leave no depth."""
+    material = model.geom_matid
+    opacity = (
+        np.where(material >= 0, model.mat_rgba[material, 3], 1.0) if model.nmat else np.ones(model.ngeom)
+    )
+    return np.asarray((model.geom_rgba[:, 3] < 1.0) | (opacity < 1.0))

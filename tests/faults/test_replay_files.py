@@ -1,0 +1,237 @@
+"""Damaged, forged, swapped and truncated run directories: a replay notices every one, in one line."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from experiments import records
+from experiments.checksums import CHECKSUMS, write_checksums
+from experiments.errors import ExperimentError
+from experiments.files import read_arrays, read_json, save_arrays, write_json
+from experiments.house import House
+from experiments.replaying.derived_files import CIRCUMSTANCES, checksum_mismatches, derived_mismatches
+from experiments.replaying.replay import replay
+from experiments.replaying.run_record import load_run
+from experiments.trial import TrialConfig, run_trial
+
+FLIPS_PER_FILE = 24
+FILES = (
+    records.EPISODE,
+    records.EVENTS,
+    records.TRAJECTORY,
+    records.RECORDING,
+    records.METRICS,
+    records.PLAN,
+    records.TOPDOWN,
+    records.VIDEO,
+    CHECKSUMS,
+)
+# Checked without simulating the run again.
+UNSIMULATED = (records.METRICS, records.PLAN, records.TOPDOWN, records.VIDEO, CHECKSUMS)
+
+
+@pytest.fixture(scope="session")
+def house():
+    return House.load()
+
+
+def make_run(out, house, seed, seconds):
+    config = TrialConfig(objects=6, assistance="optimal", seed=seed, time_limit=seconds, fidelity="event")
+    run_trial(config, out, topdown=False, house=house)
+    # Pictures as a replay sees them: files whose checksum was written with the run. Nothing has to be drawn for that.
+    for name in (records.TOPDOWN, records.VIDEO):
+        (out / name).write_bytes(np.random.default_rng(seed).bytes(2000))
+    write_checksums(out, records.FILES)
+    return out
+
+
+@pytest.fixture(scope="session")
+def run(house, tmp_path_factory):
+    """12 s with a pick: a record of every kind."""
+    return make_run(tmp_path_factory.mktemp("faults") / "run", house, 3, 12.0)
+
+
+@pytest.fixture(scope="session")
+def other(house, tmp_path_factory):
+    return make_run(tmp_path_factory.mktemp("faults") / "other", house, 4, 12.0)
+
+
+@pytest.fixture
+def copy(run, tmp_path):
+    return shutil.copytree(run, tmp_path / "copy")
+
+
+def fault_of(folder, house):
+    """The one line that refuses a run; fails if it is accepted, or if anything but a typed error comes."""
+    with pytest.raises(ExperimentError) as caught:
+        replay(folder, house=house)
+    line = str(caught.value)
+    assert len(line.splitlines()) == 1 and len(line) > 20
+    return caught.value
+
+
+def test_the_run_itself_is_verified(run, other, house):
+    for folder in (run, other):
+        report = replay(folder, house=house)
+        assert {verdict.file for verdict in report.verdicts} == set(records.FILES)
+        assert all(verdict.verified for verdict in report.verdicts)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_flipped_bit_is_noticed(copy, house, name):
+    path = copy / name
+    content = path.read_bytes()
+    rng = np.random.default_rng(sum(map(ord, name)))
+    for place, bit in zip(
+        rng.integers(0, len(content), FLIPS_PER_FILE), rng.integers(0, 8, FLIPS_PER_FILE), strict=True
+    ):
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << bit
+        path.write_bytes(damaged)
+        assert derived_faults(copy) if name in UNSIMULATED else fault_of(copy, house)
+    fault_of(copy, house)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_cut_is_noticed(copy, house, name):
+    path = copy / name
+    content = path.read_bytes()
+    for length in {0, 1, len(content) // 3, len(content) - 1}:
+        path.write_bytes(content[:length])
+        fault_of(copy, house)
+    path.unlink()
+    fault_of(copy, house)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_of_another_run_is_noticed(copy, other, house, name):
+    shutil.copy(other / name, copy / name)
+    fault_of(copy, house)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x00" * 400, b"\xff\xfe", b"[" * 100_000, b"NaN", b"{}", b"[1]", b'"x"', b"null", b"{"]
+)
+@pytest.mark.parametrize("name", FILES)
+def test_other_content_is_noticed_although_its_checksum_is_right(copy, house, name, content):
+    (copy / name).write_bytes(content)
+    if name != CHECKSUMS:
+        write_checksums(copy, records.FILES)
+    if name in (records.TOPDOWN, records.VIDEO):
+        return  # only their checksums are claimed
+    fault_of(copy, house)
+
+
+# Forged by somebody who writes the checksums anew.
+
+
+def forged_values(value):
+    """Other values for a field: another one of its kind, of other kinds, not finite."""
+    if isinstance(value, bool):
+        others = [not value]
+    elif isinstance(value, int | float):
+        others = [value + 1, -value - 1, str(value), float("nan"), float("inf")]
+    else:
+        others = [1, "forged", []]
+    return [other for other in [*others, None, {}] if other != value]
+
+
+def derived_faults(folder):
+    """What is wrong with files that follow from log and trajectory; needs no simulation."""
+    record = load_run(folder)
+    found = [*derived_mismatches(record), *checksum_mismatches(record)]
+    return "; ".join(mismatch.message for mismatch in found)
+
+
+def test_every_field_of_the_metrics_is_checked(copy, house):
+    path = copy / records.METRICS
+    metrics = read_json(path)
+    names = [name for name in metrics if name not in CIRCUMSTANCES]
+    assert len(names) > 50
+    for number, name in enumerate(names):
+        values = forged_values(metrics[name])
+        write_json(path, {**metrics, name: values[number % len(values)]})
+        assert derived_faults(copy).startswith(f"metrics.json has {name} = ")
+    write_checksums(copy, records.FILES)
+    assert f"metrics.json has {names[-1]} = " in str(fault_of(copy, house))
+
+
+@pytest.mark.parametrize("name", CIRCUMSTANCES)
+def test_what_cannot_be_computed_anew_is_protected_by_the_checksum(copy, house, name):
+    path = copy / records.METRICS
+    metrics = read_json(path)
+    for value in (1, "forged"):
+        write_json(path, {**metrics, name: value})
+        assert "metrics.json is not the file that was written" in str(fault_of(copy, house))
+
+
+@pytest.mark.parametrize("edit", ["drop", "add", "empty", "list"])
+def test_metrics_have_all_fields_and_no_others(copy, house, edit):
+    path = copy / records.METRICS
+    metrics = read_json(path)
+    last = next(iter(metrics))
+    forged = {
+        "drop": {k: v for k, v in metrics.items() if k != last},
+        "add": {**metrics, "score": 9},
+        "empty": {},
+        "list": [metrics],
+    }[edit]
+    write_json(path, forged)
+    write_checksums(copy, records.FILES)
+    assert "metrics.json" in str(fault_of(copy, house))
+
+
+def test_every_field_of_the_plans_is_checked(copy, house):
+    path = copy / records.PLAN
+    plans = read_json(path)
+    for name in plans[0]:
+        for value in forged_values(plans[0][name]):
+            path.write_text(json.dumps([{**plans[0], name: value}, *plans[1:]]))
+            assert derived_faults(copy).startswith("plan.json does not hold the plans of the log")
+    write_checksums(copy, records.FILES)
+    assert "plan.json does not hold the plans of the log" in str(fault_of(copy, house))
+
+
+@pytest.mark.parametrize("name", [records.TRAJECTORY, records.RECORDING])
+def test_arrays_of_other_types_and_shapes_are_refused(copy, house, name):
+    path = copy / name
+    arrays = read_arrays(path)
+    for array in arrays:
+        for forged in (
+            np.array(["x"] * len(arrays[array])),
+            arrays[array][..., None],
+            np.zeros(()),
+            arrays[array].astype("c16") if arrays[array].dtype.kind != "U" else np.zeros(3),
+        ):
+            if forged.dtype.kind == "U" and arrays[array].dtype.kind == "U":
+                continue
+            save_arrays(path, {**arrays, array: forged})
+            write_checksums(copy, records.FILES)
+            assert array in str(fault_of(copy, house))
+
+
+@pytest.mark.parametrize("value", [np.nan, -np.inf, 1e308])
+def test_numbers_that_are_not_finite_or_huge_are_noticed(copy, house, value):
+    path = copy / records.TRAJECTORY
+    arrays = read_arrays(path)
+    for array, found in arrays.items():
+        if found.dtype.kind != "f":
+            continue
+        forged = found.copy()
+        forged.flat[len(forged.flat) // 2] = value
+        if forged.tobytes() == found.tobytes():
+            continue
+        save_arrays(path, {**arrays, array: forged})
+        write_checksums(copy, records.FILES)
+        assert "trajectory.npz" in str(fault_of(copy, house))
+
+
+def test_a_file_that_was_not_written_with_the_run_is_not_vouched_for(copy, house):
+    sums = (copy / CHECKSUMS).read_text().splitlines(keepends=True)
+    (copy / CHECKSUMS).write_text("".join(line for line in sums if records.TOPDOWN not in line))
+    error = fault_of(copy, house)
+    assert "topdown.png was not written with the run" in str(error)
+    assert any("topdown.png" in line and "NOT VERIFIED" in line for line in error.verdicts)
+    assert any("metrics.json" in line and " verified" in line for line in error.verdicts)
