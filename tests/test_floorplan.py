@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mjsim.errors import RenderError
-from mjsim.render import render_floorplan
+from mjsim.render import largest_scale, render_floorplan
 
 # A red tile with its corners at whole centimetres, under a green ceiling; a tall blue post away from the centre.
 HOUSE = """<mujoco><worldbody>
@@ -75,6 +75,26 @@ def test_the_ceiling_is_hidden_and_outside_is_paper(house):
 def test_unusable_bounds_and_scales_are_refused(house, bounds, scale):
     with pytest.raises(RenderError):
         render_floorplan(*house, bounds, scale)
+
+
+def test_the_person_is_not_drawn(scene):
+    """Who starts out is no part of the house; a walk is drawn as a line."""
+    data = mujoco.MjData(scene.model)
+    bounds = (0.0, 0.0, 12.8, 10.4)
+    plans = []
+    for place in ((2.0, 2.0), (8.0, 8.0)):
+        data.joint("avatar/x").qpos[0], data.joint("avatar/y").qpos[0] = place
+        mujoco.mj_forward(scene.model, data)
+        plans.append(render_floorplan(scene.model, data, bounds, 40).rgb)
+    assert np.array_equal(*plans)
+
+
+@pytest.mark.parametrize("size", [(12_000.0, 9_000.0), (12_000.0, 5.0), (0.1, 0.2)])
+def test_a_house_of_any_size_can_be_drawn_at_some_scale(house, size):
+    bounds = (-1.0, -2.0, size[0] - 1.0, size[1] - 2.0)
+    assert largest_scale(bounds) == pytest.approx(4095 / max(size))
+    plan = render_floorplan(*house, bounds, min(60.0, 300 / max(size)))
+    assert 12 <= max(plan.rgb.shape) <= 301
 
 
 def test_objects_of_the_apartment_lie_where_the_plan_says(scene):

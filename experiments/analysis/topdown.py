@@ -15,13 +15,15 @@ from experiments.house import House
 from experiments.records import Event
 from mjsim.files import replacing
 from mjsim.model.scene import Scene
-from mjsim.render import render_floorplan
+from mjsim.render import largest_scale, render_floorplan
 from mjsim.world import World
 
 # Okabe-Ito colours, distinct for all common kinds of colour vision.
 CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
 PLANNED, WALKED = "#D55E00", "#1B1B1B"
-PIXELS_PER_METRE = 80
+PIXELS_PER_METRE = 80  # of a house of usual size
+LARGEST_SIDE = 1920  # of the picture of the house, px; larger houses are drawn at a smaller scale
+LEGEND = 7.0  # inches that the legend needs
 
 
 def draw_topdown(
@@ -36,14 +38,14 @@ def draw_topdown(
         plan: The first `plan` event of the log.
         arrays: The trajectory, as `Trajectory.arrays` gives it; only `position` is drawn, m, shape (T, 2).
     """
-    x_min, y_min, x_max, y_max = house.bounds
-    figure = Figure(
-        figsize=((x_max - x_min) * 0.95, (y_max - y_min) * 0.95 + 0.9), dpi=100, layout="constrained"
-    )
+    scale = _scale(house.bounds)
+    floor = render_floorplan(scene.model, World(scene).data, house.bounds, pixels_per_metre=scale)
+    x_min, y_min, x_max, y_max = floor.bounds
+    inches = 0.95 * scale / PIXELS_PER_METRE  # per metre
+    size = max((x_max - x_min) * inches, LEGEND), (y_max - y_min) * inches + 0.9
+    figure = Figure(figsize=size, dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    floor = render_floorplan(scene.model, World(scene).data, house.bounds, pixels_per_metre=PIXELS_PER_METRE)
-    x_min, y_min, x_max, y_max = floor.bounds
     axes.imshow(floor.rgb, extent=(x_min, x_max, y_min, y_max), interpolation="bilinear")
     _draw_rooms(axes, house)
     planned = planned_path(house, scene, plan)
@@ -59,6 +61,12 @@ def draw_topdown(
     with replacing(path) as temporary:
         # Fixed metadata, so that equal trials give equal bytes.
         figure.savefig(temporary, metadata={"Software": "mjsim"})
+
+
+def _scale(bounds: tuple[float, float, float, float]) -> float:
+    """Pixels per metre."""
+    x_min, y_min, x_max, y_max = bounds
+    return min(PIXELS_PER_METRE, LARGEST_SIDE / max(x_max - x_min, y_max - y_min), largest_scale(bounds))
 
 
 def planned_path(house: House, scene: Scene, plan: Event) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from mjsim.render.cameras import CameraPose
 from mjsim.render.context import GlInfo, gl_info
-from mjsim.render.floorplan import FloorPlan, render_floorplan, render_house_map
+from mjsim.render.floorplan import FloorPlan, largest_scale, render_floorplan, render_house_map
 from mjsim.render.labels import Labels
 from mjsim.render.layered import LayeredRenderer
 from mjsim.render.markers import MarkerLike
@@ -25,6 +25,7 @@ __all__ = [
     "RenderProfile",
     "Renderer",
     "gl_info",
+    "largest_scale",
     "render_floorplan",
     "render_house_map",
     "render_picture",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.errors import RenderError
+from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.render.cameras import View, look_rotation
@@ -52,7 +53,7 @@ def render_floorplan(
     bounds: tuple[float, float, float, float],
     pixels_per_metre: float = 60.0,
 ) -> FloorPlan:
-    """Draw the house from above without its ceilings (geom group 1).
+    """Draw the house from above without its ceilings (geom group 1), and without the person.
 
     Args:
         model: Compiled model.
@@ -86,9 +87,22 @@ def render_floorplan(
     rasteriser = Rasteriser(model, width, height, _PROFILE, TOP_DOWN_GROUPS, _LIGHTS)
     with rasteriser, current_context():
         rasteriser.update(data)
-        rgb = rasteriser.colour(view)
+        drawn = rasteriser.layer(view, hidden=_of_person(model), lowest=True)
+        rgb = rasteriser.reduced(drawn.colour)
         rgb[rasteriser.geometry(view)[0] < 0] = _PAPER
     return FloorPlan(rgb, (xmin, ymin, xmax, ymax), pixels_per_metre)
+
+
+def _of_person(model: Any) -> NDArray[np.bool_]:
+    """Geoms of the person, shape (ngeom,); a model without a person has none."""
+    base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BASE)
+    return np.asarray((model.body_rootid[model.geom_bodyid] == base) & (base >= 0))
+
+
+def largest_scale(bounds: tuple[float, float, float, float]) -> float:
+    """The largest scale at which bounds (xmin, ymin, xmax, ymax, m) can be drawn, pixels per metre."""
+    xmin, ymin, xmax, ymax = bounds
+    return (MAX_SIDE / _PROFILE.supersampling - 1) / max(xmax - xmin, ymax - ymin)
 
 
 def render_house_map(
@@ -99,7 +113,7 @@ def render_house_map(
     Args:
         catalogue: Of the house.
         bounds: What it shows: xmin, ymin, xmax, ymax, m.
-        pixels_per_metre: Scale.
+        pixels_per_metre: Scale; a smaller one where the house is too large for it.
 
     Returns:
         RGBA, uint8, shape (height, width, 4), opaque.
@@ -111,5 +125,5 @@ def render_house_map(
     model = compiled_house(catalogue).model
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    rgb = render_floorplan(model, data, bounds, pixels_per_metre).rgb
+    rgb = render_floorplan(model, data, bounds, min(pixels_per_metre, largest_scale(bounds))).rgb
     return np.concatenate([rgb, np.full((*rgb.shape[:2], 1), 255, dtype=np.uint8)], axis=2)

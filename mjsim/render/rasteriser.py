@@ -25,6 +25,7 @@ MAX_SIDE = 8192
 
 _Flag = mujoco.mjtRndFlag
 _BACKGROUND = -1
+_FAR_UP = 1e4  # m; nothing up there throws a spot on the floor
 
 
 @dataclass(frozen=True)
@@ -212,8 +213,8 @@ class Rasteriser:
         layer = Layer(np.empty_like(self._colour), np.empty(self._colour.shape[:2], np.float32))
         try:
             if lowest and self._shadows is not None:
-                far = np.where(hidden[:, None], np.inf, self._positions)
-                self._shadows.add(scene, view, self._aspect, far, self._rotations)
+                away = np.where(hidden[:, None], _FAR_UP, self._positions)
+                self._shadows.add(scene, view, self._aspect, away, self._rotations)
             add_markers(scene, in_view(view, self._aspect, markers))
             with without(scene, hidden | self._unseen(view, self._profile)):
                 self._draw(scene, self._drawn, layer.colour, layer.depth)
