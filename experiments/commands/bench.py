@@ -18,8 +18,8 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 DESCRIPTION = """\
 Run a benchmark of the source checkout and print what it measured, as ratios where possible, so that the figures hold on
 other machines as well. A benchmark is a module in benchmarks/ that defines measure() -> dict of JSON values, and
-lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, hours, workers, only, seeds
-and objects; the options of the same name set them. picture(result, path) may draw the result."""
+lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, kills, hours, workers, only,
+seeds and objects; the options of the same name set them. picture(result, path) may draw the result."""
 
 
 def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
@@ -117,6 +117,7 @@ def positive_number(text: str) -> float:
 OPTIONS = (
     ("houses", positive, "N", "number of houses"),
     ("count", positive, "N", "number of cases"),
+    ("kills", positive, "N", "number of processes to kill"),
     ("hours", positive_number, "H", "simulated hours"),
     ("workers", positive, "N", "processes"),
     ("only", natural, "N", "run only the session with this number"),

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.commands.options import add_command, add_force, add_house, add_points
+from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.run_directory import check_file
 from mjsim.model.export import export_house
@@ -33,6 +34,10 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Sample, compose, export."""
+    if arguments.out.suffix != ".xml":
+        raise ConfigError(
+            f"cannot export to {arguments.out}: MuJoCo reads models from files that end in .xml"
+        )
     episode_file = arguments.out.with_suffix(".episode.json")
     for path in (arguments.out, episode_file):
         check_file(path, replace=arguments.force)

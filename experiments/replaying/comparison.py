@@ -5,6 +5,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from experiments.endings import BROKEN_OFF
 from experiments.records import EVENTS, RECORDING, TRAJECTORY, Event
 from experiments.replaying.replayer import Replayer
 from experiments.replaying.run_record import PER_STEP, WORLD_EVENTS, Mismatch
@@ -64,7 +65,9 @@ def _compare_events(replayer: Replayer) -> Iterator[Mismatch]:
     logged = [
         (step, _comparable(event))
         for step, event in record.events
-        if replayer.first <= step < end and event["event"] in COMPARED_EVENTS
+        if replayer.first <= step < max(end, 1)
+        and event["event"] in COMPARED_EVENTS
+        and not _is_broken_end(event)
     ]
     replayed = [_comparable(event) for event in replayer.events if event["event"] in COMPARED_EVENTS]
     for (step, then), now in zip(logged, replayed, strict=False):
@@ -75,6 +78,11 @@ def _compare_events(replayer: Replayer) -> Iterator[Mismatch]:
         both = min(len(logged), len(replayed))
         step, extra = [*logged[both:], *((record.steps - 1, event) for event in replayed[both:])][0]
         yield Mismatch(step, f"{EVENTS}: only one of log and replay has {_describe(extra)}", EVENTS)
+
+
+def _is_broken_end(event: Event) -> bool:
+    """Whether this is the end of a run that broke off, to which a replay does not get."""
+    return event["event"] == "end" and event["reason"] in BROKEN_OFF
 
 
 def _comparable(event: Event) -> Event:

@@ -1,0 +1,115 @@
+"""Signals in the middle of a run and of a batch: the record is kept, says how it ended, and replays."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from experiments import records
+from experiments.files import read_json
+from experiments.records import read_events
+from experiments.replaying.replay import replay
+from experiments.signals import PATIENCE, Stopped, signals_postponed, signals_raised
+from faults.conftest import FAST, ROOT, one_line
+
+PARTICIPANT = """
+import os, signal, time
+from mjsim.actions import Move
+class Own:
+    needs = frozenset()
+    count = 0
+    def act(self, percept):
+        self.count += 1
+        if self.count == 50:
+            os.kill(os.getpid(), signal.{name})
+            time.sleep({seconds})
+        return Move(forward=0.5, turn=0.3)
+def build(house, rng):
+    return Own()
+"""
+RUN = ("run", *FAST, "--no-video", "--no-floor-plan", "--assistance", "none", "--user", "own_code:build")
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds"), [("SIGINT", 0), ("SIGTERM", 0), ("SIGHUP", 0), ("SIGTERM", 30)], ids=str
+)
+def test_a_run_that_is_stopped_is_kept(name, seconds, house, tmp_path, mjsim, own_module):
+    """Also where the participant hangs, and so never comes to an end by itself."""
+    own_module(PARTICIPANT.format(name=name, seconds=seconds))
+    done = mjsim(*RUN, "--out", "out")
+    assert done.returncode == 128 + signal.Signals[name]
+    assert "Traceback" not in done.stderr
+    out = tmp_path / "out"
+    metrics, end = read_json(out / records.METRICS), read_events(out / records.EVENTS)[-1]
+    assert (metrics["ended"], metrics["signal"]) == (end["reason"], end["signal"]) == ("interrupted", name)
+    assert metrics["simulated_s"] == pytest.approx(49 * 0.04, abs=0.05)
+    assert replay(out, house=house).ended == "interrupted"
+    assert sorted(path.name for path in tmp_path.iterdir() if path.name != "__pycache__") == [
+        "out",
+        "own_code.py",
+    ]
+
+
+def test_signals_are_no_exceptions_while_a_record_is_saved():
+    with signals_postponed() as signals:
+        signals.save()
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.01)
+        assert signals.number == signal.SIGTERM
+    with pytest.raises(Stopped), signals_raised():
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(1)
+
+
+def test_who_does_not_look_is_interrupted_after_a_while():
+    with pytest.raises(Stopped), signals_postponed():
+        os.kill(os.getpid(), signal.SIGHUP)
+        time.sleep(PATIENCE + 5)
+
+
+def test_an_ignored_signal_stays_ignored():
+    """As SIGHUP is after `nohup`."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with signals_raised(), signals_postponed() as signals:
+            os.kill(os.getpid(), signal.SIGHUP)
+            time.sleep(0.01)
+        assert signals.number is None
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_batch_that_is_stopped_writes_its_tables(number, tmp_path):
+    words = ["batch", *FAST, "--assistance", "optimal", "--seeds", "0:200", "--workers", "1", "--out", "out"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "mjsim", *words],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    trials = tmp_path / "out" / "trials"
+    deadline = time.monotonic() + 200
+    while len(list(trials.glob(f"[!.]*/{records.METRICS}"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.killpg(process.pid, number)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert number.name in one_line(said)
+    done = [path.name for path in trials.iterdir()]
+    assert not [name for name in done if name.startswith(".")]
+    assert len((tmp_path / "out" / "trials.csv").read_text().splitlines()) == len(done) + 1 < 200
+
+
+def test_a_worker_that_is_killed_is_one_line(tmp_path, mjsim, own_module):
+    own_module("import os, signal\ndef build(house, rng):\n    os.kill(os.getpid(), signal.SIGKILL)\n")
+    words = ("--assistance", "none", "--user", "own_code:build", "--workers", "1", "--seeds", "0:4")
+    done = mjsim("batch", *FAST, *words, "--out", "out")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr and "worker" in done.stderr
+    assert not list((tmp_path / "out" / "trials").iterdir())
