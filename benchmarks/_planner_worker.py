@@ -18,7 +18,6 @@ import numpy as np
 
 from planner.problem import RoutingProblem
 from planner.solver import PATIENT_WORK, SolveLimit, solver
-from planner.tour import UNIT, integer_metric
 
 # What a planner makes of a problem: length of its tour in m (None: found none), its lower bound in m if it gives one,
 # whether it is proven.
@@ -77,7 +76,7 @@ def by_pyvrp(problem: RoutingProblem, seconds: float) -> Answer:
     import pyvrp
     from pyvrp.stop import MaxRuntime
 
-    metric = integer_metric(problem.distances)
+    metric = problem.integers.metric
     model = pyvrp.Model()
     places = [model.add_location(float(k), 0.0) for k in range(len(metric))]
     nowhere = model.add_location(-1.0, 0.0)
@@ -90,7 +89,7 @@ def by_pyvrp(problem: RoutingProblem, seconds: float) -> Answer:
     for s in problem.shipments:
         model.add_shipment(places[s.pickup], places[s.delivery], amount=1)
     result = model.solve(MaxRuntime(seconds), display=False)
-    return (result.cost() * UNIT if result.is_feasible() else None), None, False
+    return (result.cost() * problem.integers.unit if result.is_feasible() else None), None, False
 
 
 def by_vroom(problem: RoutingProblem) -> Answer:
@@ -98,7 +97,7 @@ def by_vroom(problem: RoutingProblem) -> Answer:
     import vroom
 
     task: Any = vroom.Input()
-    locomotion = integer_metric(problem.distances).astype(np.uint32)
+    locomotion = problem.integers.metric.astype(np.uint32)
     task.set_durations_matrix("car", locomotion)
     task.set_costs_matrix("car", locomotion)
     task.add_vehicle(vroom.Vehicle(1, start=problem.start, capacity=[problem.capacity]))
@@ -109,7 +108,7 @@ def by_vroom(problem: RoutingProblem) -> Answer:
             amount=vroom.Amount([1]),
         )
     found = task.solve(exploration_level=5, nb_threads=1, timeout=timedelta(seconds=60))
-    return (found.summary.cost * UNIT if not found.summary.unassigned else None), None, False
+    return (found.summary.cost * problem.integers.unit if not found.summary.unassigned else None), None, False
 
 
 if __name__ == "__main__":

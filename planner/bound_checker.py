@@ -1,4 +1,4 @@
-"""Lower bounds of tours derived anew from a certificate, in plain numpy and metres, without the solvers' code."""
+"""Lower bounds of tours derived anew from a certificate, in plain numpy and floats, without the solvers' code."""
 
 import functools
 
@@ -9,9 +9,8 @@ from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
 from planner.plan import Plan
 from planner.problem import RoutingProblem
-from planner.relaxation_checker import FINE, closed, relax
+from planner.relaxation_checker import closed, relax
 
-UNIT = 1e-4  # m per unit of a certificate
 FEW = 7  # objects whose tours are all tried
 MAX_ROWS = 1 << 16  # of a table that is computed anew: some 2 s
 
@@ -31,8 +30,7 @@ def proven_bound(problem: RoutingProblem, plan: Plan) -> float:
     Raises:
         ProblemError: The certificate, or the lower bound of the plan, claims more than that proves.
     """
-    visits = 2 * len(problem.shipments) + len(problem.onboard)
-    rounding = 2 * UNIT * (visits + 1)
+    rounding = allowance(problem, plan)
     certificate = plan.certificate
     if len(problem.shipments) + len(problem.onboard) <= FEW:
         optimum = _optimum(problem)
@@ -42,19 +40,23 @@ def proven_bound(problem: RoutingProblem, plan: Plan) -> float:
         return 0.0
     derived = 0.0
     if certificate.proof is Proof.SPANNING_TREE:
-        derived = _spanning_tree(problem, closed(problem.distances))
+        derived = _spanning_tree(problem, closed(problem))
     elif certificate.proof in (Proof.FULL_TABLE, Proof.RELAXATION) and problem.capacity == 2:
         group, prices = claim(problem, certificate)
         if np.prod(np.bincount(group) + 1.0) > MAX_ROWS:
             return 0.0
-        derived = FINE * relax(problem, group, prices).root
+        derived = relax(problem, group, prices).root
     else:
         return 0.0
-    # The claim is about a metric of rounded lengths: a shift of at most half a unit a leg, and closing undoes more.
-    _refuse(certificate.root * UNIT, derived, rounding, "certificate's root")
+    _refuse(certificate.root * certificate.unit, derived, rounding, "certificate's root")
     if certificate.proof is not Proof.RELAXATION:  # the only one with a search behind it
         _refuse(plan.lower_bound, derived, rounding, "lower bound")
     return derived
+
+
+def allowance(problem: RoutingProblem, plan: Plan) -> float:
+    """By how much what a plan claims may exceed the truth, m: rounding to the problem's resolution counts."""
+    return problem.tolerance(plan.cost) + 2 * (problem.resolution or 0.0)
 
 
 def _refuse(claimed: float, derived: float, rounding: float, what: str) -> None:
@@ -62,15 +64,15 @@ def _refuse(claimed: float, derived: float, rounding: float, what: str) -> None:
         raise ProblemError(f"the {what} claims {claimed} m, but its proof yields only {derived} m")
 
 
-def claim(problem: RoutingProblem, certificate: Certificate) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Group of each shipment in a table, (n,), and the price of picking it, (n,), units of 1e-5 m.
+def claim(problem: RoutingProblem, certificate: Certificate) -> tuple[NDArray[np.int64], Matrix]:
+    """Group of each shipment in a table, (n,), and the price of picking it, m, (n,).
 
     Raises:
         ProblemError: The certificate is not about these shipments.
     """
     n = len(problem.shipments)
     if certificate.proof is Proof.FULL_TABLE:
-        return np.arange(n), np.zeros(n, np.int64)
+        return np.arange(n), np.zeros(n)
     groups, prices = certificate.groups, certificate.multipliers
     members = sorted(k for group in groups for k in group)
     if members != list(range(n)) or not all(groups) or len(prices) != n:
@@ -80,7 +82,7 @@ def claim(problem: RoutingProblem, certificate: Certificate) -> tuple[NDArray[np
     group = np.empty(n, np.int64)
     for g, together in enumerate(groups):
         group[list(together)] = g
-    return group, round(UNIT / FINE) * np.array(prices, dtype=np.int64)
+    return group, certificate.unit * np.array(prices, dtype=np.float64)
 
 
 def _optimum(problem: RoutingProblem) -> float:

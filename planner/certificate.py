@@ -22,10 +22,11 @@ class Proof(enum.Enum):
 
 @dataclass(frozen=True)
 class Certificate:
-    """A claim about the shortest tour, in units of 0.1 mm and the metric of whole such units.
+    """A claim about the shortest tour, in whole units of length and the metric of distances rounded to these.
 
     Attributes:
         proof: How the bound was found.
+        unit: m per unit.
         root: What the proof gives without any search, units: the relaxation at the start of the tour, the length of
             the spanning tree, the optimum by the table or by trying all. Up to here it takes no search to check. Where
             a plan's lower bound is higher, it rests on the solver's search being complete.
@@ -34,6 +35,7 @@ class Certificate:
     """
 
     proof: Proof
+    unit: float
     root: int
     groups: tuple[tuple[int, ...], ...] = ()
     multipliers: tuple[int, ...] = ()

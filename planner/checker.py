@@ -2,11 +2,12 @@
 
 from planner.bound_checker import proven_bound
 from planner.errors import ProblemError
+from planner.integer_distances import TOLERANCE
 from planner.plan import Plan, Status, VisitKind
 from planner.problem import RoutingProblem
 
 
-def check(problem: RoutingProblem, plan: Plan, tolerance: float = 1e-6) -> float:
+def check(problem: RoutingProblem, plan: Plan) -> float:
     """Replay a plan against the constraints of equation 1 (PAPER section 2), then follow its proof.
 
     Feasibility and cost are verified for every plan. Of the lower bound, what :func:`proven_bound` can derive anew
@@ -16,7 +17,6 @@ def check(problem: RoutingProblem, plan: Plan, tolerance: float = 1e-6) -> float
     Args:
         problem: What the plan claims to solve.
         plan: The plan.
-        tolerance: Of lengths, m.
 
     Returns:
         A lower bound of all tours that this check has derived by itself, m.
@@ -25,7 +25,7 @@ def check(problem: RoutingProblem, plan: Plan, tolerance: float = 1e-6) -> float
         ProblemError: A visit that is impossible or repeated, an object left over, a wrong cost, a lower bound
             above the cost, OPTIMAL with a gap, or a certificate that claims more than it proves.
     """
-    _check_numbers(plan, _replayed(problem, plan), tolerance)
+    _check_numbers(plan, _replayed(problem, plan))
     return proven_bound(problem, plan)
 
 
@@ -60,7 +60,8 @@ def _replayed(problem: RoutingProblem, plan: Plan) -> float:
     return cost
 
 
-def _check_numbers(plan: Plan, cost: float, tolerance: float) -> None:
+def _check_numbers(plan: Plan, cost: float) -> None:
+    tolerance = TOLERANCE * cost
     if abs(cost - plan.cost) > tolerance:
         raise ProblemError(f"the tour is {cost} m long, not {plan.cost} m")
     if not plan.lower_bound <= plan.cost + tolerance:

@@ -8,7 +8,7 @@ from planner.certificate import Certificate, Proof
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
-from planner.tour import integer_metric, make_plan, possible_next, spanning_bound
+from planner.tour import make_plan, possible_next, spanning_bound, with_bound
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,21 @@ class GreedySolver:
         """
         del seed, limit
         started = time.perf_counter()
-        metric = integer_metric(problem.distances)
-        visits, bound = nearest_first(problem), spanning_bound(problem, metric)
-        return make_plan(problem, metric, visits, bound, started, Certificate(Proof.SPANNING_TREE, bound))
+        visits, bound, integers = nearest_first(problem), spanning_bound(problem), problem.integers
+        certificate = Certificate(Proof.SPANNING_TREE, integers.unit, bound)
+        return make_plan(problem, integers.legs, visits, bound, started, certificate)
 
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
     ) -> Iterator[Plan]:
         """Yield the one plan that there is."""
         yield self.solve(problem, seed=seed, limit=limit)
+
+
+def first_plan(problem: RoutingProblem) -> Plan:
+    """The nearest-first tour without any bound, which no planner could give sooner."""
+    certificate = Certificate(Proof.SPANNING_TREE, problem.integers.unit, 0)
+    return with_bound(problem, nearest_first(problem), 0.0, time.perf_counter(), certificate)
 
 
 def nearest_first(problem: RoutingProblem) -> list[Visit]:

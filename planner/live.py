@@ -13,7 +13,7 @@ from planner.problem import RoutingProblem
 from planner.replanner import Replanner
 from planner.route import Route, TaskState, remaining
 from planner.solver import SolveLimit, Solver
-from planner.tour import UNIT, tour_length
+from planner.tour import tour_length
 
 TIE = 0.01  # m; tours closer than this are equal: rounding to 0.1 mm alone can add up to it
 PROOF_LIMIT = SolveLimit(seconds=20.0)
@@ -211,7 +211,7 @@ class LiveReplanner(Replanner):
 def _with_bound(proof: _Proof, other: Plan) -> Plan:
     """The plan of the shown visits, with the bound of another plan of the same problem."""
     cost = tour_length(proof.problem, proof.shown)
-    optimal = other.status is Status.OPTIMAL and cost <= other.lower_bound + 2 * UNIT * len(proof.shown)
+    optimal = other.status is Status.OPTIMAL and cost <= other.lower_bound + proof.problem.tolerance(cost)
     lower = cost if optimal else min(other.lower_bound, cost)
     status = Status.OPTIMAL if optimal else Status.FEASIBLE
     return Plan(proof.shown, cost, lower, status, other.seconds, other.certificate)

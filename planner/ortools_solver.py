@@ -14,15 +14,12 @@ from planner.greedy_solver import GreedySolver, nearest_first
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
-from planner.tour import (
-    integer_metric,
-    make_plan,
-    possible_next,
-    spanning_bound,
-)
+from planner.tour import make_plan, possible_next, spanning_bound
 
 FIRST_SOLUTIONS = (1, 10)  # of the anytime form
 DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
+MANY = 250  # nodes; inserting more takes longer than it is worth
+LONGEST = 1e9  # s that OR-Tools can count
 MAX_SECONDS = 60.0  # ends a search that is limited by work but finds no more solutions
 
 
@@ -48,16 +45,17 @@ class OrToolsSolver:
         """
         del seed
         started = time.perf_counter()
-        metric = integer_metric(problem.distances)
+        legs = problem.integers.legs
         if len(problem.shipments) + len(problem.onboard) <= 3:
-            visits, bound = best_of_all(problem, metric)
+            visits, bound = best_of_all(problem, legs)
             proof = Proof.EXHAUSTIVE
         else:
-            bound, proof = spanning_bound(problem, metric), Proof.SPANNING_TREE
+            bound, proof = spanning_bound(problem), Proof.SPANNING_TREE
             if limit is None or limit == SolveLimit():
                 limit = SolveLimit(work=DEFAULT_SOLUTIONS)
-            visits = _search(problem, metric, limit)
-        return make_plan(problem, metric, visits, bound, started, Certificate(proof, bound))
+            visits = _search(problem, legs, limit, started)
+        certificate = Certificate(proof, problem.integers.unit, bound)
+        return make_plan(problem, legs, visits, bound, started, certificate)
 
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
@@ -85,8 +83,8 @@ class OrToolsSolver:
                 yield best
 
 
-def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> tuple[list[Visit], int]:
-    """The best tour and its length in an integer metric (k, k), by trying all; for very few objects."""
+def best_of_all(problem: RoutingProblem, distances: NDArray[np.int64]) -> tuple[list[Visit], int]:
+    """The best tour and its length in integer distances (k, k), by trying all; for very few objects."""
     best: list[Visit] = []
     best_length = math.inf
 
@@ -99,30 +97,32 @@ def best_of_all(problem: RoutingProblem, metric: NDArray[np.int64]) -> tuple[lis
             best, best_length = visits, length
         for option in options:
             there = problem.location(option)
-            extend([*visits, option], there, length + int(metric[here, there]))
+            extend([*visits, option], there, length + int(distances[here, there]))
 
     extend([], problem.start, 0)
     return best, int(best_length)
 
 
-def _search(problem: RoutingProblem, metric: NDArray[np.int64], limit: SolveLimit) -> list[Visit]:
+def _search(
+    problem: RoutingProblem, distances: NDArray[np.int64], limit: SolveLimit, started: float
+) -> list[Visit]:
     visit_of = _nodes(problem)
     count = len(visit_of) + 1  # node 0 is both start and end: leading back costs nothing, so the tour is open
     manager = pywrapcp.RoutingIndexManager(count, 1, 0)
     routing = pywrapcp.RoutingModel(manager)
     location = problem.stops(visit_of)
     # 1 on every leg changes no comparison, and lets guided local search penalise legs of length 0.
-    costs = metric[np.ix_(location, location)] + 1
+    costs = distances[np.ix_(location, location)] + 1
     costs[:, 0] = 0
     routing.SetArcCostEvaluatorOfAllVehicles(routing.RegisterTransitMatrix(costs.tolist()))
     _constrain(problem, manager, routing)
-    solution = routing.SolveWithParameters(_parameters(limit))
+    solution = routing.SolveWithParameters(_parameters(limit, started)) if count <= MANY else None
     if solution is None:
         # Insertion places pairs before single nodes, which fails with full hands; or time ran out.
         greedy = nearest_first(problem)
         node = {visit: k + 1 for k, visit in enumerate(visit_of)}
         first = routing.ReadAssignmentFromRoutes([[node[v] for v in greedy]], True)
-        solution = routing.SolveFromAssignmentWithParameters(first, _parameters(limit))
+        solution = routing.SolveFromAssignmentWithParameters(first, _parameters(limit, started))
         if solution is None:
             return greedy
     visits = []
@@ -157,12 +157,14 @@ def _constrain(
         routing.solver().Add(steps.CumulVar(pickup) <= steps.CumulVar(delivery))
 
 
-def _parameters(limit: SolveLimit) -> object:
+def _parameters(limit: SolveLimit, started: float) -> object:
     parameters = pywrapcp.DefaultRoutingSearchParameters()
     parameters.first_solution_strategy = routing_enums_pb2.FirstSolutionStrategy.PARALLEL_CHEAPEST_INSERTION
     parameters.local_search_metaheuristic = routing_enums_pb2.LocalSearchMetaheuristic.GUIDED_LOCAL_SEARCH
     if limit.work is not None:
         parameters.solution_limit = limit.work
-    seconds = limit.seconds if limit.seconds is not None else MAX_SECONDS
-    parameters.time_limit.FromMilliseconds(max(1, round(seconds * 1000)))
+    seconds = MAX_SECONDS
+    if limit.seconds is not None:
+        seconds = limit.seconds - (time.perf_counter() - started)
+    parameters.time_limit.FromMilliseconds(max(1, round(min(seconds, LONGEST) * 1000)))
     return parameters

@@ -1,5 +1,6 @@
 """The routing problem of equation 1: capacitated pickup and delivery with an open tour."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,7 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.errors import ProblemError
+from planner.integer_distances import TOLERANCE, IntegerDistances, integer_distances
 from planner.plan import Visit, VisitKind
+
+SMALLEST, LARGEST = 1e-250, 1e250  # m; lengths and units of tours in between are ordinary floats
+ASYMMETRY = 1e-12  # share by which a distance may differ between both ways: rounding of whoever worked it out
 
 
 @dataclass(frozen=True)
@@ -32,10 +37,12 @@ class RoutingProblem:
         onboard: Delivery index of each object that is carried now.
         capacity: How many objects may be carried at once.
         names: Of the objects, in the order of their numbers; by default the numbers themselves.
+        resolution: Distances mean no more than this, m: they are rounded to it, and tours are equal that differ by the
+            rounding of their legs. None: they mean what they say, to 1e-9 of a tour's length.
 
     Raises:
-        ProblemError: Not square, negative, not finite, asymmetric, an index out of range, more onboard than the
-            capacity, or names that are too few, too many or not unique.
+        ProblemError: Not square, negative, not finite, of a scale beyond computing, asymmetric, an index out of range,
+            more onboard than the capacity, or names that are too few, too many or not unique.
     """
 
     distances: NDArray[np.float64]
@@ -44,16 +51,35 @@ class RoutingProblem:
     onboard: tuple[int, ...] = ()
     capacity: int = 2
     names: tuple[str, ...] = ()
+    resolution: float | None = None
 
     def __post_init__(self) -> None:
         self._check_distances()
         self._check_indices()
+        self._check_scale()
         count = len(self.shipments) + len(self.onboard)
         if not self.names:
             object.__setattr__(self, "names", tuple(map(str, range(count))))
         if len(self.names) != count or len(set(self.names)) != count:
             raise ProblemError(f"{count} objects need as many different names, got {list(self.names)}")
         self.distances.setflags(write=False)
+
+    @cached_property
+    def used(self) -> list[int]:
+        """The locations that every tour visits, ascending: indices into the distances."""
+        places = {self.start, *self.onboard}
+        return sorted(places.union(*((s.pickup, s.delivery) for s in self.shipments)))
+
+    @cached_property
+    def integers(self) -> IntegerDistances:
+        """The distances in whole units."""
+        return integer_distances(self.distances, self.used, self.resolution)
+
+    def tolerance(self, length: float) -> float:
+        """Tours of about this length, m, are equal if they differ by no more than this, m."""
+        if self.resolution is None:
+            return TOLERANCE * length
+        return 2 * self.resolution * (len(self.shipments) + len(self.names))
 
     @cached_property
     def number(self) -> dict[str, int]:
@@ -90,7 +116,7 @@ class RoutingProblem:
             raise ProblemError(
                 f"distances[{i}][{j}] is {d[i, j]}; every distance must be a finite number >= 0"
             )
-        skew = np.argwhere(np.abs(d - d.T) > 1e-6)
+        skew = np.argwhere(np.abs(d - d.T) > ASYMMETRY * d)
         if skew.size:
             i, j = skew[0]
             raise ProblemError(
@@ -100,6 +126,22 @@ class RoutingProblem:
         if loops.size:
             raise ProblemError(
                 f"distances[{loops[0]}][{loops[0]}] is {d[loops[0], loops[0]]}; the diagonal must be 0"
+            )
+
+    def _check_scale(self) -> None:
+        """Refuse distances on the tour whose sums, or whose smallest parts, floats could not hold."""
+        distances = self.distances[np.ix_(self.used, self.used)]
+        if not self.used or not distances.any():
+            return
+        largest = float(distances.max())
+        if not SMALLEST <= largest <= LARGEST:
+            raise ProblemError(
+                f"the largest distance is {largest} m; choose a unit in which it is {SMALLEST} to {LARGEST}"
+            )
+        legs = len(self.shipments) + len(self.names) + 2
+        if self.resolution is not None and not 0 < largest * legs / 2**52 <= self.resolution < math.inf:
+            raise ProblemError(
+                f"a resolution of {self.resolution} m is too fine for distances of {largest} m; leave it out"
             )
 
     def _check_indices(self) -> None:

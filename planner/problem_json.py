@@ -12,7 +12,7 @@ from planner.errors import ProblemError
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 
-FORMAT = 1
+FORMAT = 2
 EXACT = 1 << 53  # whole numbers up to here are exact as floats
 PROBLEM = (
     'a problem is {"distances": [[0, 3], [3, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}, '
@@ -40,13 +40,14 @@ class _Problem(Struct, forbid_unknown_fields=True):
 
 class _Certificate(Struct, forbid_unknown_fields=True):
     proof: Proof
+    unit: float
     root: Whole
     groups: tuple[tuple[Whole, ...], ...]
     multipliers: tuple[Whole, ...]
 
 
 class _Claim(Struct, forbid_unknown_fields=True):
-    format: Literal[1]
+    format: Literal[2]
     visits: list[tuple[Action, int]]
     cost: float
     lower_bound: float
@@ -54,7 +55,7 @@ class _Claim(Struct, forbid_unknown_fields=True):
     certificate: _Certificate | None
 
 
-def problem_from_json(text: str) -> RoutingProblem:
+def problem_from_json(text: str | bytes) -> RoutingProblem:
     """Read a problem: capacity, start, distances, shipments (`{"pickup": i, "delivery": j}`), onboard (`[j, ...]`).
 
     `capacity` defaults to 2, `start` to 0, `onboard` to nothing. Indices count the rows of `distances`, in metres;
@@ -99,7 +100,7 @@ def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
     return json.dumps(written)
 
 
-def claim_from_json(text: str, problem: RoutingProblem) -> Plan:
+def claim_from_json(text: str | bytes, problem: RoutingProblem) -> Plan:
     """Read what `claim_to_json` wrote about a plan of this problem; nothing of it is checked yet.
 
     Raises:
@@ -113,11 +114,15 @@ def claim_from_json(text: str, problem: RoutingProblem) -> Plan:
     return Plan(visits, raw.cost, raw.lower_bound, raw.status, seconds=0.0, certificate=certificate)
 
 
-def _decode(text: str, kind: type[T], remedy: str) -> T:
+def _decode(text: str | bytes, kind: type[T], remedy: str) -> T:
     try:
         return msgspec.json.decode(text, type=kind)
     except msgspec.DecodeError as error:  # names the path of the value, what was expected and what came
         raise ProblemError(f"{error}; {remedy}") from error
+    except UnicodeError as error:
+        raise ProblemError(f"not UTF-8 ({error}); {remedy}") from error
+    except RecursionError as error:
+        raise ProblemError(f"nested too deeply; {remedy}") from error
 
 
 def _action(problem: RoutingProblem, visit: Visit) -> tuple[Action, int]:

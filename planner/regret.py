@@ -1,7 +1,7 @@
 """What each possible next visit costs compared with the best one."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from planner.errors import ProblemError
 from planner.exact.deadline import Deadline
@@ -14,7 +14,7 @@ from planner.exact.warm_start import NOTHING_KNOWN
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit, Solver
-from planner.tour import UNIT, integer_metric, possible_next, tour_length
+from planner.tour import possible_next, tour_length
 
 RADIUS = 1.0  # m
 MAX_ROWS = 1 << 14  # of the table of the bound of the pass
@@ -58,8 +58,8 @@ def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
     else:
         onboard.pop(number - len(shipments))
     start = problem.location(visit)
-    return RoutingProblem(
-        problem.distances, start, tuple(shipments), tuple(onboard), problem.capacity, tuple(names)
+    return replace(
+        problem, start=start, shipments=tuple(shipments), onboard=tuple(onboard), names=tuple(names)
     )
 
 
@@ -95,7 +95,7 @@ def regrets(
     if isinstance(solver, ExactSolver):
         costs = TaskTable(solver).costs(problem)
         if costs is not None:
-            return ranked(problem, costs)
+            return ranked(problem, *costs)
         found = _around_best(problem, solver, limit, radius, plan)
     return found if found is not None else one_by_one(problem, solver, limit=limit)
 
@@ -116,13 +116,18 @@ def one_by_one(
 
 
 def ranked(
-    problem: RoutingProblem, costs: Costs, longest: int | None = None, least: Costs | None = None
+    problem: RoutingProblem,
+    costs: Costs,
+    unit: float,
+    longest: int | None = None,
+    least: Costs | None = None,
 ) -> tuple[Regret, ...]:
     """Regrets from integer costs, the best visit first.
 
     Args:
         problem: What is left to do.
         costs: Length of the rest of the task by next visit, units.
+        unit: m per unit.
         longest: Costs above this are not known but for being above it; None where all are known.
         least: Lower bounds of the costs, for those.
     """
@@ -135,7 +140,7 @@ def ranked(
     found.sort(key=lambda entry: entry[:2])
     lowest = found[0][0] if found else 0
     return tuple(
-        Regret(visit, cost * UNIT, (cost - lowest) * UNIT, True, capped) for cost, capped, visit in found
+        Regret(visit, cost * unit, (cost - lowest) * unit, True, capped) for cost, capped, visit in found
     )
 
 
@@ -143,9 +148,9 @@ def _around_best(
     problem: RoutingProblem, solver: ExactSolver, limit: SolveLimit | None, radius: float, plan: Plan | None
 ) -> tuple[Regret, ...] | None:
     """Regrets within the radius of a proven plan, from one pass; None if that is too much or there is no such plan."""
-    metric = integer_metric(problem.distances)
-    if not solver.applies(problem, metric):
+    if not solver.applies(problem):
         return None
+    metric, unit = problem.integers.metric, problem.integers.unit
     if plan is None or plan.status is not Status.OPTIMAL:
         plan = solver.solve(problem, limit=limit)
     if plan.status is not Status.OPTIMAL:
@@ -157,10 +162,10 @@ def _around_best(
     relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
     least = {visit: cost - bound.prices for visit, cost in relaxed.items()}
     while True:
-        longest = best + math.floor(radius / UNIT)
+        longest = best + math.floor(radius / unit)
         costs = costs_by_pass(bound, list(possible_next(problem)), longest, MAX_STATES, deadline)
         if costs is not None:
-            return ranked(problem, costs, longest, least)
+            return ranked(problem, costs, unit, longest, least)
         radius /= 2
         if radius < MIN_RADIUS or deadline.over():
             return None
@@ -168,6 +173,8 @@ def _around_best(
 
 def _bound(instance: Instance, problem: RoutingProblem, plan: Plan, best: int, deadline: Deadline) -> Bound:
     """A tight bound, from the plan's multipliers."""
-    start = NOTHING_KNOWN.updated(problem, plan).numbered(problem.names[: len(problem.shipments)])
+    start = NOTHING_KNOWN.updated(problem, plan).numbered(
+        problem.names[: len(problem.shipments)], instance.unit
+    )
     bound = first_bound(instance, best) if start is None else warm_bound(instance, start, MAX_ROWS)
     return grown(bound, best, MAX_ROWS, deadline)

@@ -57,7 +57,7 @@ class RegretEvaluator:
             problem = self._problems.problem(state)
             costs = self._table.costs(problem)
             if costs is not None:
-                found = ranked(problem, costs)
+                found = ranked(problem, *costs)
             else:
                 best = plan if plan is not None and _is_best(plan, problem) else None
                 found = regrets(problem, self._solver, limit=self._limit, radius=self._radius, plan=best)
@@ -84,7 +84,7 @@ class RegretEvaluator:
             return None
         costs = self._table.costs(problem)
         if costs is not None:
-            return next(regret.regret for regret in ranked(problem, costs) if regret.visit == visit)
+            return next(regret.regret for regret in ranked(problem, *costs) if regret.visit == visit)
         before = plan if plan is not None and _is_best(plan, problem) else self._solve(problem)
         rest = self._after(problem, visit, before)
         if not before.status is rest.status is Status.OPTIMAL:

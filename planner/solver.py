@@ -1,6 +1,7 @@
 """The interface of all solvers, and their names."""
 
 import importlib
+import math
 import pkgutil
 import threading
 from collections.abc import Iterator
@@ -37,8 +38,8 @@ class SolveLimit:
 
     def __post_init__(self) -> None:
         for name, value in (("work", self.work), ("seconds", self.seconds)):
-            if value is not None and not value > 0:
-                raise PlannerError(f"SolveLimit.{name} must be positive or None, got {value}")
+            if value is not None and not 0 < value < math.inf:
+                raise PlannerError(f"SolveLimit.{name} must be positive and finite, or None; got {value}")
 
     @property
     def stopped(self) -> bool:

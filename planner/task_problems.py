@@ -12,6 +12,8 @@ from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 from planner.route import XY, TaskState
 
+RESOLUTION = 1e-4  # m; that of geodesics, and far below where a person stands
+
 
 class TaskProblems:
     """Makes the routing problems of the successive states of a task; keeps distances between them.
@@ -52,6 +54,7 @@ class TaskProblems:
             tuple(index[at[Visit(VisitKind.PLACE, name)]] for name in state.carried),
             self._capacity,
             (*state.loose, *state.carried),
+            RESOLUTION,
         )
 
     def length(self, state: TaskState, visits: Sequence[Visit]) -> float:

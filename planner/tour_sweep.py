@@ -13,7 +13,7 @@ def sweep_orders(problem: RoutingProblem, limit: float, max_states: int) -> tupl
     Returns:
         Whether there is one, and how many states were looked at; None if they were too many.
     """
-    d, direct = problem.distances.tolist(), closed(problem.distances).tolist()
+    d, direct = problem.distances.tolist(), closed(problem).tolist()
     jobs = [(s.pickup, s.delivery) for s in problem.shipments]
 
     def still(here: int, left: int, carried: tuple[int, ...]) -> float:

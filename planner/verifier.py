@@ -10,16 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.bound_checker import claim
+from planner.bound_checker import allowance, claim
 from planner.certificate import Proof
 from planner.checker import check
 from planner.errors import ProblemError
-from planner.plan import Plan, Status
+from planner.plan import Plan
 from planner.problem import RoutingProblem
-from planner.relaxation_checker import FINE, Relaxed, closed, relax
+from planner.relaxation_checker import Lengths, Relaxed, relax
 from planner.tour_sweep import sweep_orders
 
-UNIT = 1e-4  # m per unit of a certificate
 MAX_STATES = 30_000_000
 MAX_ROWS = 1 << 20  # of the certificate's table: some 30 s
 
@@ -31,7 +30,7 @@ class Verified:
     Attributes:
         cost: Length of its tour, m, which is feasible.
         lower_bound: No tour is shorter than this, m.
-        optimal: Whether that is the length of the tour, to rounding.
+        optimal: Whether that is the length of the tour, to twice the tolerance of the problem.
         states: How many states were looked at beyond the certificate's table.
         why: What is not verified and why, empty where everything the plan claims is.
     """
@@ -59,12 +58,12 @@ def verify_optimal(problem: RoutingProblem, plan: Plan, *, max_states: int = MAX
             or there is a tour shorter than the lower bound.
     """
     derived = check(problem, plan)
-    rounding = 2 * UNIT * (2 * len(problem.shipments) + len(problem.onboard) + 1)
+    rounding = allowance(problem, plan)
     wanted = plan.lower_bound - rounding
     states, why = 0, ""
     if derived < wanted:
         derived, states, why = _by_search(problem, plan, derived, wanted, max_states)
-    optimal = plan.status is Status.OPTIMAL and derived >= plan.cost - 2 * rounding
+    optimal = derived >= plan.cost - 2 * rounding
     return Verified(plan.cost, min(derived, plan.cost), optimal, states, why)
 
 
@@ -73,9 +72,7 @@ def _by_search(
 ) -> tuple[float, int, str]:
     """A lower bound, how many states it took, and what is missing."""
     certificate = plan.certificate
-    n = len(problem.shipments)
-    apart = bool((problem.distances - closed(problem.distances)).max(initial=0.0) > 2 * UNIT * n + UNIT)
-    if problem.capacity != 2 or apart or certificate is None or certificate.proof is Proof.EXHAUSTIVE:
+    if problem.capacity != 2 or certificate is None or certificate.proof is Proof.EXHAUSTIVE:
         found = sweep_orders(problem, wanted, max_states // 30)
     elif certificate.proof is Proof.SPANNING_TREE:
         return derived, 0, "a spanning tree bounds the tour no better"
@@ -85,10 +82,14 @@ def _by_search(
         if rows > MAX_ROWS:
             return derived, 0, f"the certificate's table has {rows} rows, more than {MAX_ROWS}"
         table = relax(problem, group, prices)
-        derived = max(derived, table.root * FINE)
+        derived = max(derived, table.root)
         if derived >= wanted:
             return derived, 0, ""
-        found = sweep(problem, table, int(np.floor(wanted / FINE)), max_states)
+        found = sweep(problem, table, wanted, max_states)
+        if found is not None and found[0] and not np.array_equal(table.d, problem.distances):
+            found = sweep_orders(
+                problem, wanted, max_states // 30
+            )  # it may take legs that the given distances lack
     if found is None:
         return derived, max_states, f"more than {max_states} states may lead to a shorter tour"
     shortest, states = found
@@ -97,8 +98,8 @@ def _by_search(
     return wanted, states, ""
 
 
-def sweep(problem: RoutingProblem, table: Relaxed, limit: int, max_states: int) -> tuple[bool, int] | None:
-    """Look for a tour shorter than a limit, units of 1e-5 m, among the states that may lead to one.
+def sweep(problem: RoutingProblem, table: Relaxed, limit: float, max_states: int) -> tuple[bool, int] | None:
+    """Look for a tour shorter than a limit, m, among the states that may lead to one.
 
     A state is the set of objects left and a place: bin b with an object for bin c in hand is b m + c, with empty
     hands b m + b, and object i with only that in hand m m + i.
@@ -107,7 +108,7 @@ def sweep(problem: RoutingProblem, table: Relaxed, limit: int, max_states: int) 
         Whether there is one, and how many states were looked at; None if they were too many.
     """
     n, m = len(table.at), len(table.bins)
-    limit += int(table.price.sum())
+    limit += float(table.price.sum())
     here, after = _begin(problem, table)
     states = 0
     for _ in range(n + 1):
@@ -129,26 +130,21 @@ def sweep(problem: RoutingProblem, table: Relaxed, limit: int, max_states: int) 
     return False, states
 
 
-States = tuple[
-    NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]
-]  # objects left, place, cost with prices
+States = tuple[NDArray[np.int64], NDArray[np.int64], Lengths]  # objects left, place, cost with prices, m
 
 
 def _none() -> States:
-    return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
+    return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
 
 
-def _states(left: NDArray[np.int64], place: NDArray[np.int64], cost: NDArray[np.int64]) -> States:
-    shape = np.broadcast_shapes(left.shape, np.shape(place), np.shape(cost))
-    whole = (np.broadcast_to(np.asarray(x, dtype=np.int64), shape) for x in (left, place, cost))
-    one, two, three = whole
-    return one, two, three
+def _states(left: NDArray[np.int64], place: NDArray[np.int64], cost: Lengths) -> States:
+    return left, np.broadcast_to(np.asarray(place, np.int64), left.shape), cost
 
 
 def _begin(problem: RoutingProblem, table: Relaxed) -> tuple[States, States]:
     """States after the first leg: those with all objects left, and those with one picked."""
     n, m = len(table.at), len(table.bins)
-    d, start = table.d.astype(np.int64), problem.start
+    d, start = table.d, problem.start
     everything = (1 << n) - 1
     bins = table.bins.tolist()
     held = [bins.index(j) for j in problem.onboard]
@@ -156,18 +152,18 @@ def _begin(problem: RoutingProblem, table: Relaxed) -> tuple[States, States]:
     here = _states(
         np.full(len(dropped), everything),
         np.array([b * m + c for b, c in dropped], np.int64),
-        np.array([d[start, table.bins[b]] for b, _ in dropped], np.int64),
+        np.array([d[start, table.bins[b]] for b, _ in dropped], np.float64),
     )
-    after: list[list[int]] = []
+    after: list[tuple[int, int, float]] = []
     for j in range(n if len(held) < 2 else 0):
         c, left = int(table.home[j]), everything ^ 1 << j
-        arrived = int(d[start, table.at[j]] + table.price[j])
+        arrived = float(d[start, table.at[j]] + table.price[j])
         if not held:
-            after.append([left, m * m + j, arrived])
+            after.append((left, m * m + j, arrived))
         for b, other in {(held[0], c), (c, held[0])} if held else ():
-            after.append([left, b * m + other, arrived + int(d[table.at[j], table.bins[b]])])
-    first = np.array(after, np.int64).reshape(-1, 3)
-    return here, (first[:, 0], first[:, 1], first[:, 2])
+            after.append((left, b * m + other, arrived + float(d[table.at[j], table.bins[b]])))
+    places = np.array([state[:2] for state in after], np.int64).reshape(-1, 2)
+    return here, (places[:, 0], places[:, 1], np.array([state[2] for state in after]))
 
 
 def _dropped(table: Relaxed, states: States) -> States:
@@ -185,7 +181,7 @@ def _dropped(table: Relaxed, states: States) -> States:
 
 
 def _picked(
-    table: Relaxed, j: int, left: NDArray[np.int64], place: NDArray[np.int64], cost: NDArray[np.int64]
+    table: Relaxed, j: int, left: NDArray[np.int64], place: NDArray[np.int64], cost: Lengths
 ) -> list[States]:
     """Where a leg to object j leads, and with two in hand the leg to either bin."""
     m, c = len(table.bins), int(table.home[j])
@@ -206,14 +202,14 @@ def _picked(
     ]
 
 
-def _promising(table: Relaxed, states: States, limit: int) -> States:
+def _promising(table: Relaxed, states: States, limit: float) -> States:
     """Those from which a tour shorter than the limit may exist."""
     left, place, cost = states
     m = len(table.bins)
     row = np.zeros(len(left), np.int64)
     for j, stride in enumerate(table.stride.tolist()):
         row += stride * (left >> j & 1)
-    rest = np.empty(len(left), np.int64)
+    rest = np.empty(len(left))
     at_bin = place < m * m
     rest[at_bin] = table.carrying.reshape(len(table.carrying), -1)[row[at_bin], place[at_bin]]
     rest[~at_bin] = table.holding[row[~at_bin], place[~at_bin] - m * m]
@@ -221,7 +217,7 @@ def _promising(table: Relaxed, states: States, limit: int) -> States:
     return left[good], place[good], cost[good]
 
 
-def _shortest(parts: list[States], table: Relaxed, limit: int) -> States:
+def _shortest(parts: list[States], table: Relaxed, limit: float) -> States:
     """The shortest path to each state, of those that may lead to a shorter tour."""
     left, place, cost = (np.concatenate([part[k] for part in parts]) for k in range(3))
     left, place, cost = _promising(table, (left, place, cost), limit)

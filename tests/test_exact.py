@@ -22,7 +22,7 @@ from planner.exact.table import new_table
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
 from planner.solver import SolveLimit, solver
-from planner.tour import integer_metric, tour_length
+from planner.tour import tour_length
 
 seeds = st.integers(0, 2**32 - 1)
 TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
@@ -50,7 +50,7 @@ def random_problem(seed, shipments, onboard=0, bins=6, planar=True):
 
 def plain_optimum(problem):
     """Least integer length by recursion on sets; drops are explicit stops, one object at a time."""
-    metric = integer_metric(problem.distances)
+    metric = problem.integers.metric
     pickups = [s.pickup for s in problem.shipments]
     homes = [s.delivery for s in problem.shipments]
 
@@ -73,7 +73,7 @@ def plain_optimum(problem):
 
 
 def integer_length(problem, plan):
-    return int(tour_length(problem, plan.visits, integer_metric(problem.distances)))
+    return int(tour_length(problem, plan.visits, problem.integers.metric))
 
 
 @settings(max_examples=60, deadline=None)
@@ -120,7 +120,7 @@ def test_a_narrow_search_claims_no_more_than_it_knows(seed, n, width, rows):
 @given(seed=seeds, n=st.integers(4, 9), width=st.integers(1, 20), rows=st.integers(1, 100))
 def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, width, rows):
     problem = random_problem(seed, n, seed % 3)
-    instance = make_instance(problem, integer_metric(problem.distances))
+    instance = make_instance(problem, problem.integers.metric)
     optimum = integer_length(problem, ExactSolver(table_bytes=1 << 30).solve(problem))
     poor = optimum + optimum // 3  # far from optimal, so that the claim rests on the states that were dropped
     bound = grown(first_bound(instance, poor), poor, rows, NEVER)
@@ -128,7 +128,7 @@ def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, wi
     assert found.lower <= optimum <= found.upper
     if found.actions is not None:
         visits = to_visits(instance, found.actions, problem.names[:n], problem.names[n:])
-        assert tour_length(problem, visits, integer_metric(problem.distances)) == found.upper
+        assert tour_length(problem, visits, problem.integers.metric) == found.upper
 
 
 @settings(max_examples=30, deadline=None)
@@ -136,7 +136,7 @@ def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, wi
 def test_the_relaxation_bounds_every_state_for_any_multipliers_and_groups(seed, n, groups):
     rng = np.random.default_rng(seed)
     problem = random_problem(seed, n, bins=3)
-    instance = make_instance(problem, integer_metric(problem.distances))
+    instance = make_instance(problem, problem.integers.metric)
     group = numbered(rng.integers(0, groups, n)) if groups < 7 else alone(n)
     exact, relaxed = new_table(instance, alone(n)), new_table(instance, group)
     relaxed.multipliers[:] = rng.integers(-20_000, 40_000, n)
@@ -159,7 +159,7 @@ def test_the_relaxation_bounds_every_state_for_any_multipliers_and_groups(seed, 
 @given(seed=seeds, n=st.integers(2, 9), onboard=st.integers(0, 2))
 def test_fitted_multipliers_bound_the_optimum_and_growing_does_not_harm(seed, n, onboard):
     problem = random_problem(seed, n, onboard)
-    instance = make_instance(problem, integer_metric(problem.distances))
+    instance = make_instance(problem, problem.integers.metric)
     table = new_table(instance, alone(n))
     fill(instance, table)
     optimum, _ = walk(instance, table, len(table.bin) - 1, np.empty(2 * n + 2, np.int64))
@@ -202,13 +202,13 @@ def dropped_every_way(instance, order):
 @given(seed=seeds, n=st.integers(0, 5), onboard=st.integers(0, 2), bins=st.integers(1, 4))
 def test_drops_of_a_pick_order_are_decoded_optimally(seed, n, onboard, bins):
     problem = random_problem(seed, n, onboard, bins)
-    instance = make_instance(problem, integer_metric(problem.distances))
+    instance = make_instance(problem, problem.integers.metric)
     order = np.random.default_rng(seed).permutation(n)
-    costs = np.empty((n + 1, len(instance.bins) + 1), np.int32)
+    costs = np.empty((n + 1, len(instance.bins) + 1), np.int64)
     length = decode(instance, order, 0, costs)
     assert length == dropped_every_way(instance, order)
     visits = to_visits(instance, tour_actions(instance, order).tolist(), problem.names[:n], problem.names[n:])
-    assert tour_length(problem, visits, integer_metric(problem.distances)) == length
+    assert tour_length(problem, visits, problem.integers.metric) == length
     assert [problem.number[v.object] for v in visits if v.kind.value == "pick"] == order.tolist()
 
 
@@ -225,9 +225,9 @@ def test_proposals_are_permutations_that_keep_the_announced_beginning(seed, n):
 
 def test_annealing_costs_stay_consistent_with_decoding_from_scratch():
     problem = random_problem(3, 14, 1)
-    instance = make_instance(problem, integer_metric(problem.distances))
+    instance = make_instance(problem, problem.integers.metric)
     length, order = anneal(instance, 7, 3000)
-    costs = np.empty((15, len(instance.bins) + 1), np.int32)
+    costs = np.empty((15, len(instance.bins) + 1), np.int64)
     assert decode(instance, order, 0, costs) == length
     again, same = anneal(instance, 7, 3000)
     assert again == length
@@ -319,7 +319,7 @@ def test_never_worse_than_or_tools():
 def test_the_recursion_used_here_agrees_with_listing_all_orders():
     problem = random_problem(9, 3, 1, bins=2)
     stops = [("p", k) for k in range(3)] + [("d", k) for k in range(3)] + [("o", 0)]
-    metric = integer_metric(problem.distances)
+    metric = problem.integers.metric
     best = np.inf
     for order in itertools.permutations(stops):
         load, here, length, ok = 1, 0, 0, True

@@ -10,10 +10,10 @@ from planner.checker import check
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
-from planner.tour import integer_metric, tour_length
+from planner.tour import tour_length
 
 TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
-FAR = 1 << 40
+FAR = 1 << 60
 
 
 @numba.njit
@@ -56,7 +56,7 @@ def oracle(d, start, pickup, delivery, onboard, capacity):
 def expected(problem):
     return int(
         oracle(
-            integer_metric(problem.distances),
+            problem.integers.metric,
             problem.start,
             np.array([s.pickup for s in problem.shipments], np.int64),
             np.array([s.delivery for s in problem.shipments], np.int64),
@@ -82,7 +82,7 @@ def grid_problem(rng, most, capacity):
 def assert_optimal(problem, planner, length):
     plan = planner.solve(problem)
     assert plan.status is Status.OPTIMAL
-    assert int(tour_length(problem, plan.visits, integer_metric(problem.distances))) == length
+    assert int(tour_length(problem, plan.visits, problem.integers.metric)) == length
     return plan
 
 
@@ -111,10 +111,12 @@ def test_any_problem_is_solved_to_the_optimum(seed, capacity):
 def test_the_oracle_knows_a_tour_that_was_worked_out_by_hand():
     d = np.abs(np.subtract.outer([0.0, 1, 2, 5], [0.0, 1, 2, 5]))  # person 0, objects at 1 and 5, bin at 2
     pair = (Shipment(1, 2), Shipment(3, 2))
-    assert expected(RoutingProblem(d, 0, pair, (), 1)) == 80_000  # 0 1 2 5 2
-    assert expected(RoutingProblem(d, 0, pair, (), 2)) == 80_000
-    assert expected(RoutingProblem(d, 0, pair, (0,), 1)) == 80_000  # what is onboard belongs here
-    assert expected(RoutingProblem(d, 0, pair, (3,), 1)) == 100_000  # 0 5 2 1 2
+    assert expected(RoutingProblem(d, 0, pair, (), 1, resolution=1e-4)) == 80_000  # 0 1 2 5 2
+    assert expected(RoutingProblem(d, 0, pair, (), 2, resolution=1e-4)) == 80_000
+    assert (
+        expected(RoutingProblem(d, 0, pair, (0,), 1, resolution=1e-4)) == 80_000
+    )  # what is onboard belongs here
+    assert expected(RoutingProblem(d, 0, pair, (3,), 1, resolution=1e-4)) == 100_000  # 0 5 2 1 2
 
 
 @pytest.mark.parametrize("n", [13, 14, 15, 16, 17, 18])
@@ -127,5 +129,5 @@ def test_search_and_full_table_agree_up_to_eighteen_objects(n):
         shipments = tuple(Shipment(1 + bins + k, 1 + int(rng.integers(bins))) for k in range(n))
         problem = RoutingProblem(d, 0, shipments, (1,) * seed, 2)
         by_table = ExactSolver(table_bytes=1 << 30).solve(problem)
-        length = int(tour_length(problem, by_table.visits, integer_metric(d)))
+        length = int(tour_length(problem, by_table.visits, problem.integers.metric))
         assert_optimal(problem, SEARCH, length)

@@ -74,4 +74,4 @@ def test_a_process_with_any_number_of_threads_finds_the_same_plan(threads, tmp_p
 def test_the_bar_for_the_best_states_is_the_order_statistic(values, data):
     size = data.draw(st.integers(1, len(values)))
     count = data.draw(st.integers(1, size))
-    assert smallest_but(np.array(values, np.int32), size, count) == sorted(values[:size])[count - 1]
+    assert smallest_but(np.array(values, np.int64), size, count) == sorted(values[:size])[count - 1]

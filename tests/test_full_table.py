@@ -11,7 +11,6 @@ from planner.exact.groups import alone
 from planner.exact.instance import make_instance
 from planner.exact.relaxation import fill, walk
 from planner.exact.table import new_table
-from planner.tour import integer_metric
 
 cases = given(
     seed=st.integers(0, 2**32 - 1),
@@ -24,7 +23,7 @@ cases = given(
 
 def instance_of(seed, n, onboard, bins, coincide):
     problem = random_problem(seed, n, onboard, bins=bins, coincide=coincide)
-    return make_instance(problem, integer_metric(problem.distances))
+    return make_instance(problem, problem.integers.metric)
 
 
 @settings(max_examples=60, deadline=None)

@@ -12,7 +12,6 @@ from planner.errors import PlannerError, ProblemError
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 from planner.solver import SOLVERS, SolveLimit, solver
-from planner.tour import UNIT, integer_metric
 
 LINE = np.abs(np.subtract.outer(np.arange(4.0), np.arange(4.0)))
 PICK, PLACE = VisitKind.PICK, VisitKind.PLACE
@@ -106,13 +105,15 @@ def test_integer_distances_are_a_metric_close_to_the_real_one(seed):
     points = np.random.default_rng(seed).uniform(0, 10, (12, 2))
     points[3] = points[4]
     d = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
-    m = integer_metric(d)
+    pair = (Shipment(0, 1),) * 5 + tuple(Shipment(k, k) for k in range(12))
+    integers = RoutingProblem(d, 0, pair, resolution=1e-4).integers
+    m = integers.metric
     assert m.dtype == np.int64
     np.testing.assert_array_equal(m, m.T)
     assert (m[:, None, :] <= m[:, :, None] + m[None, :, :]).all()
     assert m[3, 4] == 0
     # Half a unit of rounding on one leg, and half a unit on each leg of the detour that closes it.
-    assert np.abs(m * UNIT - d).max() <= 2 * UNIT
+    assert np.abs(m * 1e-4 - d).max() <= 2e-4
 
 
 def test_solvers_are_found_by_name():

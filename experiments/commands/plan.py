@@ -3,12 +3,16 @@
 import argparse
 import json
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 from experiments.errors import ConfigError
+from experiments.plan_process import Answer, PlanProcess
 from planner.errors import ProblemError
+from planner.plan import Plan
+from planner.problem import RoutingProblem
 from planner.problem_json import claim_from_json, claim_to_json, plan_to_json, problem_from_json
 from planner.solver import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, solver
 
@@ -18,11 +22,13 @@ DESCRIPTION = """\
 Solve a capacitated pickup-and-delivery problem with an open tour. Input, from FILE or - for standard input:
   {"capacity": 2, "start": 0, "distances": [[0, 3, 5], [3, 0, 4], [5, 4, 0]],
    "shipments": [{"pickup": 1, "delivery": 2}], "onboard": [2]}
-Indices count rows of the symmetric matrix distances, in metres; onboard holds the delivery index of each object
-that is carried at the start.
+Indices count rows of the symmetric matrix distances, in metres or any other unit; onboard holds the delivery index of
+each object that is carried at the start.
 Output, on standard output:
   {"visits": [1, 2, 2], "cost": 7.0, "lower_bound": 7.0, "status": "optimal", "seconds": 0.001}
-Malformed input exits with 2 and one line that names the fault.
+"optimal" says that no tour is shorter than cost by more than a billionth of it, whatever the scale of the distances.
+Progress of a long search goes to standard error. Ctrl-C or SIGTERM ends it with the best tour so far. Malformed input
+exits with 2 and one line that names the fault.
 
 With --certificate OUT.json the visits by object and what proves the lower bound are written as well. Anybody can check
 that: --check OUT.json replays the tour against the constraints, derives the bound anew and looks at every state through
@@ -49,7 +55,7 @@ def add_parser(commands: Any) -> None:
         "--time-limit",
         type=float,
         metavar="S",
-        help="seconds to search, to some 0.1 s; without it, the planner's own budget of work",
+        help="seconds from start to answer, to half a second; without it, the planner's own budget of work",
     )
     claim = parser.add_mutually_exclusive_group()
     claim.add_argument(
@@ -72,22 +78,51 @@ def run(arguments: argparse.Namespace) -> int:
         from experiments.run_directory import check_file  # loaded only where it is needed
 
         check_file(arguments.certificate, replace=arguments.force)
-    limit = _limit(arguments.planner, arguments.time_limit)
-    problem = _read(arguments.file, problem_from_json)
-    plan = solver(arguments.planner).solve(problem, limit=limit)
-    if arguments.certificate is not None:
-        from mjsim.files import write_text_atomically  # loaded only where it is needed
+    seconds = arguments.time_limit
+    started = time.perf_counter()
+    if seconds is not None:
+        SolveLimit(seconds=seconds)  # refuses what is no limit
 
-        write_text_atomically(arguments.certificate, claim_to_json(problem, plan) + "\n")
-    print(plan_to_json(problem, plan))
+    def answers() -> Iterator[Answer]:
+        problem = _read(arguments.file, problem_from_json)
+        left = None if seconds is None else max(0.001, seconds - (time.perf_counter() - started))
+        for plan in _plans(arguments.planner, problem, left):
+            claim = claim_to_json(problem, plan)
+            yield Answer(plan_to_json(problem, plan), claim, plan.cost, plan.lower_bound)
+
+    process = PlanProcess(answers, seconds)
+    try:
+        _publish(process.wait(sys.stderr), arguments.certificate)
+    except KeyboardInterrupt:
+        process.stop()
+        if process.best is not None:
+            print("mjsim: stopped early; this is the best tour so far", file=sys.stderr)
+            _publish(process.best, arguments.certificate)
+        raise
     return 0
 
 
-def _limit(planner: str, seconds: float | None) -> SolveLimit | None:
-    """The time that was asked for, or a large budget of the exact planner's work."""
+def _plans(name: str, problem: RoutingProblem, seconds: float | None) -> Iterator[Plan]:
+    """Better and better plans, within a time or a large budget of the exact planner's work."""
+    limit = SolveLimit(work=PATIENT_WORK) if name == DEFAULT_SOLVER else None
     if seconds is not None:
-        return SolveLimit(seconds=seconds)
-    return SolveLimit(work=PATIENT_WORK) if planner == DEFAULT_SOLVER else None
+        from planner.greedy_solver import first_plan  # loaded only where it is needed
+
+        limit = SolveLimit(seconds=seconds)
+        yield first_plan(problem)  # before the planner is loaded
+    planner = solver(name)
+    if hasattr(planner, "improve"):
+        yield from planner.improve(problem, limit=limit)
+    else:
+        yield planner.solve(problem, limit=limit)
+
+
+def _publish(answer: Answer, certificate: Path | None) -> None:
+    if certificate is not None:
+        from mjsim.files import write_text_atomically  # loaded only where it is needed
+
+        write_text_atomically(certificate, answer.claim + "\n")
+    print(answer.plan)
 
 
 def _check(problem_name: str, claim_name: str) -> int:
@@ -109,10 +144,10 @@ def _check(problem_name: str, claim_name: str) -> int:
     return 0
 
 
-def _read(name: str, parse: Callable[[str], T]) -> T:
+def _read(name: str, parse: Callable[[bytes], T]) -> T:
     try:
-        text = sys.stdin.read() if name == "-" else Path(name).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
+    except OSError as error:
         raise ConfigError(f"cannot read {name}: {error}") from error
     try:
         return parse(text)

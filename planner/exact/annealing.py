@@ -57,7 +57,7 @@ def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
 
 
 @kernel
-def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[np.int32]) -> int:
+def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[np.int64]) -> int:
     """Least length of a tour that picks in a given order.
 
     Args:
@@ -86,7 +86,7 @@ def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[
 
 
 @kernel
-def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int32], after: NDArray[np.int32]) -> None:
+def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: NDArray[np.int64]) -> None:
     """From pick i to pick x: row `after` from row `before`."""
     m = inst.bins.shape[0]
     c = inst.home[i]
@@ -105,7 +105,7 @@ def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int32], after: N
 
 
 @kernel
-def _finish(inst: Instance, i: int, before: NDArray[np.int32]) -> int:
+def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
     """Least length of a tour whose last pick is i."""
     m = inst.bins.shape[0]
     c = inst.home[i]
@@ -122,7 +122,7 @@ def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
     The result has the shape (actions,): k >= 0 picks object k, -1 - b goes to bin b.
     """
     n, m = inst.to_bin.shape
-    costs = np.empty((n + 1, m + 1), np.int32)
+    costs = np.empty((n + 1, m + 1), np.int64)
     decode(inst, order, 0, costs)
     backwards = np.empty(3 * n + 2, np.int64)
     count, state = 0, m
@@ -218,8 +218,8 @@ def anneal_from(
     n, m = inst.to_bin.shape
     state = np.array([seed], np.uint64)
     order = first.copy()
-    costs = np.empty((n + 1, m + 1), np.int32)
-    trial_costs = np.empty((n + 1, m + 1), np.int32)
+    costs = np.empty((n + 1, m + 1), np.int64)
+    trial_costs = np.empty((n + 1, m + 1), np.int64)
     cost = decode(inst, order, 0, costs)
     best, best_order = cost, order.copy()
     if n < 2:
@@ -250,7 +250,7 @@ def warm_order(instance: Instance, start: Start) -> NDArray[np.int64]:
     """The order of a start, each missing object put where it lengthens the tour least, (n,) int64."""
     n = len(instance.home)
     order = [*start.order, *start.missing]
-    costs = np.empty((n + 1, len(instance.bins) + 1), np.int32)
+    costs = np.empty((n + 1, len(instance.bins) + 1), np.int64)
     for k in start.missing:
         rest = [j for j in order if j != k]
         orders = [[*rest[:t], k, *rest[t:]] for t in range(n)]

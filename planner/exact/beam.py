@@ -36,7 +36,7 @@ def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadlin
 
     Args:
         bound: Bound of the cost-to-go.
-        upper: Length of the best tour known; only shorter ones are looked for.
+        upper: Length of the best tour known; only those shorter by more than a tie are looked for.
         width: States to keep of each layer.
         most: Give up when so many states were expanded.
         deadline: Give up when it is over.
@@ -45,7 +45,7 @@ def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadlin
         The result; its lower bound is that of the root if the pass was given up.
     """
     n, prices = len(bound.instance.home), bound.prices
-    limit = upper + prices
+    limit = upper - bound.instance.tie + prices
     history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
     here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
     offer_roots(bound.instance, bound.table, here, after, limit)
@@ -66,7 +66,7 @@ def beam_pass(bound: Bound, upper: int, width: int, most: int, deadline: Deadlin
             upper = int(here.cost[end]) - prices
             actions = _actions(bound, history, layer, end)
         here, after = after, new_nodes(FIRST_ROOM)
-    lower = max(bound.root, min(upper, dropped - prices))
+    lower = max(bound.root, min(upper, min(limit, dropped) - prices))
     return Pass(upper, actions, lower, expanded)
 
 

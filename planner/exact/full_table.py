@@ -15,7 +15,7 @@ from planner.exact.instance import Instance
 from planner.exact.table import Table, new_table, table_bytes
 
 COMPILER = "numba"  # takes 0.5 s to load; where something else has loaded it, the kernels cost little more
-SMALL_TABLE = 1 << 22  # bytes, 14 objects and 6 bins: filled in 10 ms by kernels, in 50 by numpy
+SMALL_TABLE = 1 << 23  # bytes, 14 objects and 6 bins: filled in 10 ms by kernels, in 50 by numpy
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def by_table(instance: Instance) -> Solution:
     """Fill the full table and follow a shortest tour."""
     table = filled_table(instance)
     length, actions = follow_table(instance, table, len(table.bin) - 1)
-    return Solution(actions, length, Certificate(Proof.FULL_TABLE, length))
+    return Solution(actions, length, Certificate(Proof.FULL_TABLE, instance.unit, length))
 
 
 def filled_table(instance: Instance) -> Table:

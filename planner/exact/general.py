@@ -3,17 +3,16 @@
 import heapq
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from planner.errors import InfeasibleError
 from planner.exact.deadline import NEVER, Deadline
+from planner.integer_distances import shortest_connections
 from planner.plan import Visit
 from planner.problem import RoutingProblem
 
 # Location, which shipments are not yet picked (bits), and where each carried object goes (sorted).
 State = tuple[int, int, tuple[int, ...]]
-Matrix = NDArray[np.int64]
+Matrix = list[list[float]]
+ROUNDING = 1e-12  # share by which sums of floats may be off
 
 
 @dataclass(frozen=True)
@@ -22,35 +21,34 @@ class Ending:
 
     Attributes:
         visits: The optimal tour, or None if the search was cut short.
-        bound: Its length, or that of the best tour that may still exist, in the unit of the distances.
+        bound: No tour is shorter than this, m.
     """
 
     visits: list[Visit] | None
-    bound: int
+    bound: float
 
 
-def best_first(
-    problem: RoutingProblem, distances: Matrix, metric: Matrix, max_states: int, deadline: Deadline = NEVER
-) -> Ending:
+def best_first(problem: RoutingProblem, max_states: int, deadline: Deadline = NEVER) -> Ending:
     """Search states by cost so far plus the farthest trip left (A*).
 
     In a metric it is free and never wrong to drop on arrival what belongs there. Otherwise a later visit to the same
-    place may be cheaper, so each drop is a move of its own.
+    place may be cheaper, so each drop is a move of its own. Lengths are sums of floats of one sign: whatever the range
+    of the distances, rounding is a share of each sum.
 
     Args:
         problem: What is left to do.
-        distances: Length of each leg, integers, (k, k).
-        metric: The same, closed to a metric.
         max_states: How many states may be expanded.
         deadline: Give up when it is over.
 
     Raises:
         InfeasibleError: No order of visits keeps to the capacity.
     """
-    search = _Search(problem, distances.tolist(), metric.tolist(), at_once=np.array_equal(distances, metric))
+    at_once = problem.integers.is_metric
+    metric = shortest_connections(problem.distances, problem.used).tolist()
+    search = _Search(problem, metric if at_once else problem.distances.tolist(), metric, at_once=at_once)
     start = search.arrive(problem.start, (1 << len(problem.shipments)) - 1, problem.onboard)
-    frontier: list[tuple[int, int, State]] = [(search.still_to_go(start), 0, start)]
-    cost: dict[State, int] = {start: 0}
+    frontier: list[tuple[float, float, State]] = [(search.still_to_go(start), 0.0, start)]
+    cost: dict[State, float] = {start: 0.0}
     before: dict[State, State] = {}
     closed: set[State] = set()
     while frontier:
@@ -58,13 +56,13 @@ def best_first(
         if state in closed:
             continue
         if not state[1] and not state[2]:
-            return Ending(search.visits(state, before), so_far)
+            return Ending(search.visits(state, before), so_far * (1 - ROUNDING))
         if len(closed) == max_states or (len(closed) % 16 == 0 and deadline.over()):
-            return Ending(None, estimate)
+            return Ending(None, estimate * (1 - ROUNDING))
         closed.add(state)
         for leg, following in search.moves(state):
             total = so_far + leg
-            if total < cost.get(following, total + 1):
+            if following not in cost or total < cost[following]:
                 cost[following], before[following] = total, state
                 heapq.heappush(frontier, (total + search.still_to_go(following), total, following))
     raise InfeasibleError("no order of visits keeps to the capacity")
@@ -73,9 +71,7 @@ def best_first(
 class _Search:
     """Moves and bounds of one problem."""
 
-    def __init__(
-        self, problem: RoutingProblem, legs: list[list[int]], metric: list[list[int]], *, at_once: bool
-    ) -> None:
+    def __init__(self, problem: RoutingProblem, legs: Matrix, metric: Matrix, *, at_once: bool) -> None:
         self._problem = problem
         self._legs = legs
         self._metric = metric
@@ -86,7 +82,7 @@ class _Search:
         """State on arrival, with what belongs here dropped."""
         return here, left, tuple(sorted(j for j in carried if not (self._at_once and j == here)))
 
-    def moves(self, state: State) -> list[tuple[int, State]]:
+    def moves(self, state: State) -> list[tuple[float, State]]:
         """Length of the leg to every feasible next state, and that state."""
         here, left, carried = state
         row = self._legs[here]
@@ -102,11 +98,11 @@ class _Search:
                     found.append((row[shipment.pickup], self.arrive(shipment.pickup, left ^ 1 << k, held)))
         return found
 
-    def still_to_go(self, state: State) -> int:
+    def still_to_go(self, state: State) -> float:
         """A lower bound: the farthest single trip that is left."""
         here, left, carried = state
         row = self._metric[here]
-        farthest = max((row[j] for j in carried), default=0)
+        farthest = max((row[j] for j in carried), default=0.0)
         for k, shipment in enumerate(self._problem.shipments):
             if left >> k & 1:
                 farthest = max(farthest, row[shipment.pickup] + self._trip[k])

@@ -9,31 +9,35 @@ from numpy.typing import NDArray
 from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem
 
-FAR = 1 << 28
+FAR = 1 << 59  # longer than any tour
 
 
 class Instance(NamedTuple):
-    """n objects, m bins and the root (where the person is), distances in integer units.
+    """n objects, m bins and the root (where the person is); distances in integer units, int64.
 
     Attributes:
-        between: Object to object, (n, n) int32; `FAR` from an object to itself.
-        to_bin: Object to bin, (n, m) int32.
-        from_bin: Bin to object, (m, n) int32.
-        bins: Bin to bin, (m, m) int32.
+        between: Object to object, (n, n); `FAR` from an object to itself.
+        to_bin: Object to bin, (n, m).
+        from_bin: Bin to object, (m, n).
+        bins: Bin to bin, (m, m).
         home: Bin of each object, (n,) int64.
-        root: Root to object, (n,) int32.
-        root_bin: Root to bin, (m,) int32.
+        root: Root to object, (n,).
+        root_bin: Root to bin, (m,).
         carried: Bins of the objects carried at the root, (0..2,) int64.
+        tie: Tours that differ by no more than this are equal, units.
+        unit: m per unit.
     """
 
-    between: NDArray[np.int32]
-    to_bin: NDArray[np.int32]
-    from_bin: NDArray[np.int32]
-    bins: NDArray[np.int32]
+    between: NDArray[np.int64]
+    to_bin: NDArray[np.int64]
+    from_bin: NDArray[np.int64]
+    bins: NDArray[np.int64]
     home: NDArray[np.int64]
-    root: NDArray[np.int32]
-    root_bin: NDArray[np.int32]
+    root: NDArray[np.int64]
+    root_bin: NDArray[np.int64]
     carried: NDArray[np.int64]
+    tie: int
+    unit: float
 
 
 def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instance:
@@ -41,30 +45,28 @@ def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instanc
 
     Args:
         problem: Of capacity two.
-        metric: Its distances, units of 0.1 mm, closed to a metric, (k, k).
+        metric: Its integer distances, closed to a metric, (k, k).
     """
     pickups = [s.pickup for s in problem.shipments]
     places = sorted({s.delivery for s in problem.shipments} | set(problem.onboard))
     index = {location: k for k, location in enumerate(places)}
 
-    n, m = len(pickups), len(places)
+    def block(rows: list[int], columns: list[int]) -> NDArray[np.int64]:
+        return metric[np.ix_(rows, columns)]
 
-    def block(rows: list[int], columns: list[int], height: int, width: int) -> NDArray[np.int32]:
-        result = np.full((height, width), FAR, dtype=np.int32)
-        result[: len(rows), : len(columns)] = metric[np.ix_(rows, columns)]
-        return result
-
-    between = block(pickups, pickups, n, n)
+    between = block(pickups, pickups)
     np.fill_diagonal(between, FAR)
     return Instance(
         between=between,
-        to_bin=block(pickups, places, n, m),
-        from_bin=block(places, pickups, m, n),
-        bins=block(places, places, m, m),
+        to_bin=block(pickups, places),
+        from_bin=block(places, pickups),
+        bins=block(places, places),
         home=np.array([index[s.delivery] for s in problem.shipments], dtype=np.int64),
-        root=block([problem.start], pickups, 1, n)[0],
-        root_bin=block([problem.start], places, 1, m)[0],
+        root=block([problem.start], pickups)[0],
+        root_bin=block([problem.start], places)[0],
         carried=np.array([index[j] for j in problem.onboard], dtype=np.int64),
+        tie=problem.integers.tie,
+        unit=problem.integers.unit,
     )
 
 

@@ -86,7 +86,7 @@ def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
         deadline: Stop growing when it is over.
     """
     warm = not bound.miscount.any()  # a warm start: first see how good its multipliers are here
-    while bound.root < upper:
+    while bound.root < upper - bound.instance.tie:
         group: NDArray[np.int64] | None = bound.table.group
         if not warm:
             group = with_one_alone(bound.table.group, bound.miscount, max_rows)
@@ -116,7 +116,7 @@ def counted_by_bin(bound: Bound, upper: int, max_rows: int, deadline: Deadline) 
         deadline: Leave the bound as it is when this is over.
     """
     group = numbered(bound.instance.home)
-    if bound.root >= upper or rows_of(group) > max_rows:
+    if bound.root >= upper - bound.instance.tie or rows_of(group) > max_rows:
         return bound
     fitted = _refitted(bound, group, upper, MAX_STEPS, deadline)
     return bound if fitted is None or fitted.root <= bound.root else fitted
@@ -167,7 +167,7 @@ def fit(
         if value > best:
             best = value
             best_multipliers[:] = table.multipliers
-        if best >= upper or k == steps - 1:
+        if best >= upper - instance.tie or k == steps - 1:
             break
         step_size = step_sizes[0] * (step_sizes[1] / step_sizes[0]) ** (k / steps)
         if not step(actions[:count], 1.002 * upper - value, step_size, current, direction, miscount):

@@ -17,16 +17,16 @@ class Nodes(NamedTuple):
     Attributes:
         size: Number of states, (1,) int64.
         key: Code of each state, int64.
-        cost: Length of the shortest known path to it, int32.
-        total: Cost plus bound of the cost-to-go, int32.
+        cost: Length of the shortest known path to it, int64.
+        total: Cost plus bound of the cost-to-go, int64.
         parent: 2 x index of the state before + (1 if that is in the same layer), or `NO_PARENT`, int64.
         slots: Hash table of indices, -1 where empty, a power of two long, int32.
     """
 
     size: NDArray[np.int64]
     key: NDArray[np.int64]
-    cost: NDArray[np.int32]
-    total: NDArray[np.int32]
+    cost: NDArray[np.int64]
+    total: NDArray[np.int64]
     parent: NDArray[np.int64]
     slots: NDArray[np.int32]
 
@@ -37,8 +37,8 @@ def new_nodes(room: int) -> Nodes:
     return Nodes(
         np.zeros(1, np.int64),
         np.empty(room, np.int64),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
+        np.empty(room, np.int64),
+        np.empty(room, np.int64),
         np.empty(room, np.int64),
         np.full(2 * room, -1, np.int32),
     )
@@ -93,24 +93,24 @@ def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
 
 
 @kernel
-def smallest_but(values: NDArray[np.int32], size: int, count: int) -> int:
+def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
     """Least number that at least `count` of the first `size` values, shape (room,), do not exceed.
 
     By bisection: reading an array 20 times takes no longer than partitioning a copy, and compiles in no time.
     """
-    low, high = np.int32(INFINITE), np.int32(-INFINITE)
+    low, high = INFINITE, -INFINITE
     for k in range(size):
         low, high = min(low, values[k]), max(high, values[k])
     while low < high:
-        middle = np.int32((low + high) >> 1)
+        middle = (low + high) >> 1
         below = 0
         for k in range(size):
             below += values[k] <= middle
         if below >= count:
             high = middle
         else:
-            low = np.int32(middle + 1)
-    return int(low)
+            low = middle + 1
+    return low
 
 
 @kernel

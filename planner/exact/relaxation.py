@@ -1,7 +1,5 @@
 """Compiled kernels that fill a table of `planner.exact.table`, and follow a best tour in it."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,12 +9,6 @@ from planner.exact.instance import Instance
 from planner.exact.table import INFINITE, Table
 
 SLICE = 1 << 13  # rows that are filled between looks at the clock: some 5 ms
-
-
-@kernel
-def add(a: Any, b: Any) -> Any:
-    """Sum in 32 bits; numba would widen it to 64, which halves the speed of vectorised loops."""
-    return np.int32(a + b)
 
 
 @kernel
@@ -72,18 +64,18 @@ def fill_rows(inst: Instance, table: Table, first: int, last: int) -> None:
     Its parts index whole arrays: to make a view of a row takes numba longer than to add it up.
     """
     n, m = inst.to_bin.shape
-    second = np.empty((m, n), np.int32)  # W with its pick, [d, j]; infinite where j cannot be picked
-    only = np.empty((1, n), np.int32)  # Y with its pick; the same
-    carrying, empty = np.empty((m, m), np.int32), np.empty((m, 1), np.int32)
+    second = np.empty((m, n), np.int64)  # W with its pick, [d, j]; infinite where j cannot be picked
+    only = np.empty((1, n), np.int64)  # Y with its pick; the same
+    carrying, empty = np.empty((m, m), np.int64), np.empty((m, 1), np.int64)
     left = left_of(table, first)
     for row in range(first, last):
         _picked(inst, table, left, row, second, only)
         _least_sums(inst.from_bin, only, empty)
         _least_sums(inst.from_bin, second, carrying)
         for d in range(m):
-            e = empty[d, 0] if row else np.int32(0)
+            e = empty[d, 0] if row else 0
             for b in range(m):
-                table.bin[row, b, d] = min(add(inst.bins[b, d], e), carrying[b, d])
+                table.bin[row, b, d] = min(inst.bins[b, d] + e, carrying[b, d])
             table.bin[row, d, d] = e
         _holding(inst, table, left, row, second)
         count_on(table, left)
@@ -95,8 +87,8 @@ def _picked(
     table: Table,
     left: NDArray[np.int64],
     row: int,
-    second: NDArray[np.int32],
-    only: NDArray[np.int32],
+    second: NDArray[np.int64],
+    only: NDArray[np.int64],
 ) -> None:
     """W (second, [d, j]) and Y (only, [0, j]), with the pick, of every object j in a row."""
     n, m = inst.to_bin.shape
@@ -107,27 +99,27 @@ def _picked(
                 second[d, j] = INFINITE
             continue
         after, price, c = row - table.stride[j], table.multipliers[j], inst.home[j]
-        only[0, j] = add(table.object[after, j], price)
-        last = add(inst.to_bin[j, c], price)
+        only[0, j] = table.object[after, j] + price
+        last = inst.to_bin[j, c] + price
         for d in range(m):
-            other_first = add(add(inst.to_bin[j, d], price), table.bin[after, d, c])
-            second[d, j] = min(other_first, add(last, table.bin[after, c, d]))
+            other_first = inst.to_bin[j, d] + price + table.bin[after, d, c]
+            second[d, j] = min(other_first, last + table.bin[after, c, d])
 
 
 @kernel
-def _least_sums(a: NDArray[np.int32], b: NDArray[np.int32], sums: NDArray[np.int32]) -> None:
+def _least_sums(a: NDArray[np.int64], b: NDArray[np.int64], sums: NDArray[np.int64]) -> None:
     """Least sum of each row of `a` (p, n) and each row of `b` (q, n), entry by entry, into `sums` (p, q)."""
     for q in range(b.shape[0]):
         for p in range(a.shape[0]):
-            best: Any = np.int32(INFINITE)
+            best = INFINITE
             for k in range(a.shape[1]):
-                best = min(best, add(a[p, k], b[q, k]))
+                best = min(best, a[p, k] + b[q, k])
             sums[p, q] = best
 
 
 @kernel
 def _holding(
-    inst: Instance, table: Table, left: NDArray[np.int64], row: int, second: NDArray[np.int32]
+    inst: Instance, table: Table, left: NDArray[np.int64], row: int, second: NDArray[np.int64]
 ) -> None:
     """Y of the objects of which some of the group were picked."""
     n = inst.to_bin.shape[0]
@@ -135,9 +127,9 @@ def _holding(
         if left[table.group[i]] == table.size[table.group[i]]:
             continue
         c = inst.home[i]
-        best = add(inst.to_bin[i, c], table.bin[row, c, c])
+        best = inst.to_bin[i, c] + table.bin[row, c, c]
         for k in range(n):  # no object follows itself, as `between` is infinite there
-            best = min(best, add(inst.between[i, k], second[c, k]))
+            best = min(best, inst.between[i, k] + second[c, k])
         table.object[row, i] = best
 
 
@@ -147,8 +139,8 @@ def choose(
     table: Table,
     row: int,
     at: int,
-    to_object: NDArray[np.int32],
-    to_bin: NDArray[np.int32],
+    to_object: NDArray[np.int64],
+    to_bin: NDArray[np.int64],
     first: int,
     second: int,
 ) -> tuple[int, int]:

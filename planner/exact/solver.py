@@ -5,9 +5,6 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from planner.certificate import Certificate, Proof
 from planner.exact.deadline import Deadline
 from planner.exact.full_table import SMALL_TABLE, Solution, by_table, full_table_bytes
@@ -19,13 +16,13 @@ from planner.greedy_solver import GreedySolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
-from planner.tour import integer_distances, integer_metric, is_metric, make_plan
+from planner.tour import make_plan, with_bound
 
-TABLE_RATE = 250e6  # bytes of a full table filled per second, roughly
+TABLE_RATE = 500e6  # bytes of a full table filled per second, roughly
 DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables; for sessions, which plan often
 GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
 PROVABLE = 14  # objects; that search proves no more of them
-MAX_LENGTH = 1 << 27  # units; tours beyond this would overflow 32 bits
+MAX_OBJECTS = 40  # of any proof but the spanning tree
 
 
 @dataclass(frozen=True)
@@ -41,7 +38,7 @@ class ExactSolver:
     """
 
     name: str = "exact"
-    table_bytes: int = 1 << 26  # 18 objects and 6 bins: 0.2 s
+    table_bytes: int = 1 << 27  # 18 objects and 6 bins: 0.2 s
     passes: tuple[tuple[int, int], ...] = (
         (1, 3_000),
         (1_000, 20_000),
@@ -91,16 +88,9 @@ class ExactSolver:
                 best = plan
                 yield plan
 
-    def applies(self, problem: RoutingProblem, metric: NDArray[np.int64]) -> bool:
-        """Whether table and search apply: capacity two, up to 40 objects, true distances.
-
-        Args:
-            problem: What is to be solved.
-            metric: Its distances, units of 0.1 mm, closed to a metric, (k, k).
-        """
-        n = len(problem.shipments)
-        small = n <= 40 and int(metric.max()) * (2 * n + 2) <= MAX_LENGTH
-        return problem.capacity == 2 and small and is_metric(problem.distances, metric)
+    def applies(self, problem: RoutingProblem) -> bool:
+        """Whether table and search apply: capacity two, up to 40 objects, true distances."""
+        return problem.capacity == 2 and len(problem.shipments) <= MAX_OBJECTS and problem.integers.is_metric
 
     def table_fits(self, instance: Instance) -> bool:
         """Whether the full table is small enough."""
@@ -117,49 +107,45 @@ class ExactSolver:
     ) -> Iterator[Plan]:
         """Better and better plans; only one where a table is filled at once."""
         started = time.perf_counter()
-        metric = integer_metric(problem.distances)
-        if not self.applies(problem, metric):
+        if not self.applies(problem):
             if not table_at_once:
                 yield GreedySolver().solve(problem)
-            yield self._general(problem, metric, seed, limit, started)
+            yield self._general(problem, seed, limit, started)
             return
+        metric = problem.integers.metric
         instance = make_instance(problem, metric)
         seconds = math.inf if limit.seconds is None else limit.seconds
         size = full_table_bytes(instance)
         tabled = size <= min(self.table_bytes, seconds * TABLE_RATE)
+        n = len(problem.shipments)
         if tabled and (table_at_once or size <= SMALL_TABLE):
             found: Iterable[Solution] = [by_table(instance)]
         else:
-            start = None if warm is None else warm.numbered(problem.names[: len(problem.shipments)])
+            start = None if warm is None else warm.numbered(problem.names[:n], instance.unit)
             found = self._search(instance, seed, limit, started, tabled=tabled, start=start)
-        n = len(problem.shipments)
         for solution in found:
             visits = to_visits(instance, solution.actions, problem.names[:n], problem.names[n:])
             yield make_plan(problem, metric, visits, solution.bound, started, solution.certificate)
 
-    def _general(
-        self, problem: RoutingProblem, metric: NDArray[np.int64], seed: int, limit: SolveLimit, started: float
-    ) -> Plan:
-        """Any capacity and any distances: proven for a few objects, else OR-Tools with the bound reached."""
-        legs = metric if is_metric(problem.distances, metric) else integer_distances(problem.distances)
-        # Half of the time for a proof where one is likely; the rest for a tour.
-        share = 0.5 if len(problem.shipments) <= PROVABLE else 0.05
-        at = None if limit.seconds is None else started + limit.seconds * share
-        found = best_first(problem, legs, metric, GENERAL_STATES, Deadline(at, limit.stop))
-        certificate = Certificate(Proof.EXHAUSTIVE, found.bound)
-        visits, other = found.visits, None
-        if visits is None:
-            from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
+    def _general(self, problem: RoutingProblem, seed: int, limit: SolveLimit, started: float) -> Plan:
+        """Any capacity and any distances: proven for a few objects, else OR-Tools with the best bound there is."""
+        deadline = math.inf if limit.seconds is None else started + limit.seconds
+        tried = None
+        if len(problem.shipments) <= MAX_OBJECTS:
+            # Half of the time for a proof where one is likely; the rest for a tour.
+            share = 0.5 if len(problem.shipments) <= PROVABLE else 0.05
+            at = None if limit.seconds is None else started + limit.seconds * share
+            tried = best_first(problem, GENERAL_STATES, Deadline(at, limit.stop))
+            certificate = Certificate(Proof.EXHAUSTIVE, problem.integers.unit, 0)
+            if tried.visits is not None:
+                return with_bound(problem, tried.visits, tried.bound, started, certificate)
+        from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
 
-            left = (
-                None if limit.seconds is None else max(0.001, started + limit.seconds - time.perf_counter())
-            )
-            other = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=left))
-            visits = list(other.visits)
-        plan = make_plan(problem, legs, visits, found.bound, started, certificate)
-        if other is not None and other.lower_bound > plan.lower_bound:
-            return replace(other, seconds=plan.seconds)
-        return plan
+        left = None if limit.seconds is None else max(0.001, deadline - time.perf_counter())
+        other = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=left))
+        if tried is None or other.lower_bound >= tried.bound:
+            return replace(other, seconds=time.perf_counter() - started)
+        return with_bound(problem, other.visits, tried.bound, started, certificate)
 
     def _search(
         self,

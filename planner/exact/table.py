@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from planner.exact.instance import Instance
 
-INFINITE = 1 << 29
+INFINITE = 1 << 60  # longer than any sum of lengths
 
 
 class Table(NamedTuple):
@@ -36,17 +36,17 @@ class Table(NamedTuple):
         group: Group of each object, numbered from 0, (n,) int64.
         size: How many objects each group has, (groups,) int64.
         stride: By how many rows picking an object goes down, (n,) int64.
-        bin: E and V, (rows, m, m) int32, entry [b, d].
-        object: Y, (rows, n) int32; only where not all of the group of object i are left.
-        multipliers: Price of a pick, (n,) int32.
+        bin: E and V, (rows, m, m) int64, entry [b, d].
+        object: Y, (rows, n) int64; only where not all of the group of object i are left.
+        multipliers: Price of a pick, (n,) int64.
     """
 
     group: NDArray[np.int64]
     size: NDArray[np.int64]
     stride: NDArray[np.int64]
-    bin: NDArray[np.int32]
-    object: NDArray[np.int32]
-    multipliers: NDArray[np.int32]
+    bin: NDArray[np.int64]
+    object: NDArray[np.int64]
+    multipliers: NDArray[np.int64]
 
 
 def rows_of(group: NDArray[np.int64]) -> int:
@@ -70,13 +70,13 @@ def new_table(inst: Instance, group: NDArray[np.int64]) -> Table:
         group,
         size,
         below[:-1][group] if n else group,
-        np.empty((rows, m, m), np.int32),
-        np.empty((rows, n), np.int32),
-        np.zeros(n, np.int32),
+        np.empty((rows, m, m), np.int64),
+        np.empty((rows, n), np.int64),
+        np.zeros(n, np.int64),
     )
 
 
 def table_bytes(inst: Instance, rows: int) -> int:
     """Memory of a table."""
     n, m = inst.to_bin.shape
-    return int(4 * (m * m + n) * rows)
+    return int(8 * (m * m + n) * rows)

@@ -85,8 +85,8 @@ def costs_by_pass(
         if states > max_states:
             return None
         here, after = after, new_nodes(FIRST_ROOM)
-    rest = [np.zeros(0, np.int32)] * (n + 1)
-    beyond, nothing = here, np.zeros(0, np.int32)
+    rest = [np.zeros(0, np.int64)] * (n + 1)
+    beyond, nothing = here, np.zeros(0, np.int64)
     for k in range(n, -1, -1):
         after, after_rest = (layers[k + 1], rest[k + 1]) if k < n else (beyond, nothing)
         rest[k] = sweep(instance, layers[k], after, after_rest)
@@ -96,7 +96,7 @@ def costs_by_pass(
 
 
 @kernel
-def look_up(nodes: Nodes, rest: NDArray[np.int32], left: int, place: int) -> int:
+def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int:
     """Length of the rest of the task from a state; `INFINITE` if it is not among the nodes.
 
     `rest` is that length, units, for each of the nodes, shape (states,).
@@ -107,7 +107,7 @@ def look_up(nodes: Nodes, rest: NDArray[np.int32], left: int, place: int) -> int
 
 @kernel
 def after_second(
-    inst: Instance, after: Nodes, after_rest: NDArray[np.int32], left: int, j: int, d: int
+    inst: Instance, after: Nodes, after_rest: NDArray[np.int64], left: int, j: int, d: int
 ) -> int:
     """Length of the rest from object j, just picked, with one for d in hand too, units.
 
@@ -121,14 +121,14 @@ def after_second(
 
 
 @kernel
-def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int32]) -> NDArray[np.int32]:
+def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int64]) -> NDArray[np.int64]:
     """Length of the rest of the task from each state of a layer, given those of the next layer.
 
     Both are in units, shape (states of the layer,).
     """
     n, m = inst.to_bin.shape
     size = here.size[0]
-    rest = np.full(size, INFINITE, np.int32)
+    rest = np.full(size, INFINITE, np.int64)
     for k in range(size):  # at a bin with empty hands
         place = here.key[k] & ((1 << PLACE_BITS) - 1)
         b, left = place // m, here.key[k] >> PLACE_BITS
@@ -159,7 +159,7 @@ def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int3
 
 @kernel
 def root_costs(
-    inst: Instance, here: Nodes, rest: NDArray[np.int32], after: Nodes, after_rest: NDArray[np.int32]
+    inst: Instance, here: Nodes, rest: NDArray[np.int64], after: Nodes, after_rest: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Length of the task by next action: places of what is carried, then picks if a hand is free.
 

@@ -17,7 +17,7 @@ from planner.exact.instance import FAR, Instance, make_instance, to_visits
 from planner.exact.table import Table
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
-from planner.tour import integer_distances, integer_metric, make_plan
+from planner.tour import make_plan
 
 if TYPE_CHECKING:
     from planner.exact.solver import ExactSolver
@@ -32,6 +32,7 @@ class TableState(NamedTuple):
         row: Row of the objects left.
         names: Of the objects of the instance.
         metric: Integer distances between the locations of the present problem, consistent with the table, (k, k).
+        unit: Of these, m.
     """
 
     instance: Instance
@@ -39,12 +40,12 @@ class TableState(NamedTuple):
     row: int
     names: tuple[str, ...]
     metric: NDArray[np.int64]
+    unit: float
 
 
 @dataclass(frozen=True, eq=False)
 class _Filled:
     problem: RoutingProblem
-    metric: NDArray[np.int64]
     instance: Instance
     table: Table
 
@@ -68,39 +69,38 @@ class TaskTable:
             return None
         length, actions = follow_table(state.instance, state.table, state.row)
         visits = to_visits(state.instance, actions, state.names, problem.names[len(problem.shipments) :])
-        return make_plan(
-            problem, state.metric, visits, length, started, Certificate(Proof.FULL_TABLE, length)
-        )
+        certificate = Certificate(Proof.FULL_TABLE, state.unit, length)
+        return make_plan(problem, state.metric, visits, length, started, certificate)
 
-    def costs(self, problem: RoutingProblem) -> dict[Visit, int] | None:
-        """Length of the rest of the task, units, by possible next visit; None as for `plan`."""
+    def costs(self, problem: RoutingProblem) -> tuple[dict[Visit, int], float] | None:
+        """Length of the rest of the task, units, and the unit, m, by possible next visit; None as for `plan`."""
         from planner.exact.table_regret import costs_in  # brings the compiled kernels
 
         state = self._at(problem)
         if state is None:
             return None
         carried = problem.names[len(problem.shipments) :]
-        return costs_in(state.instance, state.table, state.row, state.names, carried)
+        return costs_in(state.instance, state.table, state.row, state.names, carried), state.unit
 
     def _at(self, problem: RoutingProblem) -> TableState | None:
         """The state of a problem in the table that is there, or in a new one."""
         state = _state(self._filled, problem) if self._filled is not None else None
         if state is not None:
             return state
-        metric = integer_metric(problem.distances)
-        if not self._solver.applies(problem, metric):
+        if not self._solver.applies(problem):
             return None
-        instance = make_instance(problem, metric)
+        instance = make_instance(problem, problem.integers.metric)
         if not self._solver.table_fits(instance):
             return None
-        self._filled = _Filled(problem, metric, instance, filled_table(instance))
+        self._filled = _Filled(problem, instance, filled_table(instance))
         return _state(self._filled, problem)
 
 
 def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
     """A problem's state in a table that was filled for another one; None if it is not among its states."""
     before, n = filled.problem, len(problem.shipments)
-    if problem.capacity != before.capacity or not set(problem.names) <= set(before.names):
+    same_kind = (problem.capacity, problem.resolution) == (before.capacity, before.resolution)
+    if not same_kind or not set(problem.names) <= set(before.names):
         return None
     left = [before.number[name] for name in problem.names[:n]]
     if any(k >= len(before.shipments) for k in left):
@@ -113,21 +113,26 @@ def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
     metric = _metric(filled, problem, here, there)
     bins = sorted({s.delivery for s in before.shipments} | set(before.onboard))
     bin_of = [bins.index(before.location(visit)) for visit in places]
-    root, root_bin = np.full_like(filled.instance.root, FAR), np.full_like(filled.instance.root_bin, FAR)
+    root, root_bin = (
+        np.full_like(filled.instance.root, FAR),
+        np.full_like(filled.instance.root_bin, FAR),
+    )
     root[left] = metric[problem.start, here[:n]]
     root_bin[bin_of] = metric[problem.start, here[n:]]
     instance = filled.instance._replace(
         root=root, root_bin=root_bin, carried=np.array(bin_of[n:], dtype=np.int64)
     )
     names = before.names[: len(before.shipments)]
-    return TableState(instance, filled.table, sum(1 << k for k in left), names, metric)
+    return TableState(instance, filled.table, sum(1 << k for k in left), names, metric, before.integers.unit)
 
 
 def _metric(filled: _Filled, problem: RoutingProblem, here: list[int], there: list[int]) -> NDArray[np.int64]:
     """The metric of the table between locations of the present problem, with the present start."""
     metric = np.zeros(problem.distances.shape, np.int64)
-    metric[np.ix_(here, here)] = filled.metric[np.ix_(there, there)]
+    metric[np.ix_(here, here)] = filled.problem.integers.metric[np.ix_(there, there)]
     if here and problem.start not in here:
-        direct = integer_distances(problem.distances)[problem.start, here]
+        direct = np.rint(problem.distances[problem.start, here] / filled.problem.integers.unit).astype(
+            np.int64
+        )
         metric[problem.start, here] = (direct[:, None] + metric[np.ix_(here, here)]).min(axis=0)
     return metric

@@ -22,13 +22,13 @@ class Start(NamedTuple):
 
     Attributes:
         group: Group of each object, numbered from 0, (n,) int64.
-        multipliers: Price of picking each object, units, (n,) int32.
+        multipliers: Price of picking each object, units, (n,) int64.
         order: Numbers of objects in the order of a good tour.
         missing: Numbers of the objects that are not in the order.
     """
 
     group: NDArray[np.int64]
-    multipliers: NDArray[np.int32]
+    multipliers: NDArray[np.int64]
     order: list[int]
     missing: list[int]
 
@@ -38,12 +38,12 @@ class WarmStart:
     """What earlier plans tell about objects, by name.
 
     Attributes:
-        multipliers: Price of picking an object in the relaxation, units.
+        multipliers: Price of picking an object in the relaxation, m.
         groups: Objects that the relaxation counts together.
         order: Objects in the order in which a good tour may pick them.
     """
 
-    multipliers: Mapping[str, int]
+    multipliers: Mapping[str, float]
     groups: tuple[tuple[str, ...], ...] = ()
     order: tuple[str, ...] = ()
 
@@ -54,16 +54,21 @@ class WarmStart:
         if certificate is None or certificate.proof is not Proof.RELAXATION:
             return WarmStart(self.multipliers, self.groups, order)
         names = problem.names
-        new = {names[k]: price for k, price in enumerate(certificate.multipliers)}
+        new = {names[k]: price * certificate.unit for k, price in enumerate(certificate.multipliers)}
         groups = tuple(tuple(names[k] for k in members) for members in certificate.groups)
         return WarmStart({**self.multipliers, **new}, groups, order)
 
-    def numbered(self, names: Sequence[str]) -> Start | None:
+    def numbered(self, names: Sequence[str], unit: float) -> Start | None:
         """Renumbered for an instance of the objects of these names; None where no multiplier of them is known.
 
         An object that is new costs the average and joins the first group.
+
+        Args:
+            names: Of the objects, in the order of the instance.
+            unit: Of the instance, m.
         """
-        found = [self.multipliers[name] for name in names if name in self.multipliers]
+        prices = {name: round(price / unit) for name, price in self.multipliers.items()}
+        found = [prices[name] for name in names if name in prices]
         if not found:
             return None
         average = sum(found) // len(found)
@@ -74,7 +79,7 @@ class WarmStart:
         order = [number[name] for name in self.order if name in number]
         return Start(
             numbered(group),
-            np.array([self.multipliers.get(name, average) for name in names], np.int32),
+            np.array([prices.get(name, average) for name in names], np.int64),
             order,
             sorted(set(range(len(names))) - set(order)),
         )

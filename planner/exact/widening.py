@@ -44,7 +44,7 @@ def widening(
     for rows, wanted in passes:
         # A pass that is given up proves nothing, and one hardly wider than the last proves little more.
         width = min(wanted, work // rate)
-        if lower >= upper or width < min(wanted, done + 1) or deadline.over():
+        if lower >= upper - instance.tie or width < min(wanted, done + 1) or deadline.over():
             break
         if rows >= BIN_ROWS and not by_bin:  # once: later, the bound has outgrown so few rows
             bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
@@ -83,4 +83,6 @@ def _first_tour(
 def _certificate(bound: Bound) -> Certificate:
     table = bound.table
     groups = tuple(tuple(np.flatnonzero(table.group == g).tolist()) for g in range(len(table.size)))
-    return Certificate(Proof.RELAXATION, bound.root, groups, tuple(table.multipliers.tolist()))
+    return Certificate(
+        Proof.RELAXATION, bound.instance.unit, bound.root, groups, tuple(table.multipliers.tolist())
+    )
