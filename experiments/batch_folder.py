@@ -16,7 +16,7 @@ from typing import Any
 
 from experiments import records
 from experiments.checksums import read_checksums, sha256_of
-from experiments.design import confounded_rows
+from experiments.design import confounded_rows, counted
 from experiments.endings import COMPLETE
 from experiments.errors import RecordError
 from experiments.files import read_arrays, read_json
@@ -136,18 +136,18 @@ def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) ->
     early = [trial for trial in trials if not trial.complete]
     if early:
         yield (
-            f"{len(early)} trials ended early and are left out of the tables, such as {early[0].path.name}: "
-            f"{early[0].row['ended']}"
+            f"left out of the tables as it ended early: {counted(len(early), 'trial')}, such as {early[0].path.name} "
+            f"({early[0].row['ended']})"
         )
     trials = [trial for trial in trials if trial.complete]
     edited = [trial.path.name for trial in trials if not trial.as_measured]
     if edited:
         yield (
-            f"{len(edited)} metrics.json are not what their logs say, such as that of {edited[0]}; "
+            f"metrics.json is not what the log says in {counted(len(edited), 'trial')}, such as {edited[0]}; "
             "the tables hold what the logs say"
         )
     if unusable:
-        yield f"{len(unusable)} trials are left out of the tables: {next(iter(unusable.values()))}"
+        yield f"left out of the tables: {counted(len(unusable), 'trial')}, such as: {next(iter(unusable.values()))}"
     makes = {json.dumps({k: v for k, v in t.inputs.items() if not _is_of_the_design(k)}) for t in trials}
     if len(makes) > 1:
         yield (

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.batch_folder import OUTDATED, StoredTrial, put_aside, read_trials, trial_name
+from experiments.design import counted
 from experiments.errors import ConfigError
 from experiments.fingerprint import Inputs, changes, trial_inputs
 from experiments.house import House
@@ -83,7 +84,7 @@ def _why_again(trial: StoredTrial, inputs: Inputs) -> str:
 def _notes(reasons: Counter[str], out: Path) -> Iterable[str]:
     if reasons:
         why = "; ".join(f"{reason} ({count})" for reason, count in reasons.most_common(SHOWN))
-        yield f"{reasons.total()} trials are run again: {why}; what was complete is kept in {out / OUTDATED}"
+        yield f"run again: {counted(reasons.total(), 'trial')}: {why}; what was complete is kept in {out / OUTDATED}"
 
 
 def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:

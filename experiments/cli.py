@@ -11,7 +11,7 @@ from experiments.failures import USAGE_ERROR, drop_output, end_with
 from experiments.signals import exit_code, signal_of, signals_raised
 from mjsim.gl_choice import postpone_gl
 
-COMMANDS = ("run", "replay", "batch", "plan", "house", "check", "gallery", "bench", "doctor")
+COMMANDS = ("run", "replay", "batch", "compare", "plan", "house", "check", "gallery", "bench", "doctor")
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
@@ -25,6 +25,8 @@ examples:
       film one assisted trial, with metrics, event log and floor plan
   mjsim batch --objects 6,12 --assistance none,highlight,optimal --seeds 0:10 --out runs/batch
       run a factorial design on all cores; the same command continues after an interruption
+  mjsim compare runs/batch
+      compare its assistance conditions, paired by seed, with effect sizes
   mjsim house --objects 12 --seed 3 --out house.xml
       write a disorganized house as MJCF for stock MuJoCo
   mjsim check my_house/catalogue.toml --picture faults.png

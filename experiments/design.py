@@ -219,6 +219,11 @@ def numbers(text: int | list[int] | str) -> list[int]:
     return values
 
 
+def counted(number: int, noun: str) -> str:
+    """`1 trial`, `2 trials`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def confounded(trials: Sequence[TrialConfig]) -> str | None:
     """One line on what differs between the assistance conditions besides the assistance; None if nothing does."""
     return confounded_rows([trial.settings() for trial in trials])

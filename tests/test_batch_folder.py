@@ -64,7 +64,7 @@ def test_an_edited_participant_is_run_again_and_the_old_trial_is_kept(house, tmp
     write_participant(tmp_path, "A = 2")  # in a module that the participant imports
     count, (note,) = run_missing(trials, tmp_path / "b", house)
     assert count == 1
-    assert note.startswith("1 trials are run again") and "module own_person changed" in note
+    assert note.startswith("run again: 1 trial:") and "module own_person changed" in note
     assert [read_trial(path).settings["user"] for path in (tmp_path / "b/outdated").iterdir()] == [
         "own_person:build"
     ]
@@ -100,7 +100,7 @@ def test_a_moved_house_is_the_same_and_an_edited_one_is_not(small_house, tmp_pat
     with (tmp_path / "home/cube.xml").open("a") as file:
         file.write("<!-- edited -->")
     count, (note,) = run_missing([brief(house=home, points=4)], tmp_path / "b")
-    assert count == 1 and "again: house changed (1);" in note
+    assert count == 1 and "run again: 1 trial: house changed (1);" in note
 
 
 def test_another_command_adds_to_the_folder(house, tmp_path):

@@ -1,0 +1,221 @@
+"""Assistance conditions compared on the trials of a batch: pairs that differ in nothing but the assistance.
+
+The effect size of a pair of conditions is d_z, the mean difference over the standard deviation of the differences.
+Its confidence interval inverts the noncentral t distribution (Cumming and Finch 2001, doi:10.1177/0013164401614002);
+that of the mean difference is Student's.
+"""
+
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.stats import nct, t
+
+from experiments.design import counted
+from experiments.errors import ConfigError, RecordError
+from experiments.table import NAME
+from experiments.trial_config import SEEDS
+
+METRICS = ("completion_time_s", "task_distance_m", "ipl_stand", "nd_feasible", "total_regret_m")
+CIRCUMSTANCES = (
+    "objects",
+    "user",
+    "house",
+    "planner",
+    "fidelity",
+    "points",
+    "capacity",
+    "time_limit",
+    "episode",
+)
+CONFIDENCE = 0.95
+SHOWN_SEEDS = 5
+STEPS = 12  # standard errors in which the bound of an effect size is looked for
+
+Row = Mapping[str, Any]
+Interval = tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Block:
+    """Trials under the same circumstances: seeds -> row, by assistance condition.
+
+    Attributes:
+        label: What sets it apart from the other blocks of the batch.
+        rows: Condition -> the three seeds and the values of the person -> row.
+    """
+
+    label: str
+    rows: Mapping[str, Mapping[tuple[Any, ...], Row]]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Two conditions compared in one metric.
+
+    Attributes:
+        block: Label of the circumstances.
+        metric: Name of the column.
+        conditions: The two.
+        pairs: Number of pairs in which the metric is known.
+        means: Mean of the pairs under either condition.
+        difference: Mean of second minus first.
+        interval: Its 95 % confidence interval; None for fewer than two pairs.
+        effect: Mean difference in standard deviations of the differences, d_z; None where they do not vary.
+        effect_interval: Its 95 % confidence interval, or None.
+        p: Of the paired t test, two-sided; None where the differences do not vary.
+    """
+
+    block: str
+    metric: str
+    conditions: tuple[str, str]
+    pairs: int
+    means: tuple[float, float]
+    difference: float
+    interval: Interval
+    effect: float | None
+    effect_interval: Interval
+    p: float | None
+
+
+def read_blocks(folder: Path) -> list[Block]:
+    """The trials of a batch by circumstances, in the order of its table.
+
+    Raises:
+        RecordError: The folder has no table of trials, or one of another version.
+        ConfigError: It holds one assistance condition only.
+    """
+    path = folder / f"{NAME}.parquet"
+    try:
+        rows = pq.read_table(path).to_pylist()
+    except (OSError, ValueError) as error:
+        raise RecordError(f"{folder} is not a batch: {path} cannot be read ({error})") from error
+    missing = [name for name in ("assistance", *SEEDS, *CIRCUMSTANCES) if rows and name not in rows[0]]
+    if missing:
+        raise RecordError(f"{path} was written by another version: it has no {', '.join(missing)}")
+    if len({row["assistance"] for row in rows}) < 2:
+        raise ConfigError(f"{folder} holds fewer than two assistance conditions; there is nothing to compare")
+    # Somebody else with the same seed is no pair.
+    identity = (*SEEDS, *(name for name in rows[0] if name.startswith("person_") and name not in SEEDS))
+    varying = [name for name in CIRCUMSTANCES if len({row[name] for row in rows}) > 1]
+    blocks: dict[str, dict[str, dict[tuple[Any, ...], Row]]] = defaultdict(lambda: defaultdict(dict))
+    for row in rows:
+        # The time limit follows from the number of objects where none was given.
+        label = ", ".join(f"{n} {row[n]}" for n in varying if n != "time_limit" or "objects" not in varying)
+        blocks[label][row["assistance"]][tuple(row[name] for name in identity)] = row
+    return [Block(label, conditions) for label, conditions in blocks.items()]
+
+
+def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
+    """A line for every two conditions that do not have the same trials otherwise."""
+    conditions = list(dict.fromkeys(name for block in blocks for name in block.rows))
+    for block in blocks:
+        where = f"{block.label}: " if block.label else ""
+        for one, other in itertools.combinations(conditions, 2):
+            here, there = set(block.rows.get(one, {})), set(block.rows.get(other, {}))
+            if not here & there:
+                yield f"{where}no trial of {one} has the same circumstances and seeds as one of {other}"
+            elif here != there:
+                lone = sorted(here ^ there)
+                seeds = ", ".join(
+                    "/".join(map(str, dict.fromkeys(s[: len(SEEDS)]))) for s in lone[:SHOWN_SEEDS]
+                )
+                yield f"{where}without a counterpart in {one} or {other}: {counted(len(lone), 'trial')}, seeds {seeds}"
+
+
+def compare(blocks: Sequence[Block], metrics: Sequence[str] = METRICS) -> list[Difference]:
+    """Every two conditions in every metric, on the pairs that are complete.
+
+    Raises:
+        ConfigError: A metric is no number of the tables, or there is no pair at all.
+    """
+    first = next(row for block in blocks for rows in block.rows.values() for row in rows.values())
+    for name in metrics:
+        if name not in first or isinstance(first[name], str | bool):
+            known = ", ".join(
+                n for n, v in first.items() if isinstance(v, int | float) and not isinstance(v, bool)
+            )
+            raise ConfigError(f"no metric {name!r}; there are {known}")
+    found = [
+        difference
+        for block in blocks
+        for metric in metrics
+        for pair in itertools.combinations(block.rows, 2)
+        if (difference := _compare(block, metric, pair)) is not None
+    ]
+    if not found:
+        raise ConfigError(
+            f"there are no pairs to compare: {next(missing_pairs(blocks), 'no metric is known')}"
+        )
+    return found
+
+
+def _compare(block: Block, metric: str, conditions: tuple[str, str]) -> Difference | None:
+    one, other = (block.rows[name] for name in conditions)
+    values = np.array(
+        [
+            (one[seeds][metric], other[seeds][metric])
+            for seeds in sorted(one.keys() & other.keys())
+            if one[seeds][metric] is not None and other[seeds][metric] is not None
+        ],
+        float,
+    )
+    if not len(values):
+        return None
+    gaps = values[:, 1] - values[:, 0]
+    means = values.mean(axis=0)
+    return Difference(
+        block.label,
+        metric,
+        conditions,
+        len(gaps),
+        (float(means[0]), float(means[1])),
+        float(gaps.mean()),
+        mean_interval(gaps),
+        *_effect(gaps),
+    )
+
+
+def mean_interval(values: NDArray[np.float64]) -> Interval:
+    """Student's 95 % confidence interval of the mean of values (n,); None for fewer than two."""
+    if len(values) < 2:
+        return None
+    half = float(t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
+    return float(values.mean()) - half, float(values.mean()) + half
+
+
+def _effect(gaps: NDArray[np.float64]) -> tuple[float | None, Interval, float | None]:
+    """d_z, its confidence interval, and the p of the paired t test, from differences (n,)."""
+    count = len(gaps)
+    spread = float(gaps.std(ddof=1)) if count > 1 else 0.0
+    if spread <= 1e-12 * max(1.0, float(np.abs(gaps).max())):
+        return None, None, None
+    effect, root = float(gaps.mean()) / spread, math.sqrt(count)
+    statistic, freedom = effect * root, count - 1
+    bounds = [
+        _noncentrality(statistic, freedom, share) for share in (0.5 + CONFIDENCE / 2, 0.5 - CONFIDENCE / 2)
+    ]
+    interval = None if None in bounds else (float(bounds[0] or 0.0) / root, float(bounds[1] or 0.0) / root)
+    return effect, interval, float(2 * t.sf(abs(statistic), freedom))
+
+
+def _noncentrality(statistic: float, freedom: int, share: float) -> float | None:
+    """The noncentrality with which a share of the distribution lies below the statistic; None where none is found."""
+
+    def excess(center: float) -> float:
+        return float(nct.cdf(statistic, freedom, center)) - share
+
+    # Widened step by step: far away from the statistic, scipy's values are not numbers.
+    step = math.sqrt(1.0 + statistic**2 / (2 * freedom))
+    for width in step * np.arange(1.0, STEPS):
+        if excess(statistic - width) > 0 > excess(statistic + width):
+            return float(brentq(excess, statistic - width, statistic + width))
+    return None

@@ -1,0 +1,63 @@
+"""Figure of a comparison: every pair as a line, and the mean of each condition with its confidence interval."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from experiments.analysis.comparison import Block, mean_interval
+from mjsim.files import replacing
+
+FORMATS = (".png", ".svg", ".pdf")
+PANEL = (2.6, 2.4)  # inches
+PAIR, MEAN = "#9AA5B1", "#0072B2"
+
+
+def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str]) -> None:
+    """Write the figure: a row of panels per block, a panel per metric. The suffix of `path` says the format."""
+    size = PANEL[0] * len(metrics), PANEL[1] * len(blocks) + 0.3
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(len(blocks), len(metrics), squeeze=False)
+    for block, row in zip(blocks, panels, strict=True):
+        for metric, axes in zip(metrics, row, strict=True):
+            _draw_panel(axes, block, metric)
+        row[0].set_ylabel(block.label.replace(", ", "\n"), fontsize=8)
+    for metric, axes in zip(metrics, panels[0], strict=True):
+        axes.set_title(metric, fontsize=9)
+    with replacing(path) as temporary:
+        # No date in the file: equal batches give equal figures.
+        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix, {})
+        figure.savefig(temporary, dpi=150, metadata=metadata)
+
+
+def _draw_panel(axes: Axes, block: Block, metric: str) -> None:
+    names = list(block.rows)
+    for seeds in sorted({seeds for rows in block.rows.values() for seeds in rows}):
+        values = [block.rows[name].get(seeds, {}).get(metric) for name in names]
+        axes.plot(
+            range(len(names)),
+            [np.nan if v is None else v for v in values],
+            color=PAIR,
+            lw=0.7,
+            marker=".",
+            ms=3,
+        )
+    for place, name in enumerate(names):
+        known = np.array([row[metric] for row in block.rows[name].values() if row[metric] is not None], float)
+        if known.size:
+            low, high = mean_interval(known) or (known.mean(), known.mean())
+            axes.errorbar(
+                place,
+                known.mean(),
+                [[known.mean() - low], [high - known.mean()]],
+                fmt="o",
+                color=MEAN,
+                capsize=4,
+            )
+    axes.set_xticks(range(len(names)), names, fontsize=8)
+    axes.tick_params(axis="y", labelsize=7)
+    axes.margins(x=0.2)

@@ -1,0 +1,60 @@
+"""One participant for all conditions: it behaves as the one that makes the most of what is shown."""
+
+import numpy as np
+import pytest
+
+from experiments.house import House
+from experiments.participants import DEFAULT_PARTICIPANT, participant
+from experiments.records import EventLog
+from experiments.trial import prepare_session, trial_episode
+from experiments.trial_config import TrialConfig
+from mjsim.model.scene import compose
+
+
+@pytest.fixture(scope="module")
+def house():
+    return House.load()
+
+
+def played(house, **options):
+    """State hashes and log of a trial, without the two events that name the participant."""
+    config = TrialConfig(**{"objects": 3, "seed": 2, "fidelity": "event", "regret": False, **options})
+    log = EventLog()
+    session, world = prepare_session(
+        config, house, compose(trial_episode(config, house), house.catalogue), log
+    )
+    session.run()
+    return session.recording.state_hashes().tolist(), log.events[2:], world, session.trajectory.arrays()
+
+
+@pytest.mark.parametrize(
+    ("assistance", "user"), [("none", "searcher"), ("highlight", "nearest"), ("none-minimap", "searcher")]
+)
+def test_it_does_as_well_as_the_specialist_to_the_bit(house, assistance, user):
+    assert played(house, assistance=assistance)[:2] == played(house, assistance=assistance, user=user)[:2]
+
+
+def test_it_follows_breadcrumbs_and_never_deviates(house):
+    _, events, *_ = played(house, assistance="optimal")
+    assert not any(event["deviated"] for event in events if event["event"] == "visit")
+    assert events[-1]["reason"] == "all delivered"
+
+
+def test_it_is_the_default_and_needs_nothing():
+    assert TrialConfig(objects=6, assistance="none", seed=0).user == DEFAULT_PARTICIPANT == "follower"
+    assert participant("follower") is not participant("searcher")
+
+
+@pytest.mark.parametrize("assistance", ["none", "highlight", "optimal"])
+@pytest.mark.parametrize("fidelity", ["event", "full"])
+def test_one_hand_carries_one_object(house, assistance, fidelity):
+    """Physics, planner and participant agree: the left hand stays empty, and no attempt is refused for full hands."""
+    options = {"assistance": assistance, "fidelity": fidelity, "capacity": 1, "objects": 2}
+    _, events, world, arrays = played(house, **options, time_limit=300.0)
+    assert events[-1]["reason"] == "all delivered"
+    assert (arrays["hands"][:, 0] == -1).all() and (arrays["hands"][:, 1] >= 0).any()
+    assert not [e for e in events if e["event"] == "attempt" and e["refusal"] == "hands_full"]
+    plan = next(event for event in events if event["event"] == "plan")
+    assert [kind for kind, _ in plan["visits"]] == ["pick", "place"] * 2
+    assert np.count_nonzero(arrays["object_status"][-1] == 2) == 2
+    assert world.options.capacity == 1
