@@ -156,8 +156,8 @@ def load_run(directory: Path) -> RunRecord:
     _check_format(directory, start)
     try:
         check_event(log.split(b"\n", 1)[0])
+        episode = Episode.load(directory / records.EPISODE)
         text = (directory / records.EPISODE).read_text(encoding="utf-8")
-        episode = Episode.from_json(text)
         arrays = read_arrays(directory / records.TRAJECTORY, _layouts(len(episode.objects)))
         recorded = Recorded.load(directory / records.RECORDING)
     except (RecordError, EpisodeError, OSError, UnicodeDecodeError) as error:

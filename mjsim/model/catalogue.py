@@ -117,7 +117,7 @@ class Catalogue:
         try:
             text = path.read_text(encoding="utf-8")
             return _Reader(path, tomllib.loads(text)).catalogue(house, text)
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
             raise AssetError(f"cannot read catalogue {path}: {error}") from error
 
 

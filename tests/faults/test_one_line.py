@@ -1,0 +1,93 @@
+"""Errors end in one line with the right exit code; bugs of ours in a report."""
+
+import errno
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from experiments.cli import main
+from experiments.failures import INTERNAL_ERROR
+from faults.conftest import ROOT, one_line
+
+PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
+
+
+@pytest.fixture
+def problem(tmp_path):
+    path = tmp_path / "problem.json"
+    path.write_text(json.dumps(PROBLEM))
+    return str(path)
+
+
+def raising(error):
+    def solver(_name):
+        raise error
+
+    return solver
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (MemoryError("Unable to allocate 9 TiB"), 1, "not enough memory (Unable to allocate 9 TiB)"),
+        (OSError(errno.ENOSPC, "No space left on device", "/a"), 1, "/a: No space left on device"),
+        (ImportError("libGL.so.1: cannot open"), 1, "libGL.so.1: cannot open; `mjsim doctor`"),
+        (KeyError("x"), INTERNAL_ERROR, "internal error (KeyError: 'x')"),
+        (ValueError("two\nlines"), INTERNAL_ERROR, "internal error (ValueError: two lines)"),
+        (RecursionError("too deep"), INTERNAL_ERROR, "internal error (RecursionError: too deep)"),
+    ],
+)
+def test_an_error_is_one_line(error, code, said, problem, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr("experiments.commands.plan.solver", raising(error))
+    assert main(["plan", problem]) == code
+    line = one_line(capsys.readouterr().err)
+    assert said in line
+    reports = list((tmp_path / "state").rglob("*.txt"))
+    assert [str(path) for path in reports] == ([line.rpartition(" ")[2]] if code == INTERNAL_ERROR else [])
+
+
+def test_a_report_says_what_is_needed_and_no_secrets(problem, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("API_TOKEN", "sesame-1")
+    monkeypatch.setattr("experiments.failures.exit_code", lambda _: None)
+    with pytest.raises(SystemExit):
+        main(["plan", problem, "--no-such-token", "sesame-2"])  # argparse refuses before anything runs
+    assert main(["plan", problem + ".gone", "--planner", "greedy"]) == INTERNAL_ERROR
+    report = Path(capsys.readouterr().err.split()[-1]).read_text()
+    assert "Traceback" in report and "--planner greedy" in report and "mujoco 3." in report
+    assert "sesame" not in report
+
+
+def test_secrets_on_the_command_line_are_left_out():
+    from experiments.failures import _report_text
+
+    text = _report_text(
+        ValueError("x"), ["serve", "--api-token", "sesame", "--password=sesame", "--port", "1"]
+    )
+    assert "sesame" not in text and "--port 1" in text
+
+
+@pytest.mark.parametrize("words", [[], ["--no-such"], ["run"], ["run", "--out"], ["plan", "a", "b"], ["fly"]])
+def test_a_command_line_that_is_none(words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    assert stop.value.code == 2
+    assert "--help" in one_line(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    ("target", "code"), [("/dev/full", 1), ("| true", 141), (">&-", 0)], ids=["full", "no reader", "closed"]
+)
+def test_an_output_that_takes_nothing(target, code, problem, tmp_path):
+    redirect = target if target[0] in "|>" else f"> {target}"
+    command = f"{sys.executable} -m mjsim plan {problem} {redirect}; exit ${{PIPESTATUS[0]}}"
+    environment = {"PYTHONPATH": str(ROOT), "HOME": str(tmp_path)}
+    done = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, timeout=120, env=environment
+    )
+    assert done.returncode == code
+    assert "Traceback" not in done.stderr and len(done.stderr.splitlines()) == (target == "/dev/full")
