@@ -74,6 +74,11 @@ class Recording:
         self.checkpoints[self.step] = state
         return self._world.restore(state)
 
+    @property
+    def last_hash(self) -> int:
+        """Hash of the state recorded last."""
+        return self._state_hash[-1]
+
     def append(self) -> None:
         """Record the state before the next action."""
         self._log_size.append(self.log.size)
@@ -95,30 +100,25 @@ class Recording:
             (step - self.step for step in self._steps_given if step > self.step), default=NO_CHECKPOINT_AHEAD
         )
 
-    def save(self, path: Path, actions: NDArray[np.float64]) -> None:
-        """Write a compressed NPZ, whole or not at all.
+    def recorded(self, actions: NDArray[np.float64]) -> "Recorded":
+        """Everything so far.
 
         Args:
-            path: File to write.
             actions: The trajectory's, shape (T, 6).
         """
         count = len(actions)  # an interruption can fall between recording a step and its action
         kept = {step: state for step, state in self.checkpoints.items() if step < count}
         states = [state.physics for state in kept.values()]
-        details = [state.details_json() for state in kept.values()]
-        arrays = {
-            "state_hash": np.array(self._state_hash[:count], np.uint64),
-            "action_hash": action_hashes(actions),
-            "log_size": np.array([*self._log_size[:count], self.log.size], np.int64),
-            "log_hash": np.array([*self._log_hash[:count], self.log.hash], np.uint64),
-            "checkpoint_step": np.array(list(kept), np.int64),
-            "checkpoint_physics": np.array(states) if states else np.zeros((0, 0)),
-            "checkpoint_details": np.array(details, np.str_),
-            "checkpoint_hash": np.array(
-                [checkpoint_hash(*pair) for pair in zip(states, details, strict=True)], np.uint64
-            ),
-        }
-        save_arrays(path, arrays)
+        return Recorded(
+            state_hash=np.array(self._state_hash[:count], np.uint64),
+            action_hash=action_hashes(actions),
+            log_size=np.array([*self._log_size[:count], self.log.size], np.int64),
+            log_hash=np.array([*self._log_hash[:count], self.log.hash], np.uint64),
+            checkpoint_step=np.array(list(kept), np.int64),
+            checkpoint_physics=np.array(states) if states else np.zeros((0, 0)),
+            checkpoint_details=np.array([state.details_json() for state in kept.values()], np.str_),
+            checkpoint_hash=np.array([state.hash for state in kept.values()], np.uint64),
+        )
 
     def state_hashes(self) -> NDArray[np.uint64]:
         """Hashes of the states since `first`, in order, shape (steps,)."""
@@ -163,6 +163,10 @@ class Recorded:
         """
         arrays = read_arrays(path, _LAYOUTS)
         return cls(**{name: arrays[name] for name in _LAYOUTS})
+
+    def save(self, path: Path) -> None:
+        """Write a compressed NPZ, whole or not at all."""
+        save_arrays(path, {name: getattr(self, name) for name in _LAYOUTS})
 
     def checkpoint(self, number: int) -> WorldState:
         """The `number`-th checkpoint.

@@ -61,6 +61,7 @@ class EventLog:
         events: Everything logged so far.
         size: Length of the file so far, bytes.
         hash: First 64 bits of the SHA-1 of the file so far.
+        muted: Whether nothing is logged, because what happens was logged before.
     """
 
     def __init__(self, path: Path | None = None) -> None:
@@ -69,10 +70,24 @@ class EventLog:
         self.size = 0
         self._digest = LogDigest()
         self.hash = self._digest.hash
+        self.muted = False
 
     def append(self, time: float, event: str, **fields: Any) -> None:
-        """Log `event` at simulated `time` s, with JSON-ready fields."""
-        line = {"t": round(time, 6), "event": event, **fields}
+        """Log `event` at simulated `time` s, with JSON-ready fields; nothing while the log is muted."""
+        if self.muted:
+            return
+        self._append({"t": round(time, 6), "event": event, **fields})
+
+    def extend(self, lines: Sequence[str]) -> None:
+        """Log again what `lines` gave of another log."""
+        for line in lines:
+            self._append(json.loads(line))
+
+    def lines(self, first: int = 0) -> list[str]:
+        """The lines of the events from the `first` on, without their ends."""
+        return [json.dumps(event) for event in self.events[first:]]
+
+    def _append(self, line: dict[str, Any]) -> None:
         self.events.append(line)
         text = json.dumps(line) + "\n"
         self.size += len(text)  # JSON is written as ASCII

@@ -68,6 +68,7 @@ class Session:
             the same without.
 
     Attributes:
+        assistant: As above.
         trajectory: Poses and actions so far.
         recording: Hashes and checkpoints so far.
     """
@@ -85,7 +86,7 @@ class Session:
         rollouts: bool = True,
     ) -> None:
         self._world = world
-        self._assistant = assistant
+        self.assistant = assistant
         self._participant = participant
         self._log = recording.log
         self._time_limit = time_limit
@@ -107,7 +108,7 @@ class Session:
         """
         self._now = self._world.reset()
         try:
-            self._assistant.begin(self._now)
+            self.assistant.begin(self._now)
         except UserCodeError as error:
             self._log_end(self._now.time, ERROR, error=describe(error))
             raise
@@ -122,7 +123,7 @@ class Session:
         """
         self._now = observation
         self._delivered = len(observation.names_with(ObjectStatus.DELIVERED))
-        shown = self._assistant.shown_roles
+        shown = self.assistant.shown_roles
         if not self._participant.needs <= shown:
             raise SessionError(
                 f"this participant needs {sorted(self._participant.needs)} markers but the assistance condition shows "
@@ -135,18 +136,22 @@ class Session:
             while (reason := self.end_reason) is None:
                 self.advance()
                 on_progress(self.progress)
-            self._end(reason)
-            self._assistant.finish(self._now.time)
+            self.end(reason)
         except KeyboardInterrupt as stop:
-            self._assistant.finish(self._now.time)
-            self._log_end(self._now.time, INTERRUPTED, signal=signal_of(stop).name)
+            self.end(INTERRUPTED, signal=signal_of(stop).name)
             return INTERRUPTED
         except Exception as error:
             reason = PHYSICS_ERROR if isinstance(error, PhysicsError) else ERROR
             self._log_end(self._recorded_until, reason, error=describe(error))
             raise
-        self._log_end(self._now.time, reason)
         return reason
+
+    def end(self, reason: str, **details: str) -> None:
+        """End the session, and log why; after the last step its state is recorded."""
+        if reason != INTERRUPTED:
+            self._record_end(reason)
+        self.assistant.finish(self._now.time)
+        self._log_end(self._now.time, reason, **details)
 
     @property
     def progress(self) -> Progress:
@@ -172,7 +177,7 @@ class Session:
             self._now,
             self._answer,
             self._world,
-            self._assistant,
+            self.assistant,
             self._hud_state,
             blocked=self._controller.blocked,
         )
@@ -187,7 +192,7 @@ class Session:
     def scroll(self, rows: int) -> None:
         """Scroll the task list by so many rows, positive towards its end; logged, so that a replay shows the same."""
         self.note("scroll", rows=rows)
-        self._assistant.scroll(rows)
+        self.assistant.scroll(rows)
         self._hud = None
 
     def _log_end(self, time: float, reason: str, **details: str) -> None:
@@ -215,7 +220,7 @@ class Session:
 
     def _roll_out(self, decision: Decision) -> bool:
         """Carry out many control steps at once, if all of them follow from the decision; whether that was so."""
-        if self._assistant.expecting:
+        if self.assistant.expecting:
             return False
         left = int((self._time_limit - self._now.time) / self._world.control_timestep) - 1
         if isinstance(decision, Wait):
@@ -230,7 +235,7 @@ class Session:
         if isinstance(decision, WalkAlong):
             self._controller.commit(len(rollout))
         uneventful = len(rollout) - (1 if rollout.events else 0)
-        self._assistant.observe_walk(rollout.states.positions[:uneventful], self._now)
+        self.assistant.observe_walk(rollout.states.positions[:uneventful], self._now)
         if rollout.events:
             self._note_events(rollout.events)
         return True
@@ -269,10 +274,10 @@ class Session:
         self.recording.append()
         self.trajectory.append(self._now, action, self._world.health_sample)
 
-    def _end(self, reason: str) -> None:
+    def _record_end(self, reason: str) -> None:
         """Record the last state; let the viewer see for a moment that all is done. That is not measured."""
         if reason == ALL_DELIVERED:
-            self._assistant.show_message("finished", self._now.time)
+            self.assistant.show_message("finished", self._now.time)
         self._record(IDLE)
         end = self._now
         while reason == ALL_DELIVERED and self._viewer is not None and self._now.time < end.time + FINAL_HOLD:
@@ -284,7 +289,7 @@ class Session:
         """Log what happened in the world and tell the assistant."""
         for event in events:
             self._log.append(event.time, event.kind.value, object=event.object, receptacle=event.receptacle)
-        self._assistant.observe(self._now, events)
+        self.assistant.observe(self._now, events)
         if events:
             self._delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
 
@@ -296,13 +301,13 @@ class Session:
             time, "attempt", action=kind, object=result.object, applied=result.applied, refusal=refusal
         )
         if refusal is not None:
-            self._assistant.show_message(refusal, time, result.object)
+            self.assistant.show_message(refusal, time, result.object)
 
     def _hud_state(self) -> HudState:
         """What the HUD shows now; composed once per state, and only when asked for."""
         if self._hud is None or self._hud[0] is not self._now:
             camera = self._viewer.camera(self._world) if self._viewer is not None else None
-            self._hud = self._now, self._assistant.hud_state(self._now, camera)
+            self._hud = self._now, self.assistant.hud_state(self._now, camera)
         return self._hud[1]
 
     def _show(self) -> None:

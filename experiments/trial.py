@@ -19,6 +19,7 @@ from experiments.fingerprint import fingerprint, trial_inputs
 from experiments.first_person import FilmConfig, TrialFilm
 from experiments.house import House
 from experiments.participants import participant
+from experiments.participants.base import Participant
 from experiments.person_distribution import PersonDistribution
 from experiments.recording import Recording, provenance
 from experiments.records import EventLog
@@ -37,6 +38,7 @@ from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 from planner.live import LiveReplanner
 from planner.replanner import Replanner
+from planner.route import RoutePlanner
 from planner.solver import solver
 
 _SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
@@ -89,7 +91,7 @@ def run_trial(
                 signals.check()
 
             result = trial.run(progress)
-            if result.error is not None and not result.recorded:
+            if result.error is not None and not result.has_steps:
                 raise result.error
             signals.save()
             wall = time.perf_counter() - started
@@ -188,9 +190,14 @@ class _Trial:
             except Exception as failure:
                 error = failure
         if film is None:
-            return SessionResult(session, log, error)
-        name = film.renderer_name or NOTHING_FILMED
-        return SessionResult(session, log, error, film.frames_sha256, name, film.failure)
+            return SessionResult.of_session(session, error)
+        return SessionResult.of_session(
+            session,
+            error,
+            frames_sha256=film.frames_sha256,
+            renderer=film.renderer_name or NOTHING_FILMED,
+            no_film=film.failure,
+        )
 
 
 def prepare_session(
@@ -199,10 +206,11 @@ def prepare_session(
     scene: Scene,
     log: EventLog,
     viewer: Viewer | None = None,
-    replanner: Replanner | None = None,
+    replanner: RoutePlanner | None = None,
     *,
     rollouts: bool = True,
     world: World | None = None,
+    user: Participant | None = None,
 ) -> tuple[Session, World]:
     """Make the world, the assistant and the participant of a trial, ready to run.
 
@@ -215,6 +223,7 @@ def prepare_session(
         replanner: Plans for the assistant; None for one whose plans repeat.
         rollouts: See `Session`.
         world: A new world of the scene in the trial's fidelity; None to make one.
+        user: The participant; None to make the one that is named.
     """
     order_rng = _session_rng(config.order_seed, _LIST_ORDER)
     order = [scene.index.names[i] for i in order_rng.permutation(len(scene.index.names))]
@@ -223,7 +232,7 @@ def prepare_session(
     session = Session(
         world,
         _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
-        make_participant(config.user, house, _session_rng(config.person_seed, _CHANCE)),
+        user or make_participant(config.user, house, _session_rng(config.person_seed, _CHANCE)),
         Recording(world, log),
         walls=house.navmesh.outline,
         time_limit=config.limit,
@@ -256,7 +265,7 @@ def _log_start(config: TrialConfig, house: House, world: World, order: list[str]
 
 
 def _make_assistant(
-    config: TrialConfig, board: TaskBoard, world: World, log: EventLog, replanner: Replanner | None
+    config: TrialConfig, board: TaskBoard, world: World, log: EventLog, replanner: RoutePlanner | None
 ) -> Assistant:
     """The assistant of a trial; for a live one, all that takes long is done before the clock starts."""
     geodesics = board.house.geodesics

@@ -3,9 +3,12 @@
 import dataclasses
 import shutil
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from numpy.typing import NDArray
 
 from experiments import records
 from experiments.checksums import write_checksums
@@ -13,6 +16,7 @@ from experiments.errors import RecordError
 from experiments.files import save_arrays, write_json
 from experiments.house import House
 from experiments.metrics import measure
+from experiments.recording import Recorded
 from experiments.records import Event, EventLog
 from experiments.run_directory import free_name
 from experiments.session import Session
@@ -27,7 +31,8 @@ class SessionResult:
     """A session that is over.
 
     Attributes:
-        session: Has the trajectory and the recording.
+        arrays: The trajectory.
+        recorded: Hashes and checkpoints.
         log: The event log; its last event says why it ended.
         error: What ended it, where that is an error.
         frames_sha256: Hash of the frames filmed, or None.
@@ -35,7 +40,8 @@ class SessionResult:
         no_film: Why there is no film although one was wanted, or None.
     """
 
-    session: Session
+    arrays: Mapping[str, NDArray[Any]]
+    recorded: Recorded
     log: EventLog
     error: Exception | None
     frames_sha256: str | None = None
@@ -43,9 +49,15 @@ class SessionResult:
     no_film: str | None = None
 
     @property
-    def recorded(self) -> bool:
+    def has_steps(self) -> bool:
         """Whether there is anything to keep."""
-        return self.session.recording.step > 0
+        return len(self.recorded.state_hash) > 0
+
+    @classmethod
+    def of_session(cls, session: Session, error: Exception | None, **film: str | None) -> "SessionResult":
+        """The result of a session that ran here; `film` holds what is known of its film."""
+        arrays = session.trajectory.arrays()
+        return cls(arrays, session.recording.recorded(arrays["action"]), session.recording.log, error, **film)  # type: ignore[arg-type]
 
     @property
     def end(self) -> Event:
@@ -89,8 +101,7 @@ def draw_floor_plan(folder: Path, house: House, scene: Scene, result: SessionRes
     try:
         from experiments.analysis.topdown import draw_topdown  # matplotlib: batches do without
 
-        arrays = result.session.trajectory.arrays()
-        draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], arrays)
+        draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], result.arrays)
         write_checksums(folder, records.FILES)
     except Exception as error:  # no picture is worth a record
         return f"no floor plan: {describe(error)}"
@@ -98,11 +109,11 @@ def draw_floor_plan(folder: Path, house: House, scene: Scene, result: SessionRes
 
 
 def _write(folder: Path, scene: Scene, result: SessionResult, wall: float) -> dict[str, Any]:
-    arrays = result.session.trajectory.arrays()
+    arrays = result.arrays
     scene.episode.save(folder / records.EPISODE)
     result.log.save(folder / records.EVENTS)
     save_arrays(folder / records.TRAJECTORY, arrays)
-    result.session.recording.save(folder / records.RECORDING, arrays["action"])
+    result.recorded.save(folder / records.RECORDING)
     write_json(folder / records.PLAN, result.plans)
     metrics = {
         **measure(result.log.events, arrays),

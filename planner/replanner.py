@@ -83,6 +83,10 @@ class Replanner:
         """
         return self.plan(state)
 
+    def adopt(self, route: Route, state: TaskState) -> None:
+        """Follow a route that was planned elsewhere, such as before an interruption."""
+        self._follow(route, state)
+
     @property
     def pending(self) -> bool:
         """Whether `poll` would find something new; never for this replanner."""

@@ -81,17 +81,20 @@ def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | 
 
 
 class RoutePlanner(Protocol):
-    """Keeps the route of a task; the replanners of `planner` do, and a replay with the logged plans.
+    """Keeps the route of a task; the replanners of `planner` do, and a replay with the logged plans."""
 
-    Attributes:
-        replans: How often `update` made a new plan because the old one no longer fitted.
-    """
-
-    replans: int
+    @property
+    def replans(self) -> int:
+        """How often `update` made a new plan because the old one no longer fitted."""
+        ...
 
     @property
     def pending(self) -> bool:
         """Whether `poll` may have a better route."""
+        ...
+
+    def prepare(self, state: TaskState, *, seconds: float | None = None) -> Route:
+        """Plan the task before its clock starts, in at most so many seconds of proofs."""
         ...
 
     def update(self, state: TaskState, *, shown: bool = True) -> Route:

@@ -26,6 +26,10 @@ class LoggedReplanner:
         self._plans = list(plans)
         self._route: Route | None = None
 
+    def prepare(self, state: TaskState, *, seconds: float | None = None) -> Route:  # noqa: ARG002 - it is planned
+        """The plan that was logged for the start."""
+        return self.update(state)
+
     @property
     def pending(self) -> bool:
         """Whether a better plan for the same task was logged now."""

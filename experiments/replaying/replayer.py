@@ -151,26 +151,27 @@ class Replayer:
             observation = self._world.restore(self.record.recorded.checkpoint(number))
         except StateError as error:
             raise self.error(Mismatch(self.first, str(error), RECORDING)) from error
-        self._catch_up()
+        catch_up(self.record, self.first, self._assistant, self._replanner)
         return observation
 
-    def _catch_up(self) -> None:
-        """Tell the assistant what was recorded before the checkpoint; this needs no physics."""
-        record, assistant = self.record, self._assistant
-        assistant.begin(record.observation(0))
-        events_of_step: dict[int, list[Event]] = {}
-        for step, event in record.events:
-            events_of_step.setdefault(step, []).append(event)
-        for step in range(self.first):
-            observation = record.observation(step + 1)
-            self._replanner.clock = _constant(observation.time)
-            for event in events_of_step.get(step, []):
-                if event["event"] == "scroll":
-                    assistant.scroll(int(event["rows"]))
-                if event["event"] == "attempt" and event["refusal"] is not None:
-                    assistant.show_message(event["refusal"], observation.time, event["object"])
-            events = [_world_event(e) for e in events_of_step.get(step, []) if e["event"] in WORLD_EVENTS]
-            assistant.observe(observation, events)
+
+def catch_up(record: RunRecord, first: int, assistant: Assistant, replanner: LoggedReplanner) -> None:
+    """Tell an assistant what was recorded before control step `first`; this needs no physics."""
+    assistant.begin(record.observation(0))
+    events_of_step: dict[int, list[Event]] = {}
+    for step, event in record.events:
+        events_of_step.setdefault(step, []).append(event)
+    for step in range(first):
+        observation = record.observation(step + 1)
+        replanner.clock = _constant(observation.time)
+        for event in events_of_step.get(step, []):
+            if event["event"] == "attempt" and event["refusal"] is not None:
+                assistant.show_message(event["refusal"], observation.time, event["object"])
+        events = [_world_event(e) for e in events_of_step.get(step, []) if e["event"] in WORLD_EVENTS]
+        assistant.observe(observation, events)
+        for event in events_of_step.get(step, []):
+            if event["event"] == "scroll":
+                assistant.scroll(int(event["rows"]))
 
 
 def mismatch_error(directory: Path, start: Event, mismatch: Mismatch, reasons: str = "") -> ReplayError:

@@ -1,0 +1,19 @@
+"""A person at the keyboard. `mjsim play` runs sessions with one; nothing simulates it."""
+
+from typing import Never
+
+import numpy as np
+
+from experiments.errors import ConfigError
+from experiments.house import House
+
+NAME = "human"
+
+
+def build(house: House, rng: np.random.Generator) -> Never:  # noqa: ARG001 - the interface of participants
+    """Refuse to simulate a person.
+
+    Raises:
+        ConfigError: Always.
+    """
+    raise ConfigError("user human is a person at the keyboard; start `mjsim play` instead")
