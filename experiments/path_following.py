@@ -31,18 +31,21 @@ class Pace(NamedTuple):
         braking: Deceleration planned for, m/s^2.
         turning_speed: Fastest turn, rad/s.
         clearance: Distance kept from the middle of objects on the floor, m.
+        patience: Time without progress until the person is blocked, s.
     """
 
     speed: float
     braking: float
     turning_speed: float
     clearance: float
+    patience: float
 
     @classmethod
     def of(cls, person: PersonParameters) -> "Pace":
         """That of a person."""
         braking = BRAKING * person.walking_acceleration
-        return cls(person.walking_speed, braking, person.turning_speed, person.body_radius + HALF_OBJECT)
+        clearance = person.body_radius + HALF_OBJECT
+        return cls(person.walking_speed, braking, person.turning_speed, clearance, person.patience)
 
 
 class Obstacles(NamedTuple):

@@ -97,6 +97,7 @@ class PersonParameters:
         reading_time: For how long a participant stands and reads the HUD before each visit, s. The default takes no
             time; preparing a step mentally takes 1.35 s (Card, Moran and Newell, CACM 23, 1980), and people read 238
             words a minute (Brysbaert, Journal of Memory and Language 109, 2019).
+        patience: For how long a walk may make no progress before the person steps back or looks for another way, s.
         motion: How the hands pick and place.
 
     Raises:
@@ -120,6 +121,7 @@ class PersonParameters:
     viewing_distance: float = _number(8.0, 0.5, 100.0, "m")
     looking_interval: float = _number(0.2, 0.04, 60.0, "s")
     reading_time: float = _number(0.0, 0.0, 60.0, "s")
+    patience: float = _number(2.0, 1.0, 60.0, "s")
     motion: MotionParameters = field(default_factory=MotionParameters)
 
     def __post_init__(self) -> None:

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from experiments.locomotion import BACK_OFF, BACK_OFF_TIME, PROGRESS_TIMEOUT, LocomotionController
+from experiments.locomotion import BACK_OFF, BACK_OFF_TIME, LocomotionController
 from experiments.participants.base import Moves, Percept, WalkAlong
 from experiments.participants.visit_executor import CLOSER, MIN_STOP_DISTANCE, STOP_SHARE, VisitExecutor
 from mjsim.actions import ActionResult, Move, Pick, Refusal
@@ -61,14 +61,16 @@ def test_at_the_end_of_a_walk_the_person_turns_to_the_goal_and_acts():
     assert controller.step(walk_to(3.0), seen(position=(2.7, 0.0), heading=1.0)) == Move()
 
 
-def test_a_blocked_person_backs_off_on_the_way_to_a_visit():
-    controller, walk = LocomotionController(NO_WALLS, PersonParameters()), walk_to(3.0, Pick("a"))
+@pytest.mark.parametrize("patience", [1.0, 2.0])
+def test_a_blocked_person_backs_off_on_the_way_to_a_visit(patience):
+    person = PersonParameters(patience=patience)
+    controller, walk = LocomotionController(NO_WALLS, person), walk_to(3.0, Pick("a"))
     moves, blocked = [], []
-    for k in range(round((PROGRESS_TIMEOUT + BACK_OFF_TIME) / STEP) + 3):  # and the person does not move
+    for k in range(round((patience + BACK_OFF_TIME) / STEP) + 3):  # and the person does not move
         moves.append(controller.step(walk, seen(time=k * STEP)))
         blocked.append(controller.blocked)
     assert moves.count(BACK_OFF) == round(BACK_OFF_TIME / STEP) - 1
-    assert blocked.index(True) * STEP == pytest.approx(PROGRESS_TIMEOUT + STEP)
+    assert blocked.index(True) * STEP == pytest.approx(patience + STEP)
     assert blocked.count(True) == round(BACK_OFF_TIME / STEP)
     assert moves[-1] == moves[0]
     assert blocked[-1] is False

@@ -131,13 +131,15 @@ def test_every_tier_reaches_and_sees_as_far_as_the_person(
 
 def test_nothing_of_a_person_is_left_out() -> None:
     """The values that no test above measures are those of participants (tests/test_people.py)."""
-    elsewhere = {"reach", "field_of_view", "viewing_distance", "looking_interval", "reading_time"}
+    elsewhere = {"reach", "field_of_view", "viewing_distance", "looking_interval", "reading_time", "patience"}
     assert {*MOVES, *elsewhere} == set(RANGES)
 
 
 def test_participants_walk_at_the_persons_pace() -> None:
-    person = PersonParameters(walking_speed=0.9, walking_acceleration=2.0, turning_speed=1.5, body_radius=0.1)
-    assert Pace.of(person) == pytest.approx((0.9, 1.0, 1.5, 0.3))
+    person = PersonParameters(
+        walking_speed=0.9, walking_acceleration=2.0, turning_speed=1.5, body_radius=0.1, patience=1.0
+    )
+    assert Pace.of(person) == pytest.approx((0.9, 1.0, 1.5, 0.3, 1.0))
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ PATIENT = settings(deadline=None)  # the first case compiles
 coordinate = st.floats(-5, 5).map(lambda v: round(v, 3))
 spots = st.tuples(coordinate, coordinate)
 points = st.lists(spots, min_size=2, max_size=6).map(np.array)
-PACE = Pace(speed=1.3, braking=1.5, turning_speed=2.5, clearance=0.4)
+PACE = Pace(speed=1.3, braking=1.5, turning_speed=2.5, clearance=0.4, patience=2.0)
 NOTHING = Obstacles(np.zeros((0, 3)), np.zeros(0, bool), np.zeros((0, 4)))
 
 
