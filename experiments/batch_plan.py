@@ -16,8 +16,10 @@ from experiments.run_directory import TRIALS
 from experiments.trial_config import TrialConfig
 from hud.conditions import condition
 from mjsim.episode import Episode
+from mjsim.errors import EpisodeError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.sampling import POINTS
+from mjsim.model.scene import compose
 from planner.solver import solver
 
 SHOWN = 3  # names or reasons in a line
@@ -104,9 +106,8 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
             check(name)
     catalogue = functools.cache(Catalogue.load)
     house = functools.cache(House.load)
-    for trial in dict.fromkeys(trials):
-        if trial.episode is not None:
-            _check_episode(trial, catalogue(trial.house))
+    for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():
+        _check_episode(trial, catalogue(trial.house))
     for name, seed, points in dict.fromkeys(
         (t.house, t.house_seed, t.points) for t in trials if _may_be_small(t)
     ):
@@ -123,9 +124,7 @@ def _check_episode(trial: TrialConfig, catalogue: Catalogue) -> None:
     episode = Episode.load(Path(str(trial.episode)))
     if len(episode.objects) != trial.objects:
         raise ConfigError(f"objects is {trial.objects}, but {trial.episode} holds {len(episode.objects)}")
-    unknown = [placed.model for placed in episode.objects if placed.model not in catalogue.objects]
-    unknown += [key for key in episode.targets.values() if key not in catalogue.receptacles]
-    if unknown:
-        raise ConfigError(
-            f"{trial.episode} is of another house: {catalogue.name} has no {', '.join(map(repr, unknown[:SHOWN]))}"
-        )
+    try:
+        compose(episode, catalogue)
+    except EpisodeError as error:
+        raise EpisodeError(f"{trial.episode}: {error}") from error

@@ -103,6 +103,23 @@ def test_a_moved_house_is_the_same_and_an_edited_one_is_not(small_house, tmp_pat
     assert count == 1 and "run again: 1 trial: house changed (1);" in note
 
 
+def test_a_house_whose_files_swap_their_contents_is_another_one(small_house, tmp_path):
+    path = copy_of(small_house, tmp_path / "home")
+    before = Catalogue.load(path).content
+    cube, ball = ((tmp_path / "home" / name) for name in ("cube.xml", "ball.xml"))
+    texts = cube.read_text(), ball.read_text()
+    ball.write_text(texts[0])
+    cube.write_text(texts[1])
+    assert Catalogue.load(path).content != before
+
+
+def test_an_episode_of_another_house_is_named_before_the_first_trial(house, small_house, tmp_path):
+    house.sample_episode(objects=1, seed=0).save(tmp_path / "episode.json")
+    trial = brief(house=str(small_house / "catalogue.toml"), episode=str(tmp_path / "episode.json"))
+    with pytest.raises(EpisodeError, match=r"episode\.json: "):
+        check_trials([trial])
+
+
 def test_another_command_adds_to_the_folder(house, tmp_path):
     run_missing([brief()], tmp_path, house)
     run_missing([brief(user="searcher")], tmp_path, house)

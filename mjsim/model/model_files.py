@@ -54,7 +54,8 @@ def content_hash(text: str, models: Iterable[Path]) -> str:
                 kind = "texturedir" if element.tag == "texture" else "meshdir"
                 folder = settings.get(kind, settings.get("assetdir", ""))
                 _read(f"{model.parent}/{folder}/{element.get(name)}", files)
-    digests = sorted(hashlib.sha256(content).digest() for content in files.values())
+    # In the order in which they are referred to: two files that swap their contents are another house.
+    digests = [hashlib.sha256(content).digest() for content in files.values()]
     return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
 
 
