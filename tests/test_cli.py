@@ -1,12 +1,17 @@
 """The command line teaches, and names what is wrong with what it was given."""
 
 import argparse
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import mujoco
 import pytest
 
 from experiments.cli import COMMANDS, main, parser
-from experiments.commands.options import frame_size, int_list, text_list
+from experiments.commands.options import frame_size, int_list, seconds, text_list
 from mjsim.episode import Episode
 
 
@@ -126,3 +131,57 @@ def test_the_doctor_names_the_renderer(capsys):
     text = capsys.readouterr().out
     assert "OpenGL" in text
     assert "mujoco" in text
+
+
+def test_the_version_is_told(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out.startswith("mjsim ")
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-1", "soon"])
+def test_a_time_is_a_finite_number(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="is not a number of seconds"):
+        seconds(text)
+
+
+def test_a_design_takes_no_options_of_trials_beside_it(tmp_path, capsys):
+    design = tmp_path / "design.toml"
+    design.write_text("[[cells]]\npeople = 1\nobjects = 1\nassistance = 'none'")
+    assert (
+        main(["batch", str(design), "--user", "searcher", "--seeds", "1", "--out", str(tmp_path / "b")]) == 2
+    )
+    assert "leave out --seeds, --user" in capsys.readouterr().err
+    assert not (tmp_path / "b").exists()
+
+
+def test_modules_in_the_current_folder_are_found(tmp_path):
+    """By the installed command, whose own folder is elsewhere: participant and planner of one's own."""
+    (tmp_path / "mine.py").write_text(
+        "from experiments.participants.searcher import build\nfrom planner.greedy_solver import GreedySolver\n"
+    )
+    options = [
+        "--objects",
+        "1",
+        "--assistance",
+        "none",
+        "--fidelity",
+        "event",
+        "--time-limit",
+        "1",
+        "--no-video",
+    ]
+    own = ["--user", "mine:build", "--planner", "mine:GreedySolver", "--out", "run"]
+    root = str(Path(__file__).parents[1])
+    subprocess.run(
+        [sys.executable, "-P", "-m", "mjsim", "run", *options, *own],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": root},
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
+    start = json.loads((tmp_path / "run/events.jsonl").read_text().splitlines()[0])
+    assert (start["user"], start["planner"]) == ("mine:build", "mine:GreedySolver")
+    assert len(start["inputs"]["module mine"]) == 16
