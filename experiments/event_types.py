@@ -34,6 +34,8 @@ class Start(Logged, frozen=True, forbid_unknown_fields=False):
         versions: Versions of mjsim, its physics code, MuJoCo and NumPy, and the machine's architecture.
         model: Fingerprint of the compiled house with its objects, without what is only drawn.
         world: Options of the world: timestep, capacity, grip, fidelity.
+        fingerprint: Hash of the settings and of `inputs`.
+        inputs: What the trial depends on besides its settings, by hash or version: the house, the code, libraries.
         episode_sha256: SHA-256 of `episode.json`.
         order: Object names in the participant's own random order.
     """
@@ -42,6 +44,8 @@ class Start(Logged, frozen=True, forbid_unknown_fields=False):
     versions: dict[str, str]
     model: str
     world: dict[str, float | str]
+    fingerprint: str
+    inputs: dict[str, str]
     episode_sha256: str
     order: list[str]
     objects: Count

@@ -464,6 +464,23 @@ def test_a_changed_house_is_named_as_the_reason(own_house, tmp_path):
         replay(tmp_path / "run")
 
 
+def test_a_run_in_a_house_that_was_moved(own_house, tmp_path, capsys):
+    """Replayed where the house lies now, if it is the same one; its files are found beside the catalogue."""
+    catalogue = own_house / "catalogue.toml"
+    catalogue.write_text(catalogue.read_text().replace(f"{own_house}/", ""))
+    config = TrialConfig(objects=2, assistance="optimal", seed=0, house=str(catalogue), time_limit=1.0)
+    run_trial(config, tmp_path / "run", topdown=False)
+    moved = own_house.rename(tmp_path / "elsewhere") / "catalogue.toml"
+    assert main(["replay", str(tmp_path / "run")]) == 2
+    assert "if it lies elsewhere now, name its catalogue with --house" in capsys.readouterr().err
+    assert main(["replay", str(tmp_path / "run"), "--house", str(moved)]) == 0
+    assert "26 steps verified" in capsys.readouterr().out
+    ball = moved.parent / "ball.xml"
+    ball.write_text(ball.read_text().replace('mass="0.1"', 'mass="0.2"'))
+    assert main(["replay", str(tmp_path / "run"), "--house", str(moved)]) == 1
+    assert "is not the house of" in capsys.readouterr().err
+
+
 # A failure leaves what led to it.
 
 # A joint inside the ball that is pushed away from its middle, the harder the farther it is: e-fold in 0.1 s.

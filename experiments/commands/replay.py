@@ -22,8 +22,8 @@ from experiments.run_directory import check_file
 
 DESCRIPTION = """\
 Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one
-bit for bit. DIR is a run directory, however the run ended. Prints the number of verified steps and exits with 0, or
-names the first step that differs and exits with 1.
+bit for bit. DIR is a run directory, however the run ended. Prints for every file of it what was checked, and exits with
+0, or names the first step that differs and exits with 1.
 
 With --video, the replay is filmed: as it was, or in another size, from another camera, with another HUD."""
 
@@ -45,6 +45,11 @@ def add_parser(commands: Any) -> None:
         default=0.0,
         metavar="T",
         help="simulated seconds: start at the last checkpoint at or before T",
+    )
+    parser.add_argument(
+        "--house",
+        metavar="CATALOGUE",
+        help="catalogue.toml of the run's house, where it does not lie where it was; its content must be the same",
     )
     parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="film the replay")
     parser.add_argument("--camera", choices=CAMERAS, default=FIRST_PERSON, help="the view that is filmed")
@@ -110,6 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
                 start=arguments.start,
                 film=film,
                 assistance=arguments.assistance,
+                catalogue=arguments.house,
                 on_progress=lambda done, total: bars.update(bar, completed=done, total=total),
             )
     except ReplayError as error:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments import records
-from experiments.errors import ConfigError, RecordError
+from experiments.errors import ConfigError, RecordError, ReplayError
 from experiments.files import read_json
 from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
 from experiments.house import House
@@ -16,6 +16,7 @@ from experiments.replaying.run_record import RunRecord, load_run
 from experiments.replaying.verdicts import Verdict, all_mismatches, verdicts
 from experiments.session import Viewer
 from experiments.video import VideoWriter
+from mjsim.errors import AssetError
 from mjsim.files import replacing
 from mjsim.person_parameters import PersonParameters
 
@@ -84,6 +85,7 @@ def replay(
     film: ReplayFilm | None = None,
     assistance: str | None = None,
     house: House | None = None,
+    catalogue: str | None = None,
     on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> ReplayReport:
     """Simulate a run again and compare every control step with the record.
@@ -95,6 +97,7 @@ def replay(
         assistance: Assistance condition whose HUD is shown, or None for the recorded one. Actions and plans are the
             recorded ones in any case.
         house: The house of the run, if it is loaded already.
+        catalogue: Where its catalogue lies now, if not where it was; its content must be the recorded one.
         on_progress: Called with the numbers of replayed and of recorded control steps.
 
     Raises:
@@ -106,7 +109,7 @@ def replay(
     record = load_run(directory)
     if record.mismatch is not None and record.mismatch.step == 0:
         raise mismatch_error(directory, record.start, record.mismatch)
-    house = house or House.load(str(record.start["house"]))
+    house = house or _house_of(record, catalogue)
     shown = assistance or str(record.start["assistance"])
     replayer = Replayer(record, house, start=start, assistance=shown)
     with ExitStack() as stack:
@@ -128,6 +131,26 @@ def replay(
         frames_sha256=frames,
         as_filmed=_as_filmed(record, frames),
     )
+
+
+def _house_of(record: RunRecord, catalogue: str | None) -> House:
+    """The house of a run, from where it was or from where it lies now."""
+    name = catalogue or str(record.start["house"])
+    try:
+        house = House.load(name)
+    except AssetError as error:
+        raise ConfigError(
+            f"the house of {record.directory} cannot be loaded: {error}; if it lies elsewhere now, name its catalogue "
+            "with --house"
+        ) from error
+    recorded = record.start["inputs"].get("house")
+    if catalogue is not None and house.catalogue.content != recorded:
+        raise ReplayError(
+            f"{catalogue} is not the house of {record.directory}: its content has the hash {house.catalogue.content}, "
+            f"recorded was {recorded}; name the catalogue as it was",
+            0,
+        )
+    return house
 
 
 def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[Viewer, VideoWriter]:
