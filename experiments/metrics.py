@@ -17,6 +17,15 @@ PROVENANCE = frozenset(
     {"t", "event", "format", "versions", "model", "world", "inputs", "episode_sha256", "order", "person"}
 )
 
+# In short, for the command line.
+DEFINITIONS = """\
+  nd_strict_2n     visits that differ from the suggested next one, over two per object
+  nd_feasible      the same, over the visits at which another one was feasible
+  nd_bin_tied      as nd_feasible, but which object goes first into one bin is no choice
+  nd_regret_10cm   as nd_feasible, but only deviations that cost more than 0.1 m
+  ipl_locations    distances between the places of visits, over the metres walked (the paper's; can exceed 1)
+  ipl_stand        shortest walks between where the person stood, over the metres walked (never exceeds 1)"""
+
 
 @dataclass(frozen=True)
 class Metrics:

@@ -142,6 +142,22 @@ class RunRecord:
         return count - 1 if count else None
 
 
+def check_log(directory: Path) -> None:
+    """Whether the log of a run has the format of this version, and every line is an event with the fields of its kind.
+
+    Raises:
+        RecordError: It is not a run directory, or a line is no event.
+        ReplayError: The log has the format of another version.
+    """
+    log = _read_log(directory)
+    _check_format(directory, _first_event(log))
+    for number, line in enumerate(log.splitlines(), start=1):
+        try:
+            check_event(line)
+        except RecordError as error:
+            raise RecordError(f"{directory / records.EVENTS}, line {number}: {error}") from error
+
+
 def load_run(directory: Path) -> RunRecord:
     """Read a run directory and check lengths and hashes.
 
@@ -149,9 +165,7 @@ def load_run(directory: Path) -> RunRecord:
         RecordError: It is not a run directory.
         ReplayError: A file cannot be read, or has the log format of another version.
     """
-    if not (directory / records.EVENTS).is_file():
-        raise RecordError(f"{directory} is not a run directory: it has no {records.EVENTS}")
-    log = (directory / records.EVENTS).read_bytes()
+    log = _read_log(directory)
     start = _first_event(log)
     _check_format(directory, start)
     try:
@@ -189,6 +203,12 @@ def _person(events: Sequence[tuple[int, Event]]) -> PersonParameters:
         return PersonParameters.from_dict(logged["person"])
     except (PersonError, KeyError, TypeError) as error:
         raise ReplayError(f"{records.EVENTS}: {error}; the first bad step is 0", 0) from error
+
+
+def _read_log(directory: Path) -> bytes:
+    if not (directory / records.EVENTS).is_file():
+        raise RecordError(f"{directory} is not a run directory: it has no {records.EVENTS}")
+    return (directory / records.EVENTS).read_bytes()
 
 
 def _first_event(log: bytes) -> Event:
