@@ -6,10 +6,10 @@ READY  := $(VENV)/.ready
 WORKERS ?= auto
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format wheel-check assets pictures clean
+.PHONY: help demo test check format wheel-check assets pictures data-dictionary clean
 
 help: ## List the targets
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 14
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
 
 demo: $(READY) ## Set up, then film an assisted clean-up into runs/demo
 	$(BIN)/mjsim run --objects 6 --assistance guided --seed 0 --out runs/demo
@@ -35,6 +35,9 @@ assets: $(READY) ## Make textures and meshes under models/ anew
 
 pictures: $(READY) ## Make the pictures of the README anew
 	$(BIN)/mjsim gallery --force --out docs/pictures
+
+data-dictionary: $(READY) ## Make docs/data.md anew from the types
+	$(BIN)/python -m experiments.data_dictionary > docs/data.md
 
 clean: ## Remove the environment, caches and runs
 	rm -rf $(VENV) runs dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -38,6 +38,10 @@ class Start(Logged, frozen=True, forbid_unknown_fields=False):
         inputs: What the trial depends on besides its settings, by hash or version: the house, the code, libraries.
         episode_sha256: SHA-256 of `episode.json`.
         order: Object names in the participant's own random order.
+        objects: How many misplaced objects.
+        assistance: Assistance condition.
+        house: House name, or path of its catalogue.
+        time_limit: Simulated time after which the trial ends, s.
     """
 
     format: int
