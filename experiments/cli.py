@@ -11,7 +11,19 @@ from experiments.failures import USAGE_ERROR, drop_output, end_with
 from experiments.signals import exit_code, signal_of, signals_raised
 from mjsim.gl_choice import postpone_gl
 
-COMMANDS = ("run", "replay", "batch", "metrics", "compare", "plan", "house", "check", "gallery", "bench", "doctor")
+COMMANDS = (
+    "run",
+    "replay",
+    "batch",
+    "metrics",
+    "compare",
+    "plan",
+    "house",
+    "check",
+    "gallery",
+    "bench",
+    "doctor",
+)
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
