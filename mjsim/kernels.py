@@ -22,6 +22,8 @@ ROOT = Path(__file__).parents[1]
 MARK = b"@kernel\n"
 UNUSED = 30 * 24 * 3600  # s after which machine code that no process has asked for is deleted
 
+# A division by zero gives infinity or NaN, as in numpy: the check for it would cost a tenth of a trial's time.
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _IMPORT = re.compile(r"^from ((?:mjsim|planner|experiments)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 
 
@@ -36,12 +38,12 @@ def kernel(function: F) -> F:
             folder
         )  # read when decorating; other packages' kernels keep their folder
         try:
-            return cast(F, numba.njit(cache=True, nogil=True)(function))
+            return cast(F, numba.njit(cache=True, **_OPTIONS)(function))
         except RuntimeError:  # how numba says that it cannot cache
             pass
         finally:
             numba.config.CACHE_DIR = chosen
-    return cast(F, numba.njit(nogil=True)(function))
+    return cast(F, numba.njit(**_OPTIONS)(function))
 
 
 def cache_base() -> Path:
@@ -54,13 +56,14 @@ def cache_base() -> Path:
 def cache_folder(source: Path) -> Path | None:
     """Folder for the machine code of a module's kernels, None where none is writable.
 
-    It lies in `NUMBA_CACHE_DIR` where that is set, else in the user's cache folder. Its name holds a hash of all
-    that is compiled in: numba itself notices a change in a kernel's own file only, not in the kernels that it calls.
+    It lies in `NUMBA_CACHE_DIR` where that is set, else in the user's cache folder. Its name holds a hash of this
+    module and of all that is compiled in: numba itself notices a change in a kernel's own file only, not in the
+    kernels that it calls.
     """
     base = cache_base()
     digest = hashlib.sha256()
     try:
-        for path in sorted(_compiled_in(source)):
+        for path in sorted(_compiled_in(source) | {Path(__file__)}):
             digest.update(path.read_bytes())
         folder = base / f"mjsim-{source.stem}-{digest.hexdigest()[:16]}"
         if not folder.is_dir():
