@@ -187,6 +187,40 @@ class Scroll(Logged, frozen=True):
     rows: int
 
 
+class Overrun(Logged, frozen=True):
+    """A control step came late, because the machine was busy.
+
+    Attributes:
+        seconds: How late, s of wall time.
+        skipped: Whether the clock went on from there, because the process had been stopped.
+    """
+
+    seconds: float
+    skipped: bool
+
+
+class Pause(Logged, frozen=True):
+    """The clock was stopped.
+
+    Attributes:
+        reason: `hidden` (the tab), `disconnected`, `asked` or `taken over`.
+        wall: When, s since 1970.
+    """
+
+    reason: str
+    wall: float
+
+
+class Resume(Logged, frozen=True):
+    """The clock went on.
+
+    Attributes:
+        wall: When, s since 1970.
+    """
+
+    wall: float
+
+
 class Outcome(Logged, frozen=True):
     """Something happened in the world.
 
@@ -218,6 +252,9 @@ TYPES: tuple[type[Logged], ...] = (
     Visit,
     Regret,
     Scroll,
+    Overrun,
+    Pause,
+    Resume,
     End,
 )
 

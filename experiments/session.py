@@ -172,7 +172,7 @@ class Session:
             PhysicsError: The physics failed.
         """
         self._now = self.recording.pass_checkpoint(self._now)
-        self._show()
+        self.show()
         percept = SessionPercept(
             self._now,
             self._answer,
@@ -281,7 +281,7 @@ class Session:
         self._record(IDLE)
         end = self._now
         while reason == ALL_DELIVERED and self._viewer is not None and self._now.time < end.time + FINAL_HOLD:
-            self._show()
+            self.show()
             self._now = self._world.step(IDLE).observation
         self._now = end
 
@@ -310,6 +310,7 @@ class Session:
             self._hud = self._now, self.assistant.hud_state(self._now, camera)
         return self._hud[1]
 
-    def _show(self) -> None:
+    def show(self) -> None:
+        """Let the viewer see the present state."""
         if self._viewer is not None:
             self._viewer.show(self._world, self._now, self._hud_state())

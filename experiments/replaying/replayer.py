@@ -15,7 +15,7 @@ from experiments.recording import Recording, provenance
 from experiments.records import RECORDING, Event, EventLog
 from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.recorded_participant import EndOfReplay, RecordedParticipant
-from experiments.replaying.run_record import WORLD_EVENTS, Mismatch, RunRecord
+from experiments.replaying.run_record import EXTERNAL, WORLD_EVENTS, Mismatch, RunRecord
 from experiments.session import Progress, Session, Viewer
 from mjsim.actions import WorldEvent
 from mjsim.errors import ActionError, PhysicsError, StateError
@@ -75,7 +75,7 @@ class Replayer:
         self._logged_before = 0 if number is None else len(self._log.events)
         steps = [int(step) for step in record.recorded.checkpoint_step]
         self.recording = Recording(self._world, self._log, checkpoints=steps, first=self.first)
-        self._scrolls = [e for step, e in record.events if e["event"] == "scroll" and step >= self.first]
+        self._external = [e for step, e in record.events if e["event"] in EXTERNAL and step >= self.first]
         self._participant = RecordedParticipant(record, self._world, self.recording)
 
     def run(self, viewer: Viewer | None, on_progress: Callable[[int, int], None]) -> None:
@@ -97,12 +97,12 @@ class Replayer:
         self._replanner.clock = lambda: float(self._world.data.time)
 
         def advanced(_: Progress) -> None:
-            self._scroll(session)
+            self._repeat_external(session)
             on_progress(recording.step, record.steps)
 
         try:
             session.start(self._observation)
-            self._scroll(session)
+            self._repeat_external(session)
             reason = session.finish(advanced)
             if reason == INTERRUPTED:
                 raise KeyboardInterrupt
@@ -115,10 +115,15 @@ class Replayer:
             self.failure = str(error)
         self._trajectory = session.trajectory
 
-    def _scroll(self, session: Session) -> None:
-        """Scroll the task list where the log says that it was scrolled in the present state."""
-        while self._scrolls and self._scrolls[0]["t"] <= round(session.progress.time, 6):
-            session.scroll(int(self._scrolls.pop(0)["rows"]))
+    def _repeat_external(self, session: Session) -> None:
+        """Repeat what came from outside of the simulation in the present state, such as scrolling the task list."""
+        while self._external and self._external[0]["t"] <= round(session.progress.time, 6):
+            event = self._external.pop(0)
+            if event["event"] == "scroll":
+                session.scroll(int(event["rows"]))
+            else:
+                fields = {name: value for name, value in event.items() if name not in ("t", "event")}
+                session.note(event["event"], **fields)
 
     @property
     def mismatch(self) -> Mismatch | None:

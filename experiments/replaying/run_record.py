@@ -24,6 +24,7 @@ from mjsim.observation import Observation
 from mjsim.person_parameters import PersonParameters
 
 STATUS = {code: status for status, code in STATUS_CODE.items()}
+EXTERNAL = ("scroll", "overrun", "pause", "resume")  # events that come from outside of the simulation
 WORLD_EVENTS = {kind.value: kind for kind in EventKind}
 # Arrays of the trajectory that have a row per control step: type, and shape of a row; None for one per object.
 _ROWS: dict[str, tuple[str, tuple[int | None, ...]]] = {

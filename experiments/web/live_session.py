@@ -1,7 +1,8 @@
 """A session with a person: stepped from outside, journalled step by step, and able to go on after a crash."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from experiments.errors import RecordError
 from experiments.house import House
@@ -36,6 +37,8 @@ from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.live import LiveReplanner
 from planner.solver import solver
+
+JOURNAL = "journal.bin"
 
 
 class Human:
@@ -99,7 +102,7 @@ class LiveSession:
         if closed is not None:
             raise RecordError("this session is over")
         if opened is not None:
-            config = config_of(opened)
+            config = config_of(opened.config)
         if config is None:
             raise RecordError("the journal is empty")
         self.config, self.resumed = config, bool(steps)
@@ -226,11 +229,9 @@ class LiveSession:
         self._human.controls, self.input = steps[-1].controls, steps[-1].input
 
 
-def config_of(opened: Opened) -> TrialConfig:
-    """The trial of a journal."""
-    settings = dict(opened.config)
-    settings["person"] = PersonDistribution.of(settings["person"])
-    return TrialConfig(**settings)
+def config_of(settings: Mapping[str, Any]) -> TrialConfig:
+    """The trial that `TrialConfig.settings` describes."""
+    return TrialConfig(**{**settings, "person": PersonDistribution.of(settings["person"])})
 
 
 def result_of(journal: Sequence[bytes], house: House) -> tuple[TrialConfig, Scene, SessionResult]:
@@ -242,7 +243,7 @@ def result_of(journal: Sequence[bytes], house: House) -> tuple[TrialConfig, Scen
     opened, steps, closed = decode(journal)
     if not steps:
         raise RecordError("nothing was played")
-    config = config_of(opened)
+    config = config_of(opened.config)
     person = draw_person(config)
     house = house.for_person(person)
     scene = compose(trial_episode(config, house), house.catalogue, person=person)
@@ -256,4 +257,4 @@ def result_of(journal: Sequence[bytes], house: House) -> tuple[TrialConfig, Scen
 def open_journal(folder: Path) -> Journal:
     """The journal of the session in a folder, which is made if it is not there."""
     folder.mkdir(parents=True, exist_ok=True)
-    return Journal(folder / "journal.bin")
+    return Journal(folder / JOURNAL)

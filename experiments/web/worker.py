@@ -1,0 +1,336 @@
+"""A worker process: one world, one session at a time, its clock, and its journal. The server starts it.
+
+It is ready for a session as soon as it has loaded the usual house. When its socket is closed it exits; the journal
+holds everything that was acknowledged.
+"""
+
+import argparse
+import os
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from experiments.endings import INTERRUPTED
+from experiments.house import House
+from experiments.run_directory import is_run, run_directory
+from experiments.session import Viewer
+from experiments.trial_record import draw_floor_plan, save_record
+from experiments.user_code import describe
+from experiments.web import messages
+from experiments.web.drawing import Drawer
+from experiments.web.inbox import Inbox
+from experiments.web.journal import read_journal
+from experiments.web.live_session import JOURNAL, LiveSession, config_of, open_journal, result_of
+from experiments.web.messages import Message, packed
+from hud import schema
+from hud.projection import CameraView
+from hud.state import HudState
+from mjsim.observation import Observation
+from mjsim.world import World
+
+LATE = 0.02  # s after its time at which a control step counts as late
+ASLEEP = 1.0  # s behind at which the process must have been stopped, and the clock goes on from now
+STATE_PERIOD = 2  # control steps between two states
+
+
+class Connection:
+    """The socket to the server; several threads send, one receives."""
+
+    def __init__(self, link: socket.socket) -> None:
+        self._link = link
+        self._lock = threading.Lock()
+
+    def send(self, message: Message) -> None:
+        """Send a message; nothing happens if the server is gone, which the receiving thread notices."""
+        with self._lock, suppress(OSError):
+            self._link.sendall(packed(message))
+
+    def receive(self) -> Iterator[Any]:
+        """Messages until the server closes the connection."""
+        while (head := self._read(messages.LENGTH.size)) is not None:
+            content = self._read(messages.LENGTH.unpack(head)[0])
+            if content is None:
+                return
+            yield messages.decode_to_worker(content)
+
+    def _read(self, count: int) -> bytes | None:
+        parts = bytearray()
+        while len(parts) < count:
+            with suppress(OSError):
+                part = self._link.recv(count - len(parts))
+                if part:
+                    parts += part
+                    continue
+            return None
+        return bytes(parts)
+
+
+class Window(Viewer):
+    """Looks at the session before every control step: frames for the drawing thread, states, texts."""
+
+    def __init__(self, connection: Connection, drawer: "Drawer | None" = None) -> None:
+        self._connection = connection
+        self.drawer = drawer
+        self.live: LiveSession | None = None
+        self.states = False
+        self._text: messages.Text | None = None
+
+    def camera(self, world: World) -> CameraView | None:
+        """The eye camera, for a pointer to what is out of view."""
+        return None if self.drawer is None else self.drawer.camera_view(world.data)
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
+        """Hand on what changed."""
+        if self.live is None or self.drawer is None:
+            return
+        step, number = self.live.session.recording.step, self.live.input
+        self.drawer.offer(world.data, hud_state, step, number)
+        if self.states and step % STATE_PERIOD == 0:
+            self._connection.send(_state(observation, hud_state, step, number))
+        text = _text(hud_state)
+        if text != self._text:
+            self._text = text
+            self._connection.send(text)
+
+    def repeat(self) -> None:
+        """Say everything again, to a browser that has just connected."""
+        self._text = None
+
+
+class Worker:
+    """Runs one session after the other.
+
+    Args:
+        link: Socket to the server.
+    """
+
+    def __init__(self, link: socket.socket) -> None:
+        self._connection = Connection(link)
+        self._inbox = Inbox()
+        self._opened: list[messages.Open] = []
+        self._arrived = threading.Condition()
+        self._window = Window(self._connection)
+        self._view: messages.View | None = None
+
+    def run(self) -> None:
+        """Serve until the server is gone."""
+        house = House.load()
+        threading.Thread(target=self._receive, name="receiving", daemon=True).start()
+        while (opened := self._next_session()) is not None:
+            try:
+                self._serve(opened, house)
+            except Exception as error:  # the server tells the person, and keeps the journal
+                self._connection.send(messages.Failed(describe(error)))
+
+    def _next_session(self) -> messages.Open | None:
+        with self._arrived:
+            self._arrived.wait_for(lambda: self._opened or self._inbox.closed)
+            if not self._opened:
+                return None
+            self._inbox = Inbox(closed=self._inbox.closed)
+            return self._opened.pop(0)
+
+    def _receive(self) -> None:
+        for message in self._connection.receive():
+            self._take(message)
+        with self._arrived:
+            self._inbox.set(closed=True)
+            self._arrived.notify()
+
+    def _take(self, message: Any) -> None:
+        if isinstance(message, messages.Open):
+            with self._arrived:
+                self._opened.append(message)
+                self._arrived.notify()
+        elif isinstance(message, messages.Inputs):
+            self._inbox.add(message.inputs)
+        elif isinstance(message, messages.Begin):
+            self._inbox.set(begun=True)
+        elif isinstance(message, messages.Pause):
+            self._inbox.set(paused=message.reason)
+        elif isinstance(message, messages.Resume):
+            self._inbox.set(paused=None)
+        elif isinstance(message, messages.Leave):
+            self._inbox.set(leave=True)
+        elif isinstance(message, messages.View):
+            self._view = message
+            self._apply_view()
+        elif self._window.drawer is not None:
+            self._window.drawer.seen(message.frame)
+
+    def _apply_view(self) -> None:
+        if self._view is not None and self._window.drawer is not None:
+            self._window.states = self._view.state
+            self._window.repeat()
+            self._window.drawer.show_to(self._view)
+
+    def _serve(self, opened: messages.Open, house: House) -> None:
+        folder = Path(opened.folder)
+        config = None if opened.config is None else config_of(opened.config)
+        with open_journal(folder) as journal:
+            live = LiveSession(journal, house, config, self._window)
+            inbox = self._inbox
+            with Drawer(live.scene, live.house, self._connection.send) as drawer:
+                self._window.live, self._window.drawer = live, drawer
+                inbox.set(last=live.input, begun=inbox.begun or live.resumed)
+                self._connection.send(
+                    messages.Ready(live.session.recording.step, live.input, live.resumed, inbox.begun)
+                )
+                self._apply_view()
+                reason = _Clock(live, inbox, journal.sync, self._connection, self._window).run()
+                self._window.live = self._window.drawer = None
+            if reason is None:
+                live.close()
+                return
+            live.end(reason)
+        self._connection.send(messages.Over(reason, _save(folder, Path(opened.run), house)))
+
+
+class _Clock:
+    """Steps a session in real time until it is over, left, or the server is gone."""
+
+    def __init__(
+        self, live: LiveSession, inbox: Inbox, sync: Any, connection: Connection, window: Window
+    ) -> None:
+        self._live, self._inbox, self._connection, self._window = live, inbox, connection, window
+        self._sync = _Sync(sync, connection)
+
+    def run(self) -> str | None:
+        """Why the session is over; None if the server is gone."""
+        live, inbox = self._live, self._inbox
+        deadline, paused = time.monotonic(), False
+        try:
+            while (reason := live.end_reason) is None:
+                if not inbox.runs:
+                    if inbox.closed:
+                        return None
+                    if inbox.leave:
+                        return INTERRUPTED
+                    if inbox.begun and not paused:
+                        paused = self._pause(inbox.paused or "")
+                    live.session.show()
+                    inbox.wait_until_running(0.1)
+                    deadline = time.monotonic()
+                    continue
+                if paused:
+                    paused = self._resume()
+                deadline = self._step_at(deadline)
+        finally:
+            self._sync.close()
+        return reason
+
+    def _step_at(self, deadline: float) -> float:
+        """Take a control step at its time; when the next one is due."""
+        late = time.monotonic() - deadline
+        if late < 0.0:
+            time.sleep(-late)
+        elif late > ASLEEP:
+            self._live.session.note("overrun", seconds=round(late, 3), skipped=True)
+            deadline += late
+        elif late > LATE:
+            self._live.session.note("overrun", seconds=round(late, 3), skipped=False)
+        self._live.step(self._inbox.take())
+        self._sync.request(self._live.input, self._live.session.recording.step)
+        return deadline + self._live.world.control_timestep
+
+    def _pause(self, reason: str) -> bool:
+        self._live.session.note("pause", reason=reason, wall=round(time.time(), 3))
+        self._connection.send(messages.Paused(reason))
+        return True
+
+    def _resume(self) -> bool:
+        self._live.session.note("resume", wall=round(time.time(), 3))
+        self._connection.send(messages.Paused(None))
+        return False
+
+
+class _Sync:
+    """Writes the journal through to the disk in a thread of its own, then acknowledges."""
+
+    def __init__(self, sync: Any, connection: Connection) -> None:
+        self._sync, self._connection = sync, connection
+        self._changed = threading.Condition()
+        self._wanted: tuple[int, int] | None = None
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
+        self._thread.start()
+
+    def request(self, number: int, step: int) -> None:
+        """Everything up to this input and control step is in the journal."""
+        with self._changed:
+            self._wanted = number, step
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Write through what is left."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._wanted is not None or self._closed)
+                if self._wanted is None:
+                    return
+                (number, step), self._wanted = self._wanted, None
+            self._sync()
+            self._connection.send(messages.Taken(number, step))
+
+
+def _save(folder: Path, run: Path, house: House) -> dict[str, Any] | None:
+    """Make the run directory from the journal; its metrics, or None where nothing was done."""
+    journal = read_journal(folder / JOURNAL)
+    _, scene, result = result_of(journal, house)
+    if is_run(run):
+        return None
+    with run_directory(run) as work:
+        metrics = save_record(work, run, scene, result, float(result.arrays["time"][-1]))
+    draw_floor_plan(run, house, scene, result)
+    return metrics
+
+
+def _state(seen: Observation, state: HudState, step: int, number: int) -> messages.State:
+    poses = zip(
+        seen.object_names, seen.object_positions.tolist(), seen.object_quaternions.tolist(), strict=True
+    )
+    return messages.State(
+        step,
+        number,
+        seen.time,
+        [*map(float, seen.eye), seen.heading, seen.pitch],
+        {name: [*position, *quaternion] for name, position, quaternion in poses},
+        schema.to_dict(state),
+    )
+
+
+def _text(state: HudState) -> messages.Text:
+    rows = [
+        " ".join(f"{'Done: ' if item.done else ''}{item.text}. {item.detail}".split())
+        for item in state.checklist
+    ]
+    return messages.Text(
+        message="" if state.message is None else state.message.text,
+        title=state.checklist_title,
+        rows=rows,
+        hands=[slot.label or "empty" for slot in state.inventory],
+    )
+
+
+def main() -> None:
+    """Serve on the socket whose file descriptor is given."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("descriptor", type=int)
+    descriptor = parser.parse_args().descriptor
+    os.environ.setdefault("LP_NUM_THREADS", "1")  # of software rendering; many workers share the machine
+    with socket.socket(fileno=descriptor) as link:
+        Worker(link).run()
+
+
+if __name__ == "__main__":
+    main()
