@@ -1,6 +1,8 @@
 """`mjsim gallery`: the pictures of the documentation."""
 
 import argparse
+import shutil
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +10,11 @@ from experiments.commands.options import add_command, add_force, add_frame, film
 from experiments.commands.terminal import error_console
 from experiments.first_person import FilmConfig
 from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
+from experiments.records import TOPDOWN
 from experiments.run_directory import check_file
+from experiments.trial import run_trial
 from experiments.trial_config import TrialConfig
+from mjsim.files import replacing
 
 SEED = 7
 CONDITIONS = ("none", "highlight", "optimal")
@@ -20,10 +25,11 @@ SHOTS = (
     Shot("none", TrialConfig(objects=12, assistance="none", seed=0), after(6.0)),
 )
 SHEET = "contact_sheet.png"
+WALK = TrialConfig(objects=6, assistance="optimal", seed=0, fidelity="event")  # of the floor plan
 
 DESCRIPTION = """\
-Take a picture of each assistance condition from real trials, as OUT/<name>.png, and a contact sheet of the three
-conditions in four situations, as OUT/contact_sheet.png."""
+Take a picture of each assistance condition from real trials, as OUT/<name>.png, draw the floor plan of a trial, as
+OUT/topdown.png, and make a contact sheet of the three conditions in four situations, as OUT/contact_sheet.png."""
 
 
 def add_parser(commands: Any) -> None:
@@ -46,7 +52,7 @@ def add_parser(commands: Any) -> None:
 
 def _names(arguments: argparse.Namespace) -> list[str]:
     """Files that will be written."""
-    names = [] if arguments.contact_sheet else [f"{shot.name}.png" for shot in SHOTS]
+    names = [] if arguments.contact_sheet else [TOPDOWN, *(f"{shot.name}.png" for shot in SHOTS)]
     if arguments.frames:
         names += [f"{condition}_{key}.png" for condition in CONDITIONS for key in SITUATIONS]
     return [*names, SHEET]
@@ -64,6 +70,10 @@ def run(arguments: argparse.Namespace) -> int:
         console.print(str(arguments.out / name), soft_wrap=True)
 
     if not arguments.contact_sheet:
+        with tempfile.TemporaryDirectory() as folder, replacing(arguments.out / TOPDOWN) as drawn:
+            run_trial(WALK, Path(folder) / "run")
+            shutil.copyfile(Path(folder) / "run" / TOPDOWN, drawn)
+        console.print(str(arguments.out / TOPDOWN), soft_wrap=True)
         for name, frame in take_pictures(SHOTS, film_config(arguments)).items():
             write(f"{name}.png", frame)
     frames = {}
