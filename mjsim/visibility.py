@@ -109,7 +109,8 @@ def visible_objects(
     """
     sight = scene.once("sight", lambda: _sight_geometry(scene))
     names = scene.index.names
-    wanted = np.array([among is None or name in among for name in names], np.bool_)
+    looked_for = frozenset(names if among is None else among)
+    wanted = np.array([name in looked_for for name in names], np.bool_)
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
     owners, rays = open_rays(sight, data.geom_xpos, data.geom_xmat, wanted, gaze)
     seen: set[int] = set()
