@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from mjsim.errors import EpisodeError
+from mjsim.errors import EpisodeError, brief
 from mjsim.files import write_text_atomically
 
 FORMAT_VERSION = 1
@@ -130,7 +130,7 @@ class Episode:
                 f"episode {path} is not UTF-8 at byte {error.start}; save it as UTF-8"
             ) from error
         except EpisodeError as error:
-            raise EpisodeError(f"{path}: {error}") from error
+            raise EpisodeError(brief(f"{path}: {error}")) from error
 
 
 class _Header(msgspec.Struct):

@@ -48,3 +48,9 @@ class StateError(MjsimError):
 
 class RenderError(MjsimError):
     """No GL context could be made, or a frame cannot be drawn."""
+
+
+def brief(text: str, limit: int = 600) -> str:
+    """A message as one line of at most `limit` characters: whatever a file holds, its error can be read."""
+    line = " ".join(text.split())
+    return line if len(line) <= limit else f"{line[: limit // 2]} ... {line[-limit // 2 :]}"

@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeVar
 
 import msgspec
 
-from mjsim.errors import AssetError
+from mjsim.errors import AssetError, brief
 from mjsim.model.assets import models_root
 from mjsim.model.model_files import content_hash
 
@@ -117,8 +117,8 @@ class Catalogue:
         try:
             text = path.read_text(encoding="utf-8")
             return _Reader(path, tomllib.loads(text)).catalogue(house, text)
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-            raise AssetError(f"cannot read catalogue {path}: {error}") from error
+        except (OSError, UnicodeDecodeError, RecursionError, tomllib.TOMLDecodeError) as error:
+            raise AssetError(brief(f"cannot read catalogue {path}: {error}")) from error
 
 
 def _catalogue_path(house: str) -> Path:
@@ -198,7 +198,7 @@ class _Reader:
         )
 
     def _error(self, where: str, message: str) -> AssetError:
-        return AssetError(f"{self._path}: [{where}] {message}")
+        return AssetError(brief(f"{self._path}: [{where}] {message}"))
 
     def _convert(self, value: Any, kind: type[T], where: str) -> T:
         try:

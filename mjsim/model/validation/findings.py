@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from mjsim.errors import brief
+
 Severity = Literal["error", "warning"]
 
 
@@ -31,7 +33,7 @@ class Finding:
 
     def __str__(self) -> str:
         where = f"{self.subject} ({self.file})" if self.file else self.subject
-        return f"{where}: {self.message}; {self.remedy}"
+        return brief(f"{where}: {self.message}; {self.remedy}")
 
 
 def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -43,4 +45,4 @@ def one_line(findings: Iterable[Finding], name: object) -> str:
     """The first error of what is called `name`, and how many more there are, for an exception."""
     first, *more = errors(findings)
     rest = f" ({len(more)} more; `mjsim check` lists them)" if more else ""
-    return f"{name}: {' '.join(str(first).split())}{rest}"
+    return f"{name}: {first}{rest}"

@@ -34,7 +34,8 @@ def check_house(house: "CompiledHouse") -> list[Finding]:
         compiled = compile_model(f"object {model.key}", model.path)
         if isinstance(compiled, Compiled):
             found += check_compiled_object(compiled)
-            footprints[model.key] = np.sort(np.ptp(compiled.extent(compiled.solid), axis=0)[:2])
+            if len(compiled.solid):
+                footprints[model.key] = np.sort(np.ptp(compiled.extent(compiled.solid), axis=0)[:2])
         else:
             found += compiled
     return found if errors(found) else [*found, *_check_composed(house), *_check_sizes(house, footprints)]
