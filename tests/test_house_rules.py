@@ -9,6 +9,7 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import CompiledHouse, compiled_house
 from mjsim.model.validation.findings import Finding, errors
 from mjsim.model.validation.receptacle_rules import check_receptacle
+from mjsim.model.validation.report import check_path
 from mjsim.model.validation.validate import check_house
 
 DOOR = '<body name="door" pos="3 2 1"><joint name="hinge" axis="0 0 1"/><geom type="box" size=".02 .4 1"/></body>'
@@ -248,3 +249,43 @@ def test_what_only_surprises_is_a_warning(change: str, fresh_house: Path) -> Non
 @pytest.mark.parametrize("key", list(Catalogue.load().receptacles))
 def test_shipped_receptacles_have_no_findings(key: str) -> None:
     assert check_receptacle(Catalogue.load().receptacles[key].path) == []
+
+
+def write_grid_house(folder: Path, columns: int, rows: int, width: float = 10.0, depth: float = 5.0) -> Path:
+    """Rooms in a grid with a doorway of 1 m in the middle of every inner wall; bins and objects of the small house."""
+    x_end, y_end = columns * width, rows * depth
+    walls = [(x_end / 2, y, x_end / 2 + 0.1, 0.1) for y in (-0.1, y_end + 0.1)]
+    walls += [(x, y_end / 2, 0.1, y_end / 2) for x in (-0.1, x_end + 0.1)]
+    for i in range(columns):
+        for j in range(rows):
+            x, y = i * width, j * depth
+            quarter = ((width - 1) / 4, (depth - 1) / 4)
+            if i:
+                walls += [(x, y + s * quarter[1] + (s > 1), 0.05, quarter[1]) for s in (1, 3)]
+            if j:
+                walls += [(x + s * quarter[0] + (s > 1), y, quarter[0], 0.05) for s in (1, 3)]
+    geoms = [f'<geom type="box" pos="{x} {y} 1.25" size="{a} {b} 1.25"/>' for x, y, a, b in walls]
+    keys = [(f"r{i}_{j}", (i + 0.5) * width, (j + 0.5) * depth) for i in range(columns) for j in range(rows)]
+    sites = [
+        f'<site name="room:{k}" type="box" pos="{x} {y} 1" size="{width / 2} {depth / 2} 1"/>'
+        for k, x, y in keys
+    ]
+    mounts = [f'<site name="mount:{k}" pos="{x} {depth - 0.5} 0"/>' for k, x in (("crate", 1), ("tray", 4))]
+    floor = f'<geom type="plane" size="{x_end} {y_end} 0.1"/>'
+    (folder / "house.xml").write_text(
+        f"<mujoco><worldbody>{floor}{''.join(geoms + sites + mounts)}</worldbody></mujoco>", encoding="utf-8"
+    )
+    catalogue = folder / "catalogue.toml"
+    text = catalogue.read_text(encoding="utf-8").replace('room = "west"', 'room = "r0_0"')
+    text = text.replace('room = "east"', 'room = "r0_0"').replace('west = "West room"', "")
+    rooms = "\n".join(f'{k} = "Room {k}"' for k, _, _ in keys)
+    catalogue.write_text(text.replace('east = "East room"', rooms), encoding="utf-8")
+    return catalogue
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(1, 1), (6, 6)])
+def test_houses_of_50_to_1800_square_metres_can_be_used(columns: int, rows: int, fresh_house: Path) -> None:
+    catalogue = write_grid_house(fresh_house.parent, columns, rows)
+    report = check_path(str(catalogue))
+    assert report.usable and report.facts["size"] == f"{10 * columns:.1f} x {5 * rows:.1f} m"
+    assert {f.rule for f in report.findings} <= {"points"}

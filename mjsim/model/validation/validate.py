@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from mjsim.errors import AssetError
 from mjsim.model.validation.compiled import Compiled, compile_model
 from mjsim.model.validation.findings import Finding, errors
-from mjsim.model.validation.floor_rules import Floor, check_floor
+from mjsim.model.validation.floor import Floor
+from mjsim.model.validation.floor_rules import check_floor
 from mjsim.model.validation.house_rules import check_house_file
 from mjsim.model.validation.object_rules import check_compiled_object
 from mjsim.model.validation.receptacle_rules import check_receptacle
