@@ -9,7 +9,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from experiments.commands.options import HOUSE_HELP, add_command
+from experiments.commands.options import HOUSE_HELP, add_command, add_force
+from experiments.run_directory import check_file
 from mjsim.model.validation.report import Report, check_path
 
 UNUSABLE = 2
@@ -35,10 +36,13 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--picture", type=Path, metavar="FILE.png", help="draw it, with every finding numbered where it is"
     )
+    add_force(parser, "replace a picture that exists")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Check, print, draw."""
+    if arguments.picture is not None:
+        check_file(arguments.picture, replace=arguments.force)
     report = check_path(arguments.path, arguments.house)
     if arguments.json:
         print(json.dumps(as_json(report), indent=2))
