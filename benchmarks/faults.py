@@ -34,7 +34,7 @@ REQUIREMENTS = (
     Requirement("files that differ from an undisturbed command's", "different", "<=", 0),
     Requirement("files and folders left behind", "left", "<=", 0),
     Requirement("stopped runs whose record does not replay", "unreadable", "<=", 0),
-    Requirement("tracebacks", "tracebacks", "<=", 0),
+    Requirement("tracebacks and internal errors", "tracebacks", "<=", 0),
 )
 
 
@@ -105,7 +105,7 @@ class _Kills:
         self._counts["too_late"] += code == 0
         self._signals[number.name] += 1
         said = out.with_suffix(".txt").read_text()
-        if "Traceback" in said:
+        if "Traceback" in said or "internal error" in said:
             self._fault("tracebacks", f"{out.name}, {number.name} after {moment:.2f} s: {said[-400:]!r}")
         if not command.is_batch and out.exists():
             self._check_run(out)

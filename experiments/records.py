@@ -187,6 +187,9 @@ class Trajectory:
         columns.action[first : self._length, :2] = 0.0, -1.0
         columns.action[first : self._length, 2:] = moves
 
+    def __len__(self) -> int:
+        return self._length
+
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Everything so far, as arrays by name, shapes as above; views that further steps leave unchanged."""
         arrays = {name: column[: self._length] for name, column in self._columns._asdict().items()}

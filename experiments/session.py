@@ -198,7 +198,9 @@ class Session:
     def _log_end(self, time: float, reason: str, **details: str) -> None:
         """Log the end; a record has one state at least."""
         if not self.recording.step:
-            self._record(IDLE)
+            self.recording.append()
+        if not len(self.trajectory):
+            self.trajectory.append(self._now, IDLE, self._world.health_sample)
         self._log.append(time, "end", reason=reason, **details)
 
     def _action(self, decision: Decision) -> Action:

@@ -8,7 +8,7 @@ from types import FrameType
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-PATIENCE = 1.0  # s that a trial has to notice a signal, before it is interrupted wherever it is
+PATIENCE = 2.0  # s that a trial has to notice a signal, before it is interrupted wherever it is
 
 
 class Stopped(KeyboardInterrupt):

@@ -35,7 +35,7 @@ def user_code(code: object, what: str) -> Iterator[None]:
         yield
     except OUR_ERRORS:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # somebody's code must not end the process and lose the run
         if _is_ours(code):
             raise
         raise UserCodeError(f"{what} raised {describe(error)}{_place(error)}") from error

@@ -19,6 +19,7 @@ from mjsim.episode import CAPACITY
 from mjsim.model.sampling import POINTS
 from mjsim.options import CAPACITIES, FIDELITIES
 from mjsim.render import FAST, PROFILES
+from mjsim.render.rasteriser import MAX_SIDE
 from planner.solver import DEFAULT_SOLVER, SOLVERS
 
 HOUSE_HELP = "name of a house, or path of its catalogue.toml"
@@ -51,8 +52,10 @@ def frame_size(text: str) -> tuple[int, int]:
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, such as 640x480")
     width, height = int(match[1]), int(match[2])
-    if width % 2 or height % 2 or width < 160 or height < 120:
-        raise argparse.ArgumentTypeError(f"{text} must be even in both directions and at least 160x120")
+    if width % 2 or height % 2 or width < 160 or height < 120 or max(width, height) > MAX_SIDE:
+        raise argparse.ArgumentTypeError(
+            f"{text} must be even in both directions, at least 160x120 and at most {MAX_SIDE}x{MAX_SIDE}"
+        )
     return width, height
 
 

@@ -62,6 +62,7 @@ def check_kept(house, out, fault):
     [
         ("1 / 0", "raised ZeroDivisionError: division by zero"),
         ("raise KeyError('x')", "raised KeyError"),
+        ("raise SystemExit(3)", "raised SystemExit"),
         ("return None", "answered None"),
         ("return 'left'", "answered 'left'"),
     ],

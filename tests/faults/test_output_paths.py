@@ -97,6 +97,8 @@ def nothing_is_computed(monkeypatch):
     monkeypatch.setattr("experiments.commands.gallery.take_pictures", fail)
     monkeypatch.setattr("experiments.commands.plan.solver", fail)
     monkeypatch.setattr("experiments.commands.replay.replay", fail)
+    monkeypatch.setattr("experiments.commands.check.check_path", fail)
+    monkeypatch.setattr("experiments.commands.compare.read_blocks", fail)
 
 
 def refused(words, tmp_path, capsys, codes=(1, 2)):
@@ -168,13 +170,15 @@ def commands_that_write_a_file(tmp_path):
         "plan": ["plan", problem, "--certificate"],
         "replay": ["replay", tmp_path, "--video"],
         "bench": ["bench", "planner", "--picture"],
+        "check": ["check", "apartment", "--picture"],
+        "compare": ["compare", tmp_path, "--csv"],
     }
 
 
 @pytest.mark.parametrize(
     "make", [make_file, make_notes, make_dangling_link, make_loop, make_pipe, below_a_file]
 )
-@pytest.mark.parametrize("command", ["house", "plan", "replay", "bench"])
+@pytest.mark.parametrize("command", ["house", "plan", "replay", "bench", "check", "compare"])
 def test_files_that_exist_are_kept(command, make, tmp_path, capsys):
     words = commands_that_write_a_file(tmp_path)[command]
     place = make(tmp_path / "out.xml") or tmp_path / "out.xml"

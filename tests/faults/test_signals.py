@@ -10,9 +10,11 @@ import pytest
 
 from experiments import records
 from experiments.files import read_json
-from experiments.records import read_events
+from experiments.records import Trajectory, read_events
 from experiments.replaying.replay import replay
 from experiments.signals import PATIENCE, Stopped, signals_postponed, signals_raised
+from experiments.trial import run_trial
+from experiments.trial_config import TrialConfig
 from faults.conftest import FAST, ROOT, one_line
 
 PARTICIPANT = """
@@ -113,3 +115,23 @@ def test_a_worker_that_is_killed_is_one_line(tmp_path, mjsim, own_module):
     assert done.returncode == 1
     assert "Traceback" not in done.stderr and "worker" in done.stderr
     assert not list((tmp_path / "out" / "trials").iterdir())
+
+
+def test_a_signal_in_the_very_first_step_leaves_one_state(house, tmp_path, monkeypatch):
+    """Where a step takes so long that the signal cannot wait, it comes between two halves of the record."""
+    monkeypatch.setattr(Trajectory, "append", stopped_once(Trajectory.append))
+    config = TrialConfig(objects=2, assistance="optimal", seed=0, regret=False)
+    assert run_trial(config, tmp_path / "out", topdown=False, house=house)["ended"] == "interrupted"
+    assert replay(tmp_path / "out", house=house).steps == 1
+
+
+def stopped_once(function):
+    calls = []
+
+    def stopped(*args):
+        calls.append(args)
+        if len(calls) == 1:
+            raise Stopped(signal.SIGTERM)
+        return function(*args)
+
+    return stopped
