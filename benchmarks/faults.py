@@ -27,7 +27,7 @@ from experiments.replaying.replay import replay
 
 KILLS, QUICK_KILLS = 200, 6
 KILLS_IN_A_ROW = 4  # before a command is left to finish
-LATEST = 1.1  # kills come within this share of the processor time that an undisturbed command takes
+EARLIEST, LATEST = 0.1, 1.0  # kills come within these shares of the processor time of an undisturbed command
 SEED = 20
 
 REQUIREMENTS = (
@@ -54,7 +54,7 @@ def lines(result: Mapping[str, Any]) -> Iterator[str]:
     """The result, for people."""
     sent = ", ".join(f"{number} {name}" for name, number in result["signals"].items())
     yield f"{result['kills']} kills ({sent}): {result['runs']} of runs, {result['batches']} of batches"
-    yield f"{result['too_late']} came after the end; {result['kept']} stopped runs kept a record"
+    yield f"{result['too_late']} more came after the end; {result['kept']} stopped runs kept a record"
     yield from requirement_lines(result, REQUIREMENTS)
     yield from result["faults"]
 
@@ -96,14 +96,15 @@ class _Kills:
 
     def _kill(self, command: Command, out: Path) -> None:
         number = SIGNALS[self._rng.integers(len(SIGNALS))]
-        # More often towards the end, where there is something to lose.
-        moment = LATEST * float(np.sqrt(self._rng.random())) * self._cpu[command]
+        moment = float(self._rng.uniform(EARLIEST, LATEST)) * self._cpu[command]
         group = bool(self._rng.random() < 0.5)
         code = kill(start(command, out, *_more(command, out)), number, moment, group=group)
-        self._counts["kills"] += 1
-        self._counts["batches" if command.is_batch else "runs"] += 1
-        self._counts["too_late"] += code == 0
-        self._signals[number.name] += 1
+        if code == 0:
+            self._counts["too_late"] += 1
+        else:
+            self._counts["kills"] += 1
+            self._counts["batches" if command.is_batch else "runs"] += 1
+            self._signals[number.name] += 1
         said = out.with_suffix(".txt").read_text()
         if "Traceback" in said or "internal error" in said:
             self._fault("tracebacks", f"{out.name}, {number.name} after {moment:.2f} s: {said[-400:]!r}")

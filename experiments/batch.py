@@ -72,8 +72,9 @@ def run_batch(
     """
     if workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
-    inputs = check_trials(design.trials)
     check_batch_folder(out)
+    inputs = check_trials(design.trials)
+    (out / TRIALS).mkdir(parents=True, exist_ok=True)
     plan = plan_batch(design.trials, inputs, out)
     for note in filter(None, (*plan.notes, confounded(design.trials))):
         on_note(note)

@@ -54,8 +54,9 @@ class PlanProcess:
         self._seconds = seconds
         self._started = time.perf_counter()
         self._pipe, writing = os.pipe()
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:  # it is None where the descriptor is closed
+                stream.flush()
         parent = os.getpid()
         self._child = os.fork()
         if self._child == 0:

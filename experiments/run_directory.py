@@ -69,7 +69,7 @@ def check_run_directory(path: Path, *, replace: bool = False) -> Path:
 
 
 def check_batch_folder(path: Path) -> None:
-    """Whether a batch may be written to `path`, or added to one that is there; makes the folder.
+    """Whether a batch may be written to `path`, or added to one that is there.
 
     Raises:
         RecordError: Something else is in the way.
@@ -83,8 +83,7 @@ def check_batch_folder(path: Path) -> None:
         raise RecordError(
             f"{path} holds {what} and is not the folder of a batch; choose another --out or move it away"
         )
-    (place / TRIALS).mkdir(parents=True, exist_ok=True)
-    _check_writable(place / TRIALS)
+    _check_writable(_existing(place / TRIALS))
 
 
 def check_file(path: Path, *, replace: bool = False) -> None:
@@ -99,10 +98,7 @@ def check_file(path: Path, *, replace: bool = False) -> None:
         raise RecordError(f"{path} is not a regular file; name a file that does not exist yet")
     if place.exists() and not replace:
         raise RecordError(f"{path} exists; name another file, or replace it with --force")
-    folder = place.parent
-    while not folder.exists():
-        folder = folder.parent
-    _check_writable(folder)
+    _check_writable(_existing(place.parent))
 
 
 @contextmanager
@@ -174,6 +170,13 @@ def _place(path: Path) -> Path:
     if path.is_symlink() and not path.exists():
         raise RecordError(f"{path} is a symbolic link that leads nowhere; remove it or choose another --out")
     return Path(os.path.realpath(path))
+
+
+def _existing(folder: Path) -> Path:
+    """The folder, or the lowest one above it that exists."""
+    while not folder.exists():
+        folder = folder.parent
+    return folder
 
 
 def _check_writable(folder: Path) -> None:
