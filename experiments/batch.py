@@ -19,7 +19,7 @@ from experiments.run_directory import TRIALS, check_batch_folder
 from experiments.signals import signals_postponed
 from experiments.table import write_tables
 from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.trial_config import SEEDS, TrialConfig
 from experiments.workers import worker_pool
 from mjsim.files import remove_leftovers
 
@@ -109,13 +109,19 @@ def _write_rows(
     found, unusable = read_trials(out)
     stored = [trial for trial in found if trial.complete]
     order = {trial_key(trial.settings()): number for number, trial in enumerate(trials)}
-    stored.sort(key=lambda trial: order.get(trial_key(trial.settings), len(order)))
+    stored.sort(
+        key=lambda trial: (order.get(trial_key(trial.settings), len(order)), _sort_key(trial.settings))
+    )
     for note in folder_notes(found, unusable):
         on_note(note)
     rows = [trial.row for trial in stored]
     if rows:
         write_tables(out, rows)
     return rows
+
+
+def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
+    return [settings[name] for name in ("objects", "assistance", "user", "house", *SEEDS)]
 
 
 def _results(

@@ -92,6 +92,13 @@ def test_equal_differences_and_single_pairs_have_no_effect_size(tmp_path):
     assert mean_interval(np.array([1.0])) is None
 
 
+def test_two_pairs_that_hardly_vary_have_no_interval_of_the_effect(tmp_path):
+    blocks = read_blocks(batch(tmp_path, {"none": [1.0, 2.0], "optimal": [2.0, 3.01]}))
+    (found,) = compare(blocks, ["task_distance_m"])
+    assert found.effect == pytest.approx(1.005 / (0.01 / np.sqrt(2)))
+    assert found.effect_interval is None or np.isfinite(found.effect_interval).all()
+
+
 def test_the_command_shows_and_writes_both_and_replaces_nothing(tmp_path, capsys):
     folder = batch(
         tmp_path / "b", {"none": [1.0, 2.0, 3.5], "optimal": [2.0, 2.5, 5.0], "highlight": [1, 1, 1.0]}

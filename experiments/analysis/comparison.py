@@ -217,5 +217,8 @@ def _noncentrality(statistic: float, freedom: int, share: float) -> float | None
     step = math.sqrt(1.0 + statistic**2 / (2 * freedom))
     for width in step * np.arange(1.0, STEPS):
         if excess(statistic - width) > 0 > excess(statistic + width):
-            return float(brentq(excess, statistic - width, statistic + width))
+            try:
+                return float(brentq(excess, statistic - width, statistic + width))
+            except ValueError:  # one in between is no number: two pairs that differ by nearly the same
+                return None
     return None
