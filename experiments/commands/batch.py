@@ -26,7 +26,7 @@ from experiments.commands.options import (
 )
 from experiments.commands.person_options import PERSON_OPTIONS
 from experiments.commands.terminal import error_console, progress_bars
-from experiments.design import Design, factorial, read_design
+from experiments.design import Design, counted, factorial, read_design
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
 
@@ -130,5 +130,5 @@ def run(arguments: argparse.Namespace) -> int:
             bars.console.print(line, style="yellow", soft_wrap=True)
 
         rows = run_batch(design, arguments.out, workers=arguments.workers, on_progress=show, on_note=note)
-    console.print(f"{len(rows)} trials in {arguments.out}/trials.parquet and .csv; {failed} failed")
+    console.print(f"{counted(len(rows), 'trial')} in {arguments.out}/trials.parquet and .csv; {failed} failed")
     return 1 if failed else 0
