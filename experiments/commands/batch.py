@@ -130,5 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
             bars.console.print(line, style="yellow", soft_wrap=True)
 
         rows = run_batch(design, arguments.out, workers=arguments.workers, on_progress=show, on_note=note)
-    console.print(f"{counted(len(rows), 'trial')} in {arguments.out}/trials.parquet and .csv; {failed} failed")
+    console.print(
+        f"{counted(len(rows), 'trial')} in {arguments.out}/trials.parquet and .csv; {failed} failed"
+    )
     return 1 if failed else 0
