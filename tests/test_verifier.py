@@ -106,7 +106,8 @@ def test_tampered_tours_are_refused():
 def test_what_takes_too_much_is_said_and_not_claimed():
     problem = random_problem(3, 20)
     plan = SEARCH.solve(problem)
-    found = verify_optimal(problem, plan, max_states=5)
+    loose = Certificate(Proof.RELAXATION, 1e-4, -(10**9), (tuple(range(20)),), (0,) * 20)
+    found = verify_optimal(problem, dataclasses.replace(plan, certificate=loose), max_states=5)
     assert not found.optimal and "states" in found.why
     assert found.lower_bound < plan.cost
     without = verify_optimal(random_problem(3, 14), GreedySolver().solve(random_problem(3, 14)))

@@ -40,8 +40,9 @@ class ExactSolver:
     name: str = "exact"
     table_bytes: int = 1 << 27  # 18 objects and 6 bins: 0.2 s
     passes: tuple[tuple[int, int], ...] = (
-        (1, 3_000),
-        (1_000, 20_000),
+        (600, 1_500),
+        (2_500, 8_000),
+        (8_000, 20_000),
         (16_000, 60_000),
         (BIN_ROWS, 60_000),
         (1 << 17, 200_000),

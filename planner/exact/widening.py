@@ -14,7 +14,7 @@ from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
 from planner.exact.warm_start import Start
 
-ANNEALING_MOVES = 20_000
+ANNEALING_MOVES = 10_000
 # A first plan from a warm start: some 20 ms.
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
 WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
