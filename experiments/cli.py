@@ -20,10 +20,12 @@ COMMANDS = (
     "plan",
     "house",
     "check",
+    "import",
     "gallery",
     "bench",
     "doctor",
 )
+MODULES = {"import": "import_"}  # where a module cannot be called as its command
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
@@ -64,7 +66,8 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     top.add_argument("--version", action=_Version)
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS if command is None else (command,):
-        importlib.import_module(f"experiments.commands.{name}").add_parser(commands)
+        module = importlib.import_module(f"experiments.commands.{MODULES.get(name, name)}")
+        module.add_parser(commands)
     return top
 
 

@@ -20,7 +20,12 @@ T = TypeVar("T")
 
 
 def run_sessions(
-    run: Callable[[House, int], T], count: int, *, workers: int | None = None, only: int | None = None
+    run: Callable[[House, int], T],
+    count: int,
+    *,
+    workers: int | None = None,
+    only: int | None = None,
+    house: str = "apartment",
 ) -> list[T]:
     """Run sessions 0 to count - 1, or one of them alone.
 
@@ -29,33 +34,34 @@ def run_sessions(
         count: How many.
         workers: Processes; one per core unless said.
         only: Number of the one session to run, to look at a failure again.
+        house: Name of the house, or path of its catalogue.
 
     Returns:
         Their results, in the order of the numbers.
     """
     numbers = range(count) if only is None else range(only, only + 1)
-    results = _results(run, numbers, workers or os.cpu_count() or 1)
+    results = _results(run, numbers, workers or os.cpu_count() or 1, house)
     return list(track(results, "sessions", total=len(numbers), console=Console(stderr=True)))
 
 
-def _results(run: Callable[[House, int], T], numbers: Sequence[int], workers: int) -> Iterator[T]:
+def _results(run: Callable[[House, int], T], numbers: Sequence[int], workers: int, name: str) -> Iterator[T]:
     if workers == 1 or len(numbers) < 2 * workers:
-        house = House.load()
+        house = House.load(name)
         yield from (run(house, number) for number in numbers)
         return
     # Spawned, not forked: a forked thread pool would not survive.
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield from pool.map(functools.partial(_run_in_worker, run), numbers)
+        yield from pool.map(functools.partial(_run_in_worker, run, name), numbers)
 
 
-def _run_in_worker(run: Callable[[House, int], T], number: int) -> T:
-    return run(_house(), number)
+def _run_in_worker(run: Callable[[House, int], T], name: str, number: int) -> T:
+    return run(_house(name), number)
 
 
 @functools.cache
-def _house() -> House:
-    """One house per process."""
-    return House.load()
+def _house(name: str) -> House:
+    """Each house once per process."""
+    return House.load(name)
 
 
 def upright_object(

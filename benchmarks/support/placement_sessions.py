@@ -16,7 +16,9 @@ from experiments.house import House
 from mjsim.actions import IDLE, EventKind, Pick, Place
 from mjsim.episode import Episode, PlacedObject
 from mjsim.errors import PhysicsError
+from mjsim.model.catalogue import Category
 from mjsim.model.scene import compose
+from mjsim.options import WorldOptions
 from mjsim.world import World
 
 SEED = 2026
@@ -67,8 +69,12 @@ class Placement:
 
 def run_session(house: House, number: int) -> list[Placement]:
     """Run session `number`; the same number gives the same session, to the last bit."""
-    episode = make_episode(house, number)
-    world = World(compose(episode, house.catalogue))
+    return run_episode(house, make_episode(house, number))
+
+
+def run_episode(house: House, episode: Episode, options: WorldOptions | None = None) -> list[Placement]:
+    """Place the objects of a session's episode, one after another."""
+    world, number = World(compose(episode, house.catalogue), options), episode.seed
     found: list[Placement] = []
     fill = 0
     for placed in episode.objects:
@@ -84,16 +90,23 @@ def make_episode(house: House, number: int) -> Episode:
     """The person near a receptacle with objects around: categories in turn, everything else drawn by chance."""
     rng = np.random.default_rng([SEED, number])
     category = list(house.catalogue.categories.values())[number % len(house.catalogue.categories)]
+    return arrange(house, number, category, list(category.objects) * 2, rng)
+
+
+def arrange(
+    house: House, number: int, category: Category, models: list[str], rng: np.random.Generator
+) -> Episode:
+    """The person near the receptacle of a category, with `LEVELS` of these models around, in any order."""
     receptacle = house.receptacles[category.receptacle]
     while True:
         stand = _stand(house, category.receptacle, rng)
         spots = _spots(house, stand, rng)
         if len(spots) == LEVELS:
             break
-    models = [str(model) for model in rng.permutation(list(category.objects) * 2)[:LEVELS]]
+    drawn = [str(model) for model in rng.permutation(models)[:LEVELS]]
     objects = [
         upright_object(house, i, model, spot, DROP, rng.uniform(-math.pi, math.pi))
-        for i, (model, spot) in enumerate(zip(models, spots, strict=True))
+        for i, (model, spot) in enumerate(zip(drawn, spots, strict=True))
     ]
     towards = math.atan2(*(receptacle.center[:2] - stand)[::-1])
     return session_episode(house, number, stand, float(towards + rng.uniform(-1.5, 1.5)), objects)

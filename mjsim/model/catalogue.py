@@ -1,6 +1,5 @@
 """What a house offers: its rooms, categories, receptacles and object models, read from `catalogue.toml`."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ import msgspec
 
 from mjsim.errors import AssetError, brief
 from mjsim.model.assets import models_root
+from mjsim.model.catalogue_files import catalogue_path, read_tables
 from mjsim.model.model_files import content_hash
 
 T = TypeVar("T")
@@ -113,27 +113,9 @@ class Catalogue:
             AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused
                 or used twice; the message names the culprit.
         """
-        path = _catalogue_path(house)
-        try:
-            text = path.read_text(encoding="utf-8")
-            return _Reader(path, tomllib.loads(text)).catalogue(house, text)
-        except (OSError, UnicodeDecodeError, RecursionError, tomllib.TOMLDecodeError) as error:
-            raise AssetError(brief(f"cannot read catalogue {path}: {error}")) from error
-
-
-def _catalogue_path(house: str) -> Path:
-    if house.endswith(".toml"):
-        path = Path(house)
-        if not path.is_file():
-            raise AssetError(f"no catalogue at {path}; give a house name or the path of a catalogue.toml")
-        return path.resolve()
-    houses = models_root() / "houses"
-    path = houses / house / "catalogue.toml"
-    # A name with a separator would leave the folder of houses: that is a path, and paths end in .toml.
-    if Path(house).name != house or not path.is_file():
-        known = sorted(p.parent.name for p in houses.glob("*/catalogue.toml"))
-        raise AssetError(f"no house {house!r}; there are {known}, or give the path of a catalogue.toml")
-    return path
+        path = catalogue_path(house)
+        tables, text = read_tables(path)
+        return _Reader(path, tables).catalogue(house, text)
 
 
 _Text = Annotated[str, msgspec.Meta(pattern=r"\S")]  # not blank
@@ -149,10 +131,14 @@ class _Tables(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class _ModelEntry(msgspec.Struct):
-    """An entry of [objects], or [house]."""
+    """An entry that names a model, such as [house]."""
 
     label: _Text
     model: _Text
+
+
+class _ObjectEntry(_ModelEntry):
+    category: _Text | None = None  # instead of being listed there
 
 
 class _ReceptacleEntry(_ModelEntry):
@@ -176,7 +162,7 @@ class _Reader:
         self._rooms = {k: self._convert(v, _Text, f"rooms.{k}") for k, v in tables.rooms.items()}
         self._categories = self._entries(tables.categories, _CategoryEntry, "categories")
         self._receptacles = self._entries(tables.receptacles, _ReceptacleEntry, "receptacles")
-        self._objects = self._entries(tables.objects, _ModelEntry, "objects")
+        self._objects = self._entries(tables.objects, _ObjectEntry, "objects")
 
     def catalogue(self, name: str, text: str) -> Catalogue:
         categories, receptacles, objects = (
@@ -238,7 +224,15 @@ class _Reader:
             for model in entry.objects:
                 if model not in self._objects:
                     raise self._error(where, f"lists the object {model!r}, which is not in [objects]")
-        return {k: Category(k, e.label, e.receptacle, e.objects) for k, e in self._categories.items()}
+        return {k: Category(k, e.label, e.receptacle, self._members(k)) for k, e in self._categories.items()}
+
+    def _members(self, category: str) -> tuple[str, ...]:
+        """Objects that a category lists, then those that name it themselves."""
+        listed = self._categories[category].objects
+        return (
+            *listed,
+            *(k for k, o in self._objects.items() if o.category == category and k not in listed),
+        )
 
     def _checked_receptacles(self) -> dict[str, Receptacle]:
         category_of = {entry.receptacle: key for key, entry in self._categories.items()}
@@ -257,8 +251,8 @@ class _Reader:
 
     def _checked_objects(self) -> dict[str, ObjectModel]:
         category_of: dict[str, str] = {}
-        for category, listed in self._categories.items():
-            for key in listed.objects:
+        for category in self._categories:
+            for key in self._members(category):
                 if key in category_of:
                     raise self._error(
                         f"objects.{key}",
@@ -269,6 +263,7 @@ class _Reader:
         for key, entry in self._objects.items():
             where = f"objects.{key}"
             if key not in category_of:
-                raise self._error(where, "is in no category; list it in one of [categories] or remove it")
+                known = f"one of [categories], {sorted(self._categories)},"
+                raise self._error(where, f"is in no category; list it in {known} or remove it")
             objects[key] = ObjectModel(key, entry.label, category_of[key], self._file(entry, where))
         return objects

@@ -63,6 +63,15 @@ def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise AssetError(f"cannot compile {path}: {error}") from error
+    return draw_picture(model, size, str(path))
+
+
+def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
+    """Draw a compiled model: RGBA (size, size, 4), straight alpha, rows from the top; errors call it `name`.
+
+    Raises:
+        RenderError: As for `render_pictures`.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if not 1 <= size <= 1024:
@@ -70,7 +79,7 @@ def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
     side = size * SUPERSAMPLING
     with Rasteriser(model, side, side, _PROFILE, lights=_LIGHTS) as rasteriser, current_context():
         rasteriser.update(data)
-        view = _framed(rasteriser, _first_view(model, data), path)
+        view = _framed(rasteriser, _first_view(model, data), name)
         colour, mask = rasteriser.colour(view), rasteriser.geometry(view)[0] >= 0
     return _reduce(colour, mask, size)
 
@@ -105,13 +114,13 @@ def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
     return (centres - halves).min(axis=0), (centres + halves).max(axis=0)
 
 
-def _framed(rasteriser: Rasteriser, view: View, path: Path) -> View:
+def _framed(rasteriser: Rasteriser, view: View, name: str) -> View:
     """The view shifted and scaled so that what is seen fills the picture; twice, the second time finely."""
     for _ in range(2):
         mask = rasteriser.geometry(view)[0] >= 0
         if not mask.any():
             raise RenderError(
-                f"{path} shows nothing: give it geoms in the groups 0 to 2 that are not transparent"
+                f"{name} shows nothing: give it geoms in the groups 0 to 2 that are not transparent"
             )
         side = len(mask)
         columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))

@@ -1,0 +1,202 @@
+"""A catalogue that extends a house by imported objects, each in a folder of its own: written whole or not at all."""
+
+import json
+import os
+import re
+import tomllib
+import unicodedata
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mjsim.errors import AssetError
+from mjsim.files import exchange, work_folder, write_text_atomically
+from mjsim.importing.model_writer import MODEL
+from mjsim.importing.surface import Floats
+from mjsim.importing.values import Decision
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.house import compiled_house
+from mjsim.model.validation.findings import errors, one_line
+from mjsim.model.validation.object_rules import check_object
+
+CATALOGUE = "catalogue.toml"
+HELD = 4  # objects of a kind that a bin has room for, by their boxes
+LONGEST_LABEL = 40
+_WALL_GAP = 0.02  # m, between an object and the walls of its bin
+_HEADER = "# Objects that a house has in addition. Run in it with --house and the path of this file.\nextends = {}\n"
+_ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {model}\n"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """How a catalogue names an object.
+
+    Attributes:
+        key: Its key and the name of its folder.
+        label: Name shown to the person.
+        category: Category key.
+    """
+
+    key: str
+    label: str
+    category: str
+
+    @classmethod
+    def named(cls, name: str, category: str) -> "Entry":
+        """An entry for a name such as `Toy robot`: the key is made from it.
+
+        Raises:
+            AssetError: The name has no letter or digit, or is too long to be shown.
+        """
+        label = " ".join(name.replace("_", " ").split())
+        plain = unicodedata.normalize("NFKD", label.lower()).encode("ascii", "ignore").decode()
+        key = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
+        if not key or len(label) > LONGEST_LABEL or not label.isprintable():
+            raise AssetError(
+                f"--name {name!r:.60} must have a Latin letter or digit and at most {LONGEST_LABEL} characters"
+            )
+        return cls(key, label[0].upper() + label[1:], category)
+
+
+class HouseExtension:
+    """A folder with a catalogue and the objects that it adds to a house.
+
+    Attributes:
+        folder: The folder; it need not exist.
+        catalogue: The house with what has been added so far.
+    """
+
+    def __init__(self, folder: Path, house: str | None = None) -> None:
+        """Open a folder, or plan one.
+
+        Args:
+            folder: Where objects are added.
+            house: House to extend; None for the one that the folder extends, else `apartment`.
+
+        Raises:
+            AssetError: It is no folder, its catalogue is unusable or extends another house.
+        """
+        self.folder = folder
+        self._file = folder / CATALOGUE
+        if folder.exists() and not folder.is_dir():
+            raise AssetError(f"{folder} is not a folder; choose another --out")
+        if self._file.exists():
+            self.catalogue = Catalogue.load(str(self._file))
+            self._text = self._file.read_text(encoding="utf-8")
+            extended = tomllib.loads(self._text).get("extends")
+            if house is not None and extended != _reference(house, folder):
+                owner = extended or self.catalogue.label
+                raise AssetError(f"{self._file} belongs to {owner!r}, not to {house!r}; choose another --out")
+        else:
+            self.catalogue = Catalogue.load(house or "apartment")
+            self._text = _HEADER.format(json.dumps(_reference(house or "apartment", folder)))
+
+    @property
+    def path(self) -> Path:
+        """The catalogue file."""
+        return self._file
+
+    def check(self, entry: Entry, *, force: bool) -> None:
+        """Whether an object can be added, before anything is computed.
+
+        Raises:
+            AssetError: The category is unknown, or the key is taken.
+        """
+        if entry.category not in self.catalogue.categories:
+            raise AssetError(
+                f"no category {entry.category!r}; there are {', '.join(self.catalogue.categories)}"
+            )
+        mine = self.folder / entry.key
+        known = self.catalogue.objects.get(entry.key)
+        if known is not None and known.path.resolve().parent != mine.resolve():
+            raise AssetError(
+                f"the house already has an object {entry.key!r} ({known.label}); choose another --name"
+            )
+        if (known is not None or mine.exists()) and not force:
+            raise AssetError(f"{mine} is already there; choose another --name, or say --force to replace it")
+        if mine.exists() and not (mine / MODEL).is_file():
+            raise AssetError(f"{mine} is not an imported object and is not replaced; choose another --name")
+
+    def fit(self, entry: Entry, size: Floats) -> Decision:
+        """How an object with extents (3,), m, fits into the bin of its category.
+
+        Raises:
+            AssetError: It does not, or so many of them would not that a clean-up could fail.
+        """
+        receptacle = self.catalogue.receptacles[self.catalogue.categories[entry.category].receptacle]
+        room = 2 * compiled_house(self.catalogue).receptacles[receptacle.key].half_size
+        sides = " x ".join(f"{side:.2f}" for side in size)
+        inside = " x ".join(f"{side:.2f}" for side in room)
+        across, free = np.sort(size[:2]), np.sort(room[:2]) - 2 * _WALL_GAP
+        factor = min(float((free / across).min()), (float(np.prod(room) / np.prod(size)) / HELD) ** (1 / 3))
+        if factor < 1:
+            raise AssetError(
+                f"it measures {sides} m, and {HELD} of that do not fit into {receptacle.label!r} ({inside} m); "
+                f"say --scale {0.99 * factor:.2g} on top of what you said, or choose another category"
+            )
+        return Decision("size", f"{sides} m", f"{receptacle.label} has {inside} m")
+
+    def add(self, entry: Entry, write: Callable[[Path], None], *, force: bool = False) -> Catalogue:
+        """Add an object, or replace one with `force`; if anything fails all is as before.
+
+        Args:
+            entry: How it is named.
+            write: Writes its files into a folder.
+            force: Whether to replace it.
+
+        Returns:
+            The catalogue with the object.
+
+        Raises:
+            AssetError: As for `check`, or the object breaks a convention of docs/models.md.
+            OSError: Files cannot be written.
+        """
+        self.check(entry, force=force)
+        created = not self.folder.exists()
+        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            with work_folder(self.folder) as work:
+                new = work / "new"
+                new.mkdir()
+                write(new)
+                findings = check_object(new / MODEL, entry.key)
+                if errors(findings):
+                    raise AssetError(one_line(findings, new / MODEL))
+                return self._install(entry, new)
+        finally:
+            if created and not any(self.folder.iterdir()):
+                self.folder.rmdir()
+
+    def _install(self, entry: Entry, new: Path) -> Catalogue:
+        """Put a folder into its place and name it in the catalogue; undo both on failure."""
+        place = self.folder / entry.key
+        before = self._text if self._file.exists() else None
+        swap = exchange if place.exists() else Path.rename
+        swap(new, place)
+        try:
+            write_text_atomically(self._file, self._with(entry))
+            return Catalogue.load(str(self._file))
+        except BaseException:
+            swap(place, new)
+            if before is None:
+                self._file.unlink(missing_ok=True)
+            else:
+                write_text_atomically(self._file, before)
+            raise
+
+    def _with(self, entry: Entry) -> str:
+        """The catalogue's text with an entry; one of the same key is replaced, all else stays as it is."""
+        values = {"label": entry.label, "category": entry.category, "model": f"{entry.key}/{MODEL}"}
+        block = _ENTRY.format(
+            key=entry.key, **{k: json.dumps(v, ensure_ascii=False) for k, v in values.items()}
+        )
+        table = rf"^\[objects\.{entry.key}\][^\n]*\n(?:(?!\[).*\n?)*"
+        kept = re.sub(table, "", self._text, flags=re.MULTILINE)
+        return kept.rstrip("\n") + "\n" + block
+
+
+def _reference(house: str, folder: Path) -> str:
+    """A house as a catalogue in a folder names it: a name, or a path from there."""
+    return os.path.relpath(Path(house).resolve(), folder.resolve()) if house.endswith(".toml") else house

@@ -1,0 +1,134 @@
+"""What is drawn of an object: a coarse surface with a picture on it, baked from whatever colours the file had."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+import scipy.spatial
+import trimesh
+from numpy.typing import NDArray
+
+from mjsim.importing.atlas import Atlas
+from mjsim.importing.solid import is_closed, simplified
+from mjsim.importing.surface import Floats, Ints, Surface
+
+MOST_TRIANGLES = 1400
+_SAMPLES = 200_000  # points of the file's surface among which the nearest is looked for
+_FACING = 0.01  # m; a triangle that faces away counts as this much farther off
+_CREASE = math.radians(40.0)
+_SHEET = 2e-4  # m, between both sides of an open surface
+_PLAIN = 3 / 255  # colours that differ by less are one
+_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # of the R2 sequence (Roberts 2018)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A surface to draw.
+
+    Attributes:
+        vertices: m, shape (n, 3).
+        faces: Shape (m, 3).
+        normals: Unit normals at the corners of the faces, creased at sharp edges, shape (m, 3, 3).
+        uv: Places of the corners in the picture, from 0 to 1 from the lower left, shape (m, 3, 2); None without one.
+        picture: RGB, shape (height, width, 3), or None.
+        colour: RGB from 0 to 1, where there is no picture.
+        doubled: Whether every face is there twice, since the surface is open and seen from both sides.
+    """
+
+    vertices: Floats
+    faces: Ints
+    normals: Floats
+    uv: Floats | None
+    picture: NDArray[np.uint8] | None
+    colour: tuple[float, float, float]
+    doubled: bool
+
+
+def make_look(surface: Surface, mesh: trimesh.Trimesh) -> Look:
+    """Simplify and bake.
+
+    Args:
+        surface: The triangles of the file, m.
+        mesh: The same, joined.
+    """
+    closed = is_closed(mesh)
+    coarse = simplified(mesh, MOST_TRIANGLES if closed else MOST_TRIANGLES // 2)
+    closed = closed and is_closed(coarse)
+    coarse = coarse.copy()
+    coarse.fix_normals(multibody=True)
+    vertices, faces = np.asarray(coarse.vertices), np.asarray(coarse.faces)
+    normals = _corner_normals(vertices, faces)
+    colour, uv, picture = _painted(surface, vertices[faces])
+    if not closed:
+        faces = np.concatenate((faces, faces[:, ::-1] + len(vertices)))
+        vertices = np.concatenate((vertices, vertices - _SHEET * coarse.vertex_normals))
+        normals = np.concatenate((normals, -normals[:, ::-1]))
+        uv = None if uv is None else np.concatenate((uv, uv[:, ::-1]))
+    return Look(vertices, faces, normals, uv, picture, colour, doubled=not closed)
+
+
+def _painted(
+    surface: Surface, corners: Floats
+) -> tuple[tuple[float, float, float], Floats | None, NDArray[np.uint8] | None]:
+    """Colour, or places and picture, for triangles with these corners (m, 3, 3)."""
+    triangles, weights = _sampled(surface)
+    colours = surface.colours_at(triangles, weights)
+    red, green, blue = np.clip(colours.mean(axis=0), 0.0, 1.0).round(4).tolist()
+    if np.ptp(colours, axis=0).max() <= _PLAIN:
+        return (red, green, blue), None, None
+    atlas = Atlas.pack(corners)
+    near = scipy.spatial.cKDTree(_positions(surface, triangles, weights))
+    faces, inside = atlas.texels()
+    points = np.einsum("kc,kcd->kd", inside, corners[faces])
+    normals = _normals(corners)[faces]
+    found = triangles[near.query(np.concatenate((points, _FACING * normals), axis=1))[1]]
+    baked = surface.colours_at(found, _projected(surface.corners[found], points))
+    return (red, green, blue), atlas.uv, atlas.picture(baked)
+
+
+def _sampled(surface: Surface) -> tuple[Ints, Floats]:
+    """Points spread evenly over a surface: their triangles (k,) and weights of the corners (k, 3)."""
+    edges = np.diff(surface.corners, axis=1)
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    count = np.ceil(_SAMPLES * area / area.sum()).astype(int)
+    triangles = np.repeat(np.arange(len(surface)), count)
+    u, v = ((np.arange(1, len(triangles) + 1)[:, None] * _GOLDEN) % 1.0).T
+    beyond = u + v > 1
+    u, v = np.where(beyond, 1 - u, u), np.where(beyond, 1 - v, v)
+    return triangles, np.column_stack((1 - u - v, u, v))
+
+
+def _positions(surface: Surface, triangles: Ints, weights: Floats) -> Floats:
+    """Positions and directions of points of a surface, m, shape (k, 6)."""
+    points = np.einsum("kc,kcd->kd", weights, surface.corners[triangles])
+    return np.concatenate((points, _FACING * _normals(surface.corners)[triangles]), axis=1)
+
+
+def _corner_normals(vertices: Floats, faces: Ints) -> Floats:
+    """Normal at every corner of every face, shape (m, 3, 3): mean of the faces there that bend less than `_CREASE`."""
+    corners = vertices[faces]
+    weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    units = _normals(corners)
+    count = faces.size
+    at = scipy.sparse.csr_array((np.ones(count), (np.arange(count), faces.ravel())))
+    here, there = (at @ at.T).nonzero()  # corners at the same vertex
+    near = np.einsum("kd,kd->k", units[here // 3], units[there // 3]) > math.cos(_CREASE)
+    total = np.zeros((count, 3))
+    np.add.at(total, here[near], weighted[there[near] // 3])
+    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-30)
+    return np.asarray(total.reshape(-1, 3, 3))
+
+
+def _normals(corners: Floats) -> Floats:
+    """Unit normals (n, 3) of triangles (n, 3, 3)."""
+    edges = np.diff(corners, axis=1)
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))
+
+
+def _projected(corners: Floats, points: Floats) -> Floats:
+    """Weights (k, 3) of the corners (k, 3, 3) for the points (k, 3), drawn into the triangles."""
+    weights = trimesh.triangles.points_to_barycentric(corners, points)
+    weights = np.clip(np.nan_to_num(weights, nan=1 / 3), 0.0, 1.0)
+    return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12))

@@ -1,0 +1,157 @@
+"""An imported object as files: MJCF, OBJ meshes, a PNG picture; the same object gives the same bytes."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import scipy.spatial
+from numpy.typing import NDArray
+
+from mjsim.errors import AssetError
+from mjsim.importing.look import Look
+from mjsim.importing.object_import import ImportedObject
+from mjsim.importing.surface import Floats, Ints
+
+MODEL = "object.xml"
+_ROLLING = "1 0.02 0.02"  # friction of what would roll: slide, spin, roll
+
+_MJCF = """\
+<mujoco model="{key}">
+  <!-- {label}. Imported from {source}; conventions in docs/models.md. -->
+  <compiler angle="radian"/>
+  <default>
+    <default class="look">
+      <geom group="2" contype="0" conaffinity="0" mass="0"/>
+    </default>
+    <default class="part">
+      <geom group="3" condim="6" friction="{friction}" solref="0.008 1"/>
+    </default>
+  </default>
+  <asset>
+{assets}
+  </asset>
+  <worldbody>
+    <body name="object">
+      <inertial pos="{centre}" mass="{mass}" fullinertia="{inertia}"/>
+      <geom class="look" type="mesh" mesh="{key}_look" material="{key}_look"/>
+{geoms}
+      <site name="grip_0" pos="0 0 {top}"/>
+      <site name="grip_1" pos="0 0 {top}" euler="0 0 3.14159265"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def write_model(item: ImportedObject, folder: Path, *, key: str, label: str, source: str) -> Path:
+    """Write an object into an existing folder; returns its MJCF file.
+
+    Raises:
+        OSError: A file cannot be written.
+        AssetError: The picture cannot be encoded.
+    """
+    (folder / "look.obj").write_text("\n".join(_look_lines(item.look)) + "\n", encoding="utf-8")
+    if item.look.picture is not None:
+        write_png(folder / "look.png", item.look.picture)
+    for number, points in enumerate(item.hulls):
+        hull = scipy.spatial.ConvexHull(points)
+        lines = [*_vertices(points[hull.vertices]), *_faces(_outward(points, hull))]
+        (folder / f"part_{number}.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path = folder / MODEL
+    path.write_text(_mjcf(item, key, label, source), encoding="utf-8")
+    return path
+
+
+def _mjcf(item: ImportedObject, key: str, label: str, source: str) -> str:
+    weight, inertia = item.weight, item.weight.inertia
+    corner = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return _MJCF.format(
+        key=key,
+        label=_comment(label),
+        source=_comment(source),
+        friction=_ROLLING if item.rolls else "1 0.02 0.002",
+        assets="\n".join(f"    {line}" for line in _assets(item, key)),
+        centre=_numbers(weight.centre),
+        mass=f"{weight.mass:.6g}",
+        inertia=" ".join(f"{value:.6g}" for value in corner),
+        geoms="\n".join(f"      {line}" for line in _geoms(item, key)),
+        top=f"{np.concatenate(item.hulls)[:, 2].max():.5f}",
+    )
+
+
+def _assets(item: ImportedObject, key: str) -> Iterator[str]:
+    yield f'<mesh name="{key}_look" file="look.obj" inertia="shell"/>'
+    for number in range(len(item.hulls)):
+        yield f'<mesh name="{key}_part_{number}" file="part_{number}.obj"/>'
+    shine = 'specular="0.2" shininess="0.3"'
+    if item.look.picture is None:
+        red, green, blue = item.look.colour
+        yield f'<material name="{key}_look" rgba="{red:g} {green:g} {blue:g} 1" {shine}/>'
+    else:
+        yield f'<texture name="{key}_look" type="2d" file="look.png"/>'
+        yield f'<material name="{key}_look" texture="{key}_look" {shine}/>'
+
+
+def _geoms(item: ImportedObject, key: str) -> Iterator[str]:
+    """The parts; their masses are shares of the whole by volume, for what looks at parts alone."""
+    volumes = [scipy.spatial.ConvexHull(points).volume for points in item.hulls]
+    for number, volume in enumerate(volumes):
+        mass = item.weight.mass * volume / sum(volumes)
+        yield f'<geom class="part" type="mesh" mesh="{key}_part_{number}" mass="{mass:.6g}"/>'
+
+
+def _look_lines(look: Look) -> Iterator[str]:
+    yield from _vertices(look.vertices)
+    columns = [look.faces + 1]
+    if look.uv is not None:
+        places, corner = np.unique(np.round(look.uv.reshape(-1, 2), 5), axis=0, return_inverse=True)
+        yield from (f"vt {u:.5f} {v:.5f}" for u, v in places)
+        columns.append(corner.reshape(-1, 3) + 1)
+    normals, corner = np.unique(np.round(look.normals.reshape(-1, 3), 3) + 0.0, axis=0, return_inverse=True)
+    yield from (f"vn {x:.3f} {y:.3f} {z:.3f}" for x, y, z in normals)
+    columns.append(corner.reshape(-1, 3) + 1)
+    join = "//" if look.uv is None else "/"
+    for face in np.stack(columns, axis=-1).tolist():
+        yield "f " + " ".join(join.join(map(str, corner)) for corner in face)
+
+
+def _vertices(points: Floats) -> Iterator[str]:
+    yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.round(points, 6) + 0.0)
+
+
+def _faces(faces: Ints) -> Iterator[str]:
+    yield from (f"f {a} {b} {c}" for a, b, c in faces + 1)
+
+
+def _outward(points: Floats, hull: scipy.spatial.ConvexHull) -> Ints:
+    """Faces (m, 3) of a convex hull, counter-clockwise from outside, numbered among its vertices."""
+    numbers = np.full(len(points), -1)
+    numbers[hull.vertices] = np.arange(len(hull.vertices))
+    corners = points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("nd,nd->n", normals, hull.equations[:, :3]) < 0
+    faces = hull.simplices.copy()
+    faces[inward] = faces[inward, ::-1]
+    return np.asarray(numbers[faces])
+
+
+def write_png(path: Path, rgb: NDArray[np.uint8]) -> None:
+    """Write a picture, RGB, shape (height, width, 3).
+
+    Raises:
+        AssetError: It cannot be encoded.
+    """
+    done, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    if not done:
+        raise AssetError(f"the picture {path} cannot be encoded as PNG")
+    path.write_bytes(data.tobytes())
+
+
+def _numbers(values: Floats) -> str:
+    return " ".join(f"{value:.6g}" for value in np.round(values, 7) + 0.0)
+
+
+def _comment(text: str) -> str:
+    """Text as it may stand in an XML comment."""
+    return text.replace("--", "- -").replace("&", "and").replace("<", "(").replace(">", ")")

@@ -1,0 +1,202 @@
+"""From a mesh file to an object of the simulator, with every decision on the way."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from mjsim.errors import AssetError
+from mjsim.importing.look import Look, make_look
+from mjsim.importing.parts import Parts, convex_parts, one_part
+from mjsim.importing.reading import missing_colours, read_surface
+from mjsim.importing.resting import STEADY, RestingPose, foot, resting_pose
+from mjsim.importing.scaling import Scaling, scaling
+from mjsim.importing.solid import MOST_TRIANGLES, Solid, close, simplified
+from mjsim.importing.surface import Floats, Surface, cleaned
+from mjsim.importing.values import Decision, ImportOptions
+from mjsim.importing.weight import Weight, weigh
+from mjsim.model.validation.object_rules import GRIP_REACH, SIZE
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedObject:
+    """An object in its own frame: z up, on the floor at z = 0, the middle of its footprint at the origin.
+
+    Attributes:
+        look: What is drawn.
+        hulls: Vertices of the convex parts that it collides with, m, shape (k, 3) each.
+        weight: Mass, centre of mass, inertia.
+        rolls: Whether it is round, so that it stands on a foot and rolls badly.
+        decisions: The report.
+    """
+
+    look: Look
+    hulls: tuple[Floats, ...]
+    weight: Weight
+    rolls: bool
+    decisions: tuple[Decision, ...]
+
+    @property
+    def size(self) -> Floats:
+        """Extents of what collides, m, shape (3,)."""
+        return np.asarray(np.ptp(np.concatenate(self.hulls), axis=0))
+
+
+def import_object(path: Path, options: ImportOptions) -> ImportedObject:
+    """Make an object of a mesh file; the same file and options give the same object to the last bit.
+
+    Raises:
+        AssetError: The file cannot be read, or does not describe something that a hand carries; one line that says
+            what to do.
+    """
+    _check_options(options)
+    raw = read_surface(path)
+    try:
+        return _converted(path, raw, options)
+    except AssetError as error:
+        raise AssetError(f"{path}: {error}") from error
+
+
+def _check_options(options: ImportOptions) -> None:
+    for name in ("scale", "mass", "density"):
+        value = getattr(options, name)
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise AssetError(f"--{name} {value} is not a number above 0")
+    if options.mass is not None and options.density is not None:
+        raise AssetError("--mass and --density exclude each other; leave one out")
+
+
+def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObject:
+    found = scaling(
+        path.suffix.lower(), _longest_side(raw), units=options.units, up=options.up, scale=options.scale
+    )
+    surface, dropped = cleaned(raw.moved(found.transform))
+    if not len(surface):
+        raise AssetError(f"none of its {len(raw)} triangles has an area; export it again")
+    mesh = surface.mesh()
+    solid = close(simplified(mesh, MOST_TRIANGLES))
+    weight = weigh(solid.mesh, mass=options.mass, density=options.density)
+    parts = convex_parts(solid)
+    pose = resting_pose(parts.points, weight.centre)
+    hulls = tuple(points @ pose.rotation.T for points in parts.hulls)
+    if not _has_grip(hulls):
+        parts = one_part(parts, "convex hull: parts would leave the top empty where a hand grips")
+        hulls = (parts.hulls[0] @ pose.rotation.T,)
+    if rolls := pose.tilt < STEADY:
+        hulls = (*hulls, foot(np.concatenate(hulls), pose.rotation @ weight.centre))
+    transform = _into_place(pose.rotation, np.concatenate(hulls))
+    hulls = tuple(points + transform[:3, 3] for points in hulls)
+    _check_size(np.concatenate(hulls))
+    look = make_look(*_on_the_floor(surface, transform))
+    decisions = (
+        *_origin(path, found, raw, dropped),
+        _body(solid, len(mesh.faces)),
+        Decision("mass", f"{weight.mass:.3g} kg", weight.reason),
+        _collision(parts),
+        _rest(pose, rolls),
+        *_appearance(path, look, len(mesh.faces)),
+    )
+    return ImportedObject(look, hulls, weight.moved(transform), rolls, decisions)
+
+
+def _longest_side(surface: Surface) -> float:
+    """Longest side of the bounding box, in the file's numbers.
+
+    Raises:
+        AssetError: There is no finite point, or no extent.
+    """
+    points = surface.corners.reshape(-1, 3)
+    points = points[np.isfinite(points).all(axis=1)]
+    longest = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    if not (np.isfinite(longest) and longest > 0):
+        raise AssetError("all its points coincide or are not finite numbers; export it again")
+    return longest
+
+
+def _has_grip(hulls: tuple[Floats, ...]) -> bool:
+    """Whether a part is near the middle of the top, where a hand grips."""
+    points = np.concatenate(hulls)
+    low, high = points.min(axis=0), points.max(axis=0)
+    grip = np.array([*(low + high)[:2] / 2, high[2]])
+    outside = [np.maximum(np.maximum(h.min(axis=0) - grip, grip - h.max(axis=0)), 0.0) for h in hulls]
+    return min(float(np.linalg.norm(gap)) for gap in outside) < 0.8 * GRIP_REACH
+
+
+def _into_place(rotation: Floats, points: Floats) -> Floats:
+    """Transform (4, 4) that turns, and moves the middle of the footprint of points (n, 3) to the origin."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    transform = np.eye(4)
+    transform[:3, :3] = rotation
+    transform[:3, 3] = -(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]
+    return transform
+
+
+def _on_the_floor(surface: Surface, transform: Floats) -> tuple[Surface, trimesh.Trimesh]:
+    """The surface in its place, its lowest point on the floor; thickened parts may reach farther down than it."""
+    placed = surface.moved(transform)
+    down = np.eye(4)
+    down[2, 3] = -placed.corners[..., 2].min()
+    placed = placed.moved(down)
+    return placed, placed.mesh()
+
+
+def _check_size(points: Floats) -> None:
+    size = np.ptp(points, axis=0)
+    if size.max() > SIZE[1] + 1e-3:
+        text = " x ".join(f"{side:.2f}" for side in size)
+        raise AssetError(
+            f"as it lies it measures {text} m, and a hand carries {SIZE[1]} m; say --scale {SIZE[1] / size.max():.2g}"
+        )
+    if size.max() < SIZE[0] - 1e-3:
+        raise AssetError(
+            f"as it lies its longest side is {size.max():.3f} m, less than {SIZE[0]} m; say --scale"
+        )
+
+
+def _origin(path: Path, found: Scaling, raw: Surface, dropped: dict[str, int]) -> tuple[Decision, ...]:
+    gone = ", ".join(f"{count} {kind}" for kind, count in dropped.items() if count)
+    return (
+        Decision("file", path.name, f"{len(raw)} triangles" + (f"; left out: {gone}" if gone else "")),
+        Decision("unit", found.unit, found.unit_reason),
+        Decision("up", found.up, found.up_reason),
+    )
+
+
+def _body(solid: Solid, faces: int) -> Decision:
+    notes = [f"simplified from {faces} triangles"] if faces > MOST_TRIANGLES else []
+    if solid.flat:
+        return Decision("body", "flat sheet", "given a thickness of 1 mm")
+    notes += [f"{solid.pieces} pieces joined"] * (solid.pieces > 1)
+    notes += [f"holes filled in {solid.filled}"] * (solid.filled > 0)
+    if solid.hulled:
+        share = f"{100 * solid.open_share:.0f} % of the surface"
+        notes.append(
+            f"{solid.hulled} open ones ({share}) count as their convex hulls: hollows in them are lost"
+        )
+    return Decision("body", "repaired" if solid.filled or solid.hulled else "closed", "; ".join(notes))
+
+
+def _collision(parts: Parts) -> Decision:
+    thick = f"; {parts.thickened} thickened to 15 mm" if parts.thickened else ""
+    return Decision("collision", f"{len(parts.hulls)} convex", parts.reason + thick)
+
+
+def _rest(pose: RestingPose, rolls: bool) -> Decision:
+    if rolls:
+        return Decision("rests", "as in the file, on a foot", "it is round and would roll away")
+    degrees = f"tips over at {np.degrees(pose.tilt):.0f} degrees"
+    if pose.turned:
+        return Decision(
+            "rests", "turned", f"on its steadiest side: {degrees}; in the file's pose it falls over"
+        )
+    return Decision("rests", "as in the file", degrees)
+
+
+def _appearance(path: Path, look: Look, faces: int) -> tuple[Decision, ...]:
+    how = "picture of all colours" if look.picture is not None else "one colour"
+    notes = [f"simplified from {faces} triangles"] if len(look.faces) < faces else []
+    notes += ["open: drawn from both sides"] if look.doubled else []
+    missing = missing_colours(path)
+    notes += [f"not there: {', '.join(missing)}"] if missing else []
+    return (Decision("look", f"{len(look.faces)} triangles, {how}", "; ".join(notes)),)

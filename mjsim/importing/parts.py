@@ -1,0 +1,128 @@
+"""Convex parts that an object collides with: few, made by CoACD, and none so thin that physics steps through it."""
+
+from dataclasses import dataclass
+
+import coacd
+import numpy as np
+import scipy.spatial
+import trimesh
+
+from mjsim.importing.solid import Solid, simplified
+from mjsim.importing.surface import Floats
+from mjsim.model.validation.object_rules import THIN
+
+MOST_PARTS = 6
+MOST_VERTICES = 64  # of a part
+LEAST_WIDTH = THIN  # of every part in every direction
+_WALL = 0.008  # m; parts thinner than this are walls, and an object of walls collides as its hull
+_CONVEX = 0.9  # share of its convex hull that a convex body fills
+_TRIANGLES = 1000  # of what is decomposed
+_CONCAVITY, _COARSE = 0.12, 0.35  # CoACD's threshold; for bodies of many pieces, which take minutes else
+_MANY = 8  # pieces
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What an object collides with.
+
+    Attributes:
+        hulls: Vertices of each convex part, m, shape (k, 3) each.
+        reason: How they came about.
+        thickened: How many were made thicker.
+    """
+
+    hulls: tuple[Floats, ...]
+    reason: str
+    thickened: int
+
+    @property
+    def points(self) -> Floats:
+        """All vertices, m, shape (k, 3)."""
+        return np.concatenate(self.hulls)
+
+
+def convex_parts(solid: Solid) -> Parts:
+    """The parts of a body."""
+    hull = solid.mesh.convex_hull
+    hulls, reason = [np.asarray(hull.vertices)], "convex: its own hull"
+    filled = solid.mesh.volume / hull.volume
+    if filled < _CONVEX:
+        # The mean thickness of walls of area a on either side, and volume v, is 2 v / a.
+        walls = 2 * solid.mesh.volume / solid.mesh.area < _WALL
+        pieces = [] if walls else _decomposed(solid)
+        if walls or min(width(points) for points in pieces) < _WALL:
+            reason = f"hollow or thin: its convex hull, of which it fills {100 * filled:.0f} %"
+        else:
+            hulls, reason = pieces, "convex parts by CoACD"
+    reduced = [_few_vertices(points) for points in hulls]
+    thick = [_thickened(points) for points in reduced]
+    changed = sum(len(a) != len(b) or not np.array_equal(a, b) for a, b in zip(reduced, thick, strict=True))
+    return Parts(tuple(thick), reason, changed)
+
+
+def one_part(parts: Parts, reason: str) -> Parts:
+    """The convex hull of some parts as the only one."""
+    return Parts((_few_vertices(parts.points),), reason, parts.thickened)
+
+
+def width(points: Floats) -> float:
+    """Least extent of the convex hull of points (n, 3) in any direction, m."""
+    return _narrowest(points)[1]
+
+
+def _decomposed(solid: Solid) -> list[Floats]:
+    """Vertices of the convex parts of a body, largest part first (CoACD, Wei et al. 2022; seed 0)."""
+    coarse = simplified(solid.mesh, _TRIANGLES)
+    coacd.set_log_level("error")
+    found = coacd.run_coacd(
+        coacd.Mesh(coarse.vertices, coarse.faces),
+        threshold=_CONCAVITY if solid.pieces <= _MANY else _COARSE,
+        max_convex_hull=MOST_PARTS,
+        resolution=500,
+        mcts_iterations=20,
+        mcts_nodes=10,
+        mcts_max_depth=2,
+        seed=0,
+    )
+    hulls = [np.asarray(vertices, np.float64) for vertices, _ in found]
+    return sorted(hulls, key=lambda points: -scipy.spatial.ConvexHull(points).volume)
+
+
+def _few_vertices(points: Floats) -> Floats:
+    """Vertices of the hull of points (n, 3), at most `MOST_VERTICES`, with the same bounding box."""
+    hull = trimesh.convex.convex_hull(points)
+    if len(hull.vertices) <= MOST_VERTICES:
+        return np.asarray(hull.vertices)
+    for faces in range(2 * MOST_VERTICES - 4, 8, -8):
+        coarse = hull.simplify_quadric_decimation(face_count=faces).convex_hull
+        if len(coarse.vertices) <= MOST_VERTICES:
+            break
+    else:  # nothing to collapse: the farthest vertices in evenly spread directions
+        turn = np.arange(MOST_VERTICES) + 0.5
+        z, angle = 1 - 2 * turn / MOST_VERTICES, np.pi * (1 + 5**0.5) * turn
+        level = np.sqrt(1 - z * z)
+        directions = np.column_stack((level * np.cos(angle), level * np.sin(angle), z))
+        farthest = np.unique((hull.vertices @ directions.T).argmax(axis=0))
+        coarse = trimesh.convex.convex_hull(hull.vertices[farthest])
+    scale = hull.extents / coarse.extents
+    return np.asarray((coarse.vertices - coarse.bounds[0]) * scale + hull.bounds[0])
+
+
+def _thickened(points: Floats) -> Floats:
+    """Points (n, 3) whose hull is at least `LEAST_WIDTH` wide, grown alike to both sides where it was not."""
+    for _ in range(4):
+        direction, across = _narrowest(points)
+        if across > LEAST_WIDTH - 1e-6:
+            break
+        step = direction * (LEAST_WIDTH - across) / 2
+        points = _few_vertices(np.concatenate((points - step, points + step)))
+    return points
+
+
+def _narrowest(points: Floats) -> tuple[Floats, float]:
+    """Direction (3,) in which the hull of points (n, 3) is narrowest, preferably an axis, and its width there, m."""
+    normals = scipy.spatial.ConvexHull(points).equations[:, :3]
+    directions = np.concatenate((np.eye(3), normals))
+    widths = np.ptp(points @ directions.T, axis=0)
+    best = int(np.flatnonzero(widths <= 1.01 * widths.min())[0])
+    return directions[best], float(widths[best])

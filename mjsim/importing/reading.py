@@ -1,0 +1,139 @@
+"""Reading mesh files with trimesh: every node of the scene graph in its place, with its colours."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from mjsim.errors import AssetError
+from mjsim.importing.surface import Floats, Surface, joined
+
+SUFFIXES = (".glb", ".obj", ".stl", ".ply")
+LARGEST_FILE = 500_000_000  # bytes
+MOST_TRIANGLES = 5_000_000
+PLAIN = (0.74, 0.72, 0.68)  # RGB of what has no colour
+
+
+def read_surface(path: Path) -> Surface:
+    """All triangles of a mesh file, in its own unit and axes.
+
+    Raises:
+        AssetError: The file is missing, of another format, too large, damaged, or has no triangles.
+    """
+    _check_file(path)
+    with _parsing(path):
+        geometries = trimesh.load_scene(path, process=False).dump()
+    meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
+    if not meshes:
+        raise AssetError(f"{path} {_what_it_has(geometries)}; export it as a mesh of triangles")
+    if (count := sum(len(mesh.faces) for mesh in meshes)) > MOST_TRIANGLES:
+        raise AssetError(f"{path} has {count} triangles; reduce it to {MOST_TRIANGLES} or fewer")
+    with _parsing(path):
+        return joined([_surface(mesh, linear=path.suffix.lower() == ".glb") for mesh in meshes])
+
+
+def missing_colours(path: Path) -> tuple[str, ...]:
+    """Files of materials and pictures that an OBJ file names and that are not there."""
+    if path.suffix.lower() != ".obj":
+        return ()
+    named = _named(path, "mtllib")
+    pictures = [picture for name in named for picture in _named(path.parent / name, "map_Kd")]
+    return tuple(name for name in dict.fromkeys([*named, *pictures]) if not (path.parent / name).is_file())
+
+
+def _check_file(path: Path) -> None:
+    if path.suffix.lower() not in SUFFIXES:
+        raise AssetError(f"{path} is not a {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]} file; convert it")
+    if not path.is_file():
+        raise AssetError(f"there is no file {path}")
+    size = path.stat().st_size
+    if size == 0:
+        raise AssetError(f"{path} is empty; export it again")
+    if size > LARGEST_FILE:
+        raise AssetError(f"{path} has {size / 1e6:.0f} MB; reduce it to {LARGEST_FILE / 1e6:.0f} MB or less")
+
+
+@contextmanager
+def _parsing(path: Path) -> Iterator[None]:
+    """Turn whatever a parser raises on a damaged file into one error, and keep its warnings off the terminal.
+
+    Raises:
+        AssetError: The parser failed.
+    """
+    log = logging.getLogger("trimesh")
+    before = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    except MemoryError as error:
+        raise AssetError(f"{path} claims to be larger than the memory; export it again") from error
+    except Exception as error:  # the parsers of trimesh raise whatever they come across
+        said = " ".join(str(error).split())[:120] or type(error).__name__
+        kind = path.suffix.lower()
+        raise AssetError(
+            f"cannot read {path} as {kind}: {said}; is it complete, and really a {kind} file?"
+        ) from error
+    finally:
+        log.setLevel(before)
+
+
+def _what_it_has(geometries: list[Any]) -> str:
+    points = sum(len(g.vertices) for g in geometries if isinstance(g, trimesh.PointCloud))
+    return f"has {points} points and no triangles" if points else "has no triangles"
+
+
+def _named(path: Path, keyword: str) -> list[str]:
+    """What follows a keyword in the lines of an OBJ or MTL file; nothing if there is no such file."""
+    if not path.is_file():
+        return []
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        words = (line.split() for line in lines if line.lstrip().startswith(keyword))
+        return [found[-1] for found in words if len(found) > 1]
+
+
+def _surface(mesh: trimesh.Trimesh, *, linear: bool) -> Surface:
+    """One mesh of a file; `linear` if its plain colours are linear, as in glTF."""
+    count = len(mesh.faces)
+    corners = np.asarray(mesh.triangles, np.float64)
+    colours, uv = np.ones((count, 3, 3)), np.zeros((count, 3, 2))
+    colours[:] = PLAIN
+    picture = None
+    visual = mesh.visual
+    if visual.kind == "texture":
+        colours[:], picture = _material(visual.material)
+        if visual.uv is None or len(visual.uv) != len(mesh.vertices):
+            picture = None
+        else:
+            uv = np.asarray(visual.uv, np.float64)[mesh.faces]
+    elif visual.kind == "vertex":
+        colours = np.asarray(visual.vertex_colors, np.float64)[mesh.faces][..., :3] / 255
+    elif visual.kind == "face":
+        colours = np.repeat(np.asarray(visual.face_colors, np.float64)[:, None, :3] / 255, 3, axis=1)
+    if linear and visual.kind is not None:
+        colours = _srgb(colours)
+    uv = np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0)
+    number = np.full(count, -1 if picture is None else 0)
+    return Surface(corners, colours, uv, number, () if picture is None else (picture,))
+
+
+def _material(material: Any) -> tuple[Floats, NDArray[np.float64] | None]:
+    """Plain colour (3,) and picture (height, width, 3) of a material, RGB from 0 to 1."""
+    if isinstance(material, trimesh.visual.material.PBRMaterial):
+        factor, picture = material.baseColorFactor, material.baseColorTexture
+    else:
+        factor, picture = getattr(material, "diffuse", None), getattr(material, "image", None)
+    pixels = None if picture is None else np.asarray(picture.convert("RGB"), np.float64) / 255
+    if factor is None:
+        return np.ones(3) if pixels is not None else np.array(PLAIN), pixels
+    return np.asarray(factor, np.float64)[:3] / 255, pixels
+
+
+def _srgb(linear: Floats) -> Floats:
+    """Colours as screens show them, of the same shape, from linear ones (IEC 61966-2-1)."""
+    low, high = 12.92 * linear, 1.055 * np.clip(linear, 0.0, 1.0) ** (1 / 2.4) - 0.055
+    return np.where(linear <= 0.0031308, low, high)

@@ -1,0 +1,115 @@
+"""The triangles of a mesh file with their colours, as plain arrays."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+WELD_DIGITS = 6  # corners nearer than 1e-6 m are one
+_LEAST_AREA = 1e-13  # m^2; smaller triangles have no direction
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles with colours. A point's colour is that of the corners, interpolated, times that of the image.
+
+    Attributes:
+        corners: Corners of the triangles, m, shape (n, 3, 3).
+        colours: Colour at each corner, RGB from 0 to 1, shape (n, 3, 3).
+        uv: Where each corner lies in its image, from 0 to 1 from the lower left, repeating, shape (n, 3, 2).
+        image: Number of each triangle's image, -1 for none, shape (n,).
+        images: RGB from 0 to 1, rows from the top, shape (height, width, 3) each.
+    """
+
+    corners: Floats
+    colours: Floats
+    uv: Floats
+    image: Ints
+    images: tuple[Floats, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def select(self, rows: NDArray[Any]) -> Self:
+        """The triangles of a mask (n,), or of row numbers (k,)."""
+        return replace(
+            self,
+            corners=self.corners[rows],
+            colours=self.colours[rows],
+            uv=self.uv[rows],
+            image=self.image[rows],
+        )
+
+    def moved(self, transform: Floats) -> Self:
+        """All corners moved by a homogeneous transform (4, 4)."""
+        return replace(self, corners=self.corners @ transform[:3, :3].T + transform[:3, 3])
+
+    def mesh(self) -> trimesh.Trimesh:
+        """The triangles joined where their corners coincide; face k is triangle k."""
+        vertices, faces = _welded(self.corners)
+        return trimesh.Trimesh(vertices, faces, process=False)
+
+    def colours_at(self, triangles: Ints, weights: Floats) -> Floats:
+        """Colours (k, 3), RGB from 0 to 1, of points given by triangles (k,) and weights of the corners (k, 3)."""
+        colours: Floats = np.einsum("kc,kcd->kd", weights, self.colours[triangles])
+        places = np.einsum("kc,kcd->kd", weights, self.uv[triangles])
+        for number, image in enumerate(self.images):
+            mine = self.image[triangles] == number
+            colours[mine] *= _sample(image, places[mine])
+        return colours
+
+
+def joined(surfaces: list[Surface]) -> Surface:
+    """Several surfaces as one."""
+    first = np.cumsum([0, *(len(s.images) for s in surfaces)])
+    return Surface(
+        corners=np.concatenate([s.corners for s in surfaces]),
+        colours=np.concatenate([s.colours for s in surfaces]),
+        uv=np.concatenate([s.uv for s in surfaces]),
+        image=np.concatenate(
+            [np.where(s.image < 0, -1, s.image + k) for s, k in zip(surfaces, first, strict=False)]
+        ),
+        images=tuple(image for s in surfaces for image in s.images),
+    )
+
+
+def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
+    """Without triangles that are not finite, have no area, or repeat another one; and how many of each went."""
+    finite = np.asarray(np.isfinite(surface.corners).all(axis=(1, 2)))
+    kept = surface.select(finite)
+    edges = np.diff(kept.corners, axis=1)
+    _, faces = _welded(kept.corners)
+    distinct = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    solid = distinct & (np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) > 2 * _LEAST_AREA)
+    _, first = np.unique(np.sort(faces[solid], axis=1), axis=0, return_index=True)
+    result = kept.select(solid).select(np.sort(first))
+    counts = {
+        "not finite": int((~finite).sum()),
+        "without area": int((~solid).sum()),
+        "duplicate": int(solid.sum()) - len(result),
+    }
+    return result, counts
+
+
+def _welded(corners: Floats) -> tuple[Floats, Ints]:
+    """Distinct vertices (k, 3), and the vertex of every corner, shape (n, 3)."""
+    points = np.round(corners.reshape(-1, 3), WELD_DIGITS) + 0.0
+    vertices, faces = np.unique(points, axis=0, return_inverse=True)
+    return vertices, faces.reshape(-1, 3)
+
+
+def _sample(image: Floats, places: Floats) -> Floats:
+    """Bilinear colours (k, 3) of an image (h, w, 3), which repeats, at places (k, 2)."""
+    height, width = image.shape[:2]
+    x, y = places[:, 0] * width - 0.5, (1.0 - places[:, 1]) * height - 0.5
+    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
+    across, down = (x - left)[:, None], (y - top)[:, None]
+    columns, rows = (left % width, (left + 1) % width), (top % height, (top + 1) % height)
+    upper = image[rows[0], columns[0]] * (1 - across) + image[rows[0], columns[1]] * across
+    lower = image[rows[1], columns[0]] * (1 - across) + image[rows[1], columns[1]] * across
+    return np.asarray(upper * (1 - down) + lower * down)
