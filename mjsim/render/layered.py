@@ -20,8 +20,8 @@ class LayeredRenderer:
 
     What moves, and the markers, are drawn over a picture of the rest by their depth; what comes to rest joins the rest.
     Profiles with shadow maps, mirrors or multisampling are drawn in full, as everything changes everything there; so
-    is whatever one can see through, as it has no depth. Moving parts behind something are shown faintly, as those
-    of x-ray markers are. Use as a context manager.
+    are moving things that one can see through, as they have no depth. What moves behind something shows faintly,
+    as x-ray markers do. Use as a context manager.
 
     Args:
         model: Compiled model.
@@ -68,21 +68,33 @@ class LayeredRenderer:
             self._rasteriser.update(data)
             view, still = View.of(camera), camera is self._camera
             self._camera = camera
-            clear = any(marker.rgba[3] < 1.0 for marker in markers)
-            if (
-                not (self._layered and still)
-                or clear
-                or np.any(self._note_movement(data) & self._translucent)
-            ):
+            if not (self._layered and still) or np.any(self._note_movement(data) & self._translucent):
                 self._rest = None
                 return self._rasteriser.colour(view, markers)
             rest = self._background(view)
-            front = self._rasteriser.layer(view, markers, hidden=~self._moves)
+            opaque = [marker for marker in markers if marker.rgba[3] >= 1.0]
+            front = self._rasteriser.layer(view, opaque, hidden=~self._moves)
             frame = rest.colour.copy()
             nearer = front.depth > rest.depth
             frame[nearer] = front.colour[nearer]
             blend_hidden(frame, front.colour, rest.depth, front.depth)
+            self._blend_translucent(frame, np.maximum(rest.depth, front.depth), view, markers)
             return self._rasteriser.reduced(frame)
+
+    def _blend_translucent(
+        self,
+        frame: NDArray[np.uint8],
+        depth: NDArray[np.float32],
+        view: View,
+        markers: Sequence[MarkerLike],
+    ) -> None:
+        """Blend markers that one can see through into a drawing in place; drawn as they are they leave no depth."""
+        for opacity in sorted({marker.rgba[3] for marker in markers if marker.rgba[3] < 1.0}):
+            solid = [_Solid(marker) for marker in markers if marker.rgba[3] == opacity]
+            layer = self._rasteriser.layer(view, solid, hidden=np.ones_like(self._translucent))
+            nearer = layer.depth > depth
+            mixed = frame[nearer] * (1.0 - opacity) + layer.colour[nearer] * opacity
+            frame[nearer] = np.round(mixed).astype(np.uint8)
 
     @property
     def _moves(self) -> NDArray[np.bool_]:
@@ -113,6 +125,15 @@ class LayeredRenderer:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class _Solid:
+    """A marker as it would be if nobody could see through it."""
+
+    def __init__(self, marker: MarkerLike) -> None:
+        self.shape, self.position, self.size = marker.shape, marker.position, marker.size
+        self.rgba = (*marker.rgba[:3], 1.0)
+        self.x_ray = marker.x_ray
 
 
 def _translucent(model: Any) -> NDArray[np.bool_]:
