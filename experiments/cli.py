@@ -17,6 +17,7 @@ COMMANDS = (
     "batch",
     "metrics",
     "compare",
+    "study",
     "plan",
     "house",
     "check",
@@ -41,6 +42,8 @@ examples:
       run a factorial design on all cores; the same command continues after an interruption
   mjsim compare runs/batch
       compare its assistance conditions, paired by seed, with effect sizes
+  mjsim study analyze runs/study
+      analyse a study between subjects: figures, tests, a report in one file
   mjsim house --objects 12 --seed 3 --out house.xml
       write a disorganized house as MJCF for stock MuJoCo
   mjsim check my_house/catalogue.toml --picture faults.png

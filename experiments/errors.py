@@ -5,6 +5,7 @@ ExperimentError
 ├── SessionError    a session cannot go on
 ├── RecordError     a run directory is missing, incomplete or in the way
 ├── UserCodeError   a participant, condition or planner of somebody's own raised, or returned something unusable
+├── StatisticsError the data do not allow a statistical test
 └── ReplayError     a recorded run cannot be replayed, or does not go as recorded
 """
 
@@ -29,6 +30,10 @@ class RecordError(ExperimentError):
 
 class UserCodeError(ExperimentError):
     """A participant, condition or planner of somebody's own raised, or returned something unusable."""
+
+
+class StatisticsError(ExperimentError):
+    """The data do not allow a statistical test; the message says why."""
 
 
 class ReplayError(ExperimentError):

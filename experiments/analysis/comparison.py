@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.stats import nct, t
+from scipy.stats import t
 
+from experiments.analysis.statistics.noncentral import t_noncentrality
 from experiments.design import counted
 from experiments.errors import ConfigError, RecordError
 from experiments.table import NAME
@@ -38,7 +38,6 @@ CIRCUMSTANCES = (
 )
 CONFIDENCE = 0.95
 SHOWN_SEEDS = 5
-STEPS = 12  # standard errors in which the bound of an effect size is looked for
 
 Row = Mapping[str, Any]
 Interval = tuple[float, float] | None
@@ -201,24 +200,7 @@ def _effect(gaps: NDArray[np.float64]) -> tuple[float | None, Interval, float | 
     effect, root = float(gaps.mean()) / spread, math.sqrt(count)
     statistic, freedom = effect * root, count - 1
     bounds = [
-        _noncentrality(statistic, freedom, share) for share in (0.5 + CONFIDENCE / 2, 0.5 - CONFIDENCE / 2)
+        t_noncentrality(statistic, freedom, share) for share in (0.5 + CONFIDENCE / 2, 0.5 - CONFIDENCE / 2)
     ]
     interval = None if None in bounds else (float(bounds[0] or 0.0) / root, float(bounds[1] or 0.0) / root)
     return effect, interval, float(2 * t.sf(abs(statistic), freedom))
-
-
-def _noncentrality(statistic: float, freedom: int, share: float) -> float | None:
-    """The noncentrality with which a share of the distribution lies below the statistic; None where none is found."""
-
-    def excess(center: float) -> float:
-        return float(nct.cdf(statistic, freedom, center)) - share
-
-    # Widened step by step: far away from the statistic, scipy's values are not numbers.
-    step = math.sqrt(1.0 + statistic**2 / (2 * freedom))
-    for width in step * np.arange(1.0, STEPS):
-        if excess(statistic - width) > 0 > excess(statistic + width):
-            try:
-                return float(brentq(excess, statistic - width, statistic + width))
-            except ValueError:  # one in between is no number: two pairs that differ by nearly the same
-                return None
-    return None

@@ -1,0 +1,103 @@
+"""Kinds of people by how often they accept what is suggested: a mixture of beta-binomial distributions.
+
+Within a kind, each person has a rate of acceptance from a Beta distribution, and accepts that share of the visits but
+for chance. How many kinds there are is chosen by Schwarz's criterion (BIC).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import betaln, expit, logsumexp
+
+from experiments.errors import StatisticsError
+
+MOST = 3  # kinds
+LEAST_PEOPLE = 10
+PRECISIONS = (0.0, 7.0)  # logarithms of a + b; beyond the upper one, nobody within a kind differs
+STARTS = 3
+
+Counts = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """A mixture that was fitted.
+
+    Attributes:
+        shares: Share of people of each kind, (k,), sums to 1.
+        means: Their mean rates of acceptance, (k,), falling.
+        precisions: a + b of their Beta distributions, (k,); the larger, the more alike people of a kind are.
+        log_likelihood: Of the visits in their order.
+        bic: Schwarz's criterion; smaller is better.
+    """
+
+    shares: tuple[float, ...]
+    means: tuple[float, ...]
+    precisions: tuple[float, ...]
+    log_likelihood: float
+    bic: float
+
+
+def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
+    """Mixtures of one to three kinds by maximum likelihood, the best by BIC first.
+
+    Args:
+        accepted: Accepted visits of each person, (n,).
+        visits: All visits of each person, (n,).
+
+    Raises:
+        StatisticsError: There are too few people, or a count cannot be.
+    """
+    if len(accepted) < LEAST_PEOPLE:
+        raise StatisticsError(f"a mixture needs at least {LEAST_PEOPLE} people; there are {len(accepted)}")
+    if (visits < 1).any() or (accepted < 0).any() or (accepted > visits).any():
+        raise StatisticsError("a number of accepted visits is below 0 or above that of all visits")
+    # Equal people are counted, not computed again.
+    cases, people = np.unique(np.stack([accepted, visits], axis=1), axis=0, return_counts=True)
+    return sorted((_fit(cases, people, kinds) for kinds in range(1, MOST + 1)), key=lambda m: m.bic)
+
+
+def _fit(cases: Counts, people: Counts, kinds: int) -> Mixture:
+    """The best of several climbs; `cases` are accepted and all visits, (m, 2), `people` how many have them, (m,)."""
+    rng = np.random.default_rng(kinds)  # of the starts alone
+    rates = np.sort(np.repeat(cases[:, 0] / cases[:, 1], people))
+    spread = np.quantile(rates, (np.arange(kinds) + 0.5) / kinds).clip(0.02, 0.98)
+    bounds = [(-8.0, 8.0)] * (2 * kinds - 1) + [PRECISIONS] * kinds
+    climbs = []
+    for start in range(STARTS):
+        means = spread if start == 0 else np.sort(rng.uniform(0.05, 0.95, kinds))
+        first = np.concatenate([np.zeros(kinds - 1), np.log(means / (1 - means)), np.full(kinds, 2.0)])
+        climbs.append(minimize(_loss, first, (cases, people, kinds), method="L-BFGS-B", bounds=bounds))
+    best = min(climbs, key=lambda climb: float(climb.fun))
+    weights, means, precisions = _parts(best.x, kinds)
+    order = np.argsort(-means)
+    likelihood = -float(best.fun)
+    return Mixture(
+        tuple(np.exp(weights)[order].tolist()),
+        tuple(means[order].tolist()),
+        tuple(precisions[order].tolist()),
+        likelihood,
+        (3 * kinds - 1) * math.log(int(people.sum())) - 2 * likelihood,
+    )
+
+
+def _parts(
+    parameters: NDArray[np.float64], kinds: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Logarithms of shares, means, precisions, (k,) each."""
+    weights = np.append(parameters[: kinds - 1], 0.0)
+    means = expit(parameters[kinds - 1 : 2 * kinds - 1])
+    return weights - logsumexp(weights), means, np.exp(parameters[2 * kinds - 1 :])
+
+
+def _loss(parameters: NDArray[np.float64], cases: Counts, people: Counts, kinds: int) -> float:
+    """Minus the log likelihood."""
+    weights, means, precisions = _parts(parameters, kinds)
+    accepted, others = cases[:, :1], cases[:, 1:] - cases[:, :1]
+    a, b = means * precisions, (1 - means) * precisions
+    # Of the beta-binomial, but for the number of orders, which is the same in all mixtures.
+    each = betaln(accepted + a, others + b) - betaln(a, b)
+    return -float((people * logsumexp(each + weights, axis=1)).sum())
