@@ -13,6 +13,7 @@ from mjsim.gl_choice import postpone_gl
 
 COMMANDS = (
     "run",
+    "play",
     "replay",
     "batch",
     "metrics",
@@ -38,6 +39,8 @@ EPILOG = """\
 examples:
   mjsim run --objects 6 --assistance guided --seed 0 --out runs/demo
       film one assisted trial, with metrics, event log and floor plan
+  mjsim play --objects 6 --assistance optimal --seed 0
+      tidy the apartment yourself, in a browser
   mjsim batch --objects 6,12 --assistance none,highlight,optimal --seeds 0:10 --out runs/batch
       run a factorial design on all cores; the same command continues after an interruption
   mjsim compare runs/batch

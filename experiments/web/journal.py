@@ -13,6 +13,7 @@ from types import TracebackType
 
 from experiments.errors import RecordError
 
+JOURNAL = "journal.bin"  # in the folder of a session
 MAGIC = b"mjsim journal 1\n"
 _HEAD = struct.Struct("<II")  # length of the record, bytes, and its CRC-32
 MAX_RECORD = 64 * 1024 * 1024  # bytes

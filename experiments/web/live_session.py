@@ -17,7 +17,7 @@ from experiments.trial import draw_person, prepare_session, trial_episode
 from experiments.trial_config import TrialConfig
 from experiments.trial_record import SessionResult
 from experiments.web.controls import Controls, Input, control_step
-from experiments.web.journal import Journal
+from experiments.web.journal import JOURNAL, Journal
 from experiments.web.resuming_planner import ResumingPlanner
 from experiments.web.session_journal import (
     Checkpoint,
@@ -37,8 +37,6 @@ from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.live import LiveReplanner
 from planner.solver import solver
-
-JOURNAL = "journal.bin"
 
 
 class Human:
@@ -232,6 +230,11 @@ class LiveSession:
 def config_of(settings: Mapping[str, Any]) -> TrialConfig:
     """The trial that `TrialConfig.settings` describes."""
     return TrialConfig(**{**settings, "person": PersonDistribution.of(settings["person"])})
+
+
+def is_over(journal: Sequence[bytes]) -> bool:
+    """Whether the session of a journal is over."""
+    return bool(journal) and decode(journal)[2] is not None
 
 
 def result_of(journal: Sequence[bytes], house: House) -> tuple[TrialConfig, Scene, SessionResult]:

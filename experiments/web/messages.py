@@ -25,12 +25,14 @@ class Open(Message, frozen=True):
     Attributes:
         folder: Folder of its journal.
         run: Run directory to write when it is over.
-        config: Settings of the trial; None to go on with the session in the journal.
+        config: Settings of the trial; those of a session that is in the journal already stand there.
+        paused: Why the clock is to stand at first, or None.
     """
 
     folder: str
     run: str
     config: dict[str, Any] | None = None
+    paused: str | None = None
 
 
 class Begin(Message, frozen=True):
@@ -160,6 +162,12 @@ class Text(Message, frozen=True):
     hands: list[str]
 
 
+class Busy(Message, frozen=True):
+    """Whether a pick or place is under way; what is pressed meanwhile is answered when it comes to its turn."""
+
+    busy: bool
+
+
 class Paused(Message, frozen=True):
     """The clock stands; `reason` is None when it runs again."""
 
@@ -184,7 +192,7 @@ class Failed(Message, frozen=True):
     message: str
 
 
-FromWorker = Ready | Taken | Frame | State | Text | Paused | Over | Failed
+FromWorker = Ready | Taken | Frame | State | Text | Busy | Paused | Over | Failed
 
 encode = msgspec.msgpack.Encoder().encode
 decode_to_worker = msgspec.msgpack.Decoder(ToWorker).decode

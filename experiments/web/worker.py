@@ -14,17 +14,21 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
+from experiments import records, warmup
 from experiments.endings import INTERRUPTED
 from experiments.house import House
 from experiments.run_directory import is_run, run_directory
 from experiments.session import Viewer
+from experiments.trial_config import TrialConfig
 from experiments.trial_record import draw_floor_plan, save_record
 from experiments.user_code import describe
 from experiments.web import messages
 from experiments.web.drawing import Drawer
 from experiments.web.inbox import Inbox
-from experiments.web.journal import read_journal
-from experiments.web.live_session import JOURNAL, LiveSession, config_of, open_journal, result_of
+from experiments.web.journal import JOURNAL, read_journal
+from experiments.web.live_session import LiveSession, config_of, is_over, open_journal, result_of
 from experiments.web.messages import Message, packed
 from hud import schema
 from hud.projection import CameraView
@@ -78,6 +82,7 @@ class Window(Viewer):
         self.live: LiveSession | None = None
         self.states = False
         self._text: messages.Text | None = None
+        self._busy: bool | None = None
 
     def camera(self, world: World) -> CameraView | None:
         """The eye camera, for a pointer to what is out of view."""
@@ -95,10 +100,13 @@ class Window(Viewer):
         if text != self._text:
             self._text = text
             self._connection.send(text)
+        if observation.busy != self._busy:
+            self._busy = observation.busy
+            self._connection.send(messages.Busy(observation.busy))
 
     def repeat(self) -> None:
         """Say everything again, to a browser that has just connected."""
-        self._text = None
+        self._text = self._busy = None
 
 
 class Worker:
@@ -115,14 +123,17 @@ class Worker:
         self._arrived = threading.Condition()
         self._window = Window(self._connection)
         self._view: messages.View | None = None
+        self._houses: dict[str, House] = {}
 
     def run(self) -> None:
         """Serve until the server is gone."""
-        house = House.load()
+        house = self._house()
+        warmup.plan()
+        warmup.act(house)
         threading.Thread(target=self._receive, name="receiving", daemon=True).start()
         while (opened := self._next_session()) is not None:
             try:
-                self._serve(opened, house)
+                self._serve(opened)
             except Exception as error:  # the server tells the person, and keeps the journal
                 self._connection.send(messages.Failed(describe(error)))
 
@@ -131,8 +142,9 @@ class Worker:
             self._arrived.wait_for(lambda: self._opened or self._inbox.closed)
             if not self._opened:
                 return None
-            self._inbox = Inbox(closed=self._inbox.closed)
-            return self._opened.pop(0)
+            opened = self._opened.pop(0)
+            self._inbox = Inbox(closed=self._inbox.closed, paused=opened.paused)
+            return opened
 
     def _receive(self) -> None:
         for message in self._connection.receive():
@@ -168,10 +180,14 @@ class Worker:
             self._window.repeat()
             self._window.drawer.show_to(self._view)
 
-    def _serve(self, opened: messages.Open, house: House) -> None:
+    def _serve(self, opened: messages.Open) -> None:
         folder = Path(opened.folder)
         config = None if opened.config is None else config_of(opened.config)
+        house = self._house() if config is None else self._house(config.house)
         with open_journal(folder) as journal:
+            if is_over(journal.records):
+                self._finish(folder, Path(opened.run), house)
+                return
             live = LiveSession(journal, house, config, self._window)
             inbox = self._inbox
             with Drawer(live.scene, live.house, self._connection.send) as drawer:
@@ -187,7 +203,20 @@ class Worker:
                 live.close()
                 return
             live.end(reason)
-        self._connection.send(messages.Over(reason, _save(folder, Path(opened.run), house)))
+        self._finish(folder, Path(opened.run), house)
+
+    def _house(self, name: str = TrialConfig.house) -> House:
+        """A house; loaded once."""
+        if name not in self._houses:
+            self._houses[name] = House.load(name)
+        return self._houses[name]
+
+    def _finish(self, folder: Path, run: Path, house: House) -> None:
+        """Make the run directory of a session that is over, where it is not there yet."""
+        if not is_run(run):
+            _save(folder, run, house)
+        metrics = msgspec.json.decode((run / records.METRICS).read_bytes())
+        self._connection.send(messages.Over(metrics["ended"], metrics))
 
 
 class _Clock:
@@ -283,16 +312,12 @@ class _Sync:
             self._connection.send(messages.Taken(number, step))
 
 
-def _save(folder: Path, run: Path, house: House) -> dict[str, Any] | None:
-    """Make the run directory from the journal; its metrics, or None where nothing was done."""
-    journal = read_journal(folder / JOURNAL)
-    _, scene, result = result_of(journal, house)
-    if is_run(run):
-        return None
+def _save(folder: Path, run: Path, house: House) -> None:
+    """Make the run directory from the journal alone."""
+    _, scene, result = result_of(read_journal(folder / JOURNAL), house)
     with run_directory(run) as work:
-        metrics = save_record(work, run, scene, result, float(result.arrays["time"][-1]))
+        save_record(work, run, scene, result, float(result.arrays["time"][-1]))
     draw_floor_plan(run, house, scene, result)
-    return metrics
 
 
 def _state(seen: Observation, state: HudState, step: int, number: int) -> messages.State:

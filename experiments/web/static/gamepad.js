@@ -1,0 +1,38 @@
+// A gamepad of the standard layout: left stick walks, right stick turns and looks, buttons as in the table.
+
+const DEAD = 0.15; // of a stick's way, around its middle
+
+export function connectGamepad(actions, inputs, commands, listens) {
+  let before = [];
+  let running = false;
+
+  const stick = (value) => {
+    const beyond = Math.max(0, Math.abs(value) - DEAD) / (1 - DEAD);
+    return Math.round(Math.sign(value) * Math.min(1, beyond) * 20) / 20; // few steps, so that few inputs are sent
+  };
+  const poll = () => {
+    const pad = navigator.getGamepads().find((found) => found?.mapping === "standard");
+    if (!pad) {
+      running = false;
+      inputs.hold("gamepad", {});
+      return;
+    }
+    const pressed = pad.buttons.map((button) => button.pressed);
+    if (listens()) {
+      const [x, y, turn, look] = pad.axes.map(stick);
+      inputs.hold("gamepad", { forward: -y, left: -x, turn: -turn, look: -look });
+    }
+    for (const action of actions) {
+      if (action.button === undefined || !pressed[action.button] || before[action.button]) continue;
+      if (!action.press && !action.rows) commands[action.name]();
+      else if (listens() && action.press) inputs.press(action.press);
+      else if (listens()) inputs.scroll(action.rows);
+    }
+    before = pressed;
+    requestAnimationFrame(poll);
+  };
+  window.addEventListener("gamepadconnected", () => {
+    if (!running) requestAnimationFrame(poll);
+    running = true;
+  });
+}

@@ -1,0 +1,12 @@
+// What the display says, as text for screen readers.
+
+import { made } from "./panel.js";
+
+const byId = (id) => document.getElementById(id);
+
+export function showText({ message, title, rows, hands }) {
+  if (byId("said").textContent !== message) byId("said").textContent = message;
+  byId("list-title").textContent = title;
+  byId("list").replaceChildren(...rows.map((row) => made("li", row)));
+  byId("hands").textContent = `Left hand: ${hands[0]}. Right hand: ${hands[1]}.`;
+}
