@@ -49,5 +49,5 @@ $(READY): pyproject.toml .ci/system-libraries
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --editable '.[dev]'
-	$(BIN)/python -m experiments.warmup
+	$(BIN)/python -m experiments.trials.warmup
 	@touch $@

@@ -18,8 +18,8 @@ from unittest.mock import patch
 
 from benchmarks.support.recorded_trial import RecordingWorld, play
 from experiments.house import House
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.world import World
@@ -28,23 +28,23 @@ from mjsim.world import World
 PARTS = {
     "planning": ("planner.replanner.Replanner.update",),
     "shortest paths": ("planner.geodesics.Geodesics.shortest_path",),
-    "looking": ("experiments.perception.visible_objects",),
+    "looking": ("experiments.session.perception.visible_objects",),
     "world": tuple(f"mjsim.world.World.{n}" for n in ("reset", "step", "walk", "finish", "state", "restore")),
     "house and scene": (
         "experiments.house.House.sample_episode",
-        "experiments.trial.compose",
+        "experiments.trials.trial.compose",
         "mjsim.world.World.__init__",
     ),
     "recording": (
-        "experiments.records.EventLog.append",
-        "experiments.records.Trajectory.append",
-        "experiments.records.Trajectory.extend",
-        "experiments.records.Trajectory.arrays",
-        "experiments.recording.Recording.append",
-        "experiments.recording.Recording.extend",
-        "experiments.recording.Recording.save",
-        "experiments.trial_record.save_arrays",
-        "experiments.trial_record.write_json",
+        "experiments.runs.records.EventLog.append",
+        "experiments.runs.records.Trajectory.append",
+        "experiments.runs.records.Trajectory.extend",
+        "experiments.runs.records.Trajectory.arrays",
+        "experiments.runs.recording.Recording.append",
+        "experiments.runs.recording.Recording.extend",
+        "experiments.runs.recording.Recording.save",
+        "experiments.trials.trial_record.save_arrays",
+        "experiments.trials.trial_record.write_json",
         "mjsim.episode.Episode.save",
     ),
 }
@@ -104,7 +104,7 @@ def main() -> None:
         with (
             tempfile.TemporaryDirectory() as folder,
             timers,
-            patch("experiments.trial.World", recording_world),
+            patch("experiments.trials.trial.World", recording_world),
         ):
             started = time.perf_counter()
             run_trial(config, Path(folder) / "run", topdown=False, house=house)

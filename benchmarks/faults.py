@@ -21,9 +21,9 @@ from benchmarks.support.kills import (
     start,
 )
 from benchmarks.support.requirements import Requirement, requirement_lines
-from experiments import records
 from experiments.errors import ExperimentError
 from experiments.replaying.replay import replay
+from experiments.runs import records
 
 KILLS, QUICK_KILLS = 200, 6
 KILLS_IN_A_ROW = 4  # before a command is left to finish

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from benchmarks.support.agreement import TierResult, run_all_in_tiers
-from experiments.trial_config import TrialConfig
+from experiments.trials.trial_config import TrialConfig
 from mjsim.options import FIDELITIES
 
 SEEDS = 50

@@ -19,9 +19,9 @@ import numpy as np
 from benchmarks.support.environment_speed import SETTINGS, steps_per_second
 from benchmarks.support.hud_speed import hud_milliseconds, session_states, summary
 from benchmarks.support.requirements import outcome
-from experiments.conditions import TaskBoard
 from experiments.house import House
-from experiments.trial_config import TrialConfig
+from experiments.session.task_board import TaskBoard
+from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.state import HudState

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.support.requirements import outcome
-from experiments.batch import run_batch
-from experiments.design import factorial
-from experiments.warmup import compile_kernels
+from experiments.trials.batch import run_batch
+from experiments.trials.design import factorial
+from experiments.trials.warmup import compile_kernels
 
 OBJECTS = 24
 SEEDS = 10

@@ -8,11 +8,11 @@ import typing
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from experiments.event_types import OUTCOMES, TYPES, Logged, Outcome
-from experiments.health import COUNTED
-from experiments.metrics import Metrics
-from experiments.records import HEALTH
-from experiments.trial_config import TrialConfig
+from experiments.runs.event_types import OUTCOMES, TYPES, Logged, Outcome
+from experiments.runs.health import COUNTED
+from experiments.runs.metrics import Metrics
+from experiments.runs.records import HEALTH
+from experiments.trials.trial_config import TrialConfig
 from mjsim.person_parameters import PersonParameters
 
 _HEAD = """\

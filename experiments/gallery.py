@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.endings import LeaveSession
 from experiments.errors import RecordError
-from experiments.first_person import FilmConfig, FirstPersonRenderer
 from experiments.house import House
-from experiments.records import EventLog
-from experiments.trial import prepare_session, trial_episode
-from experiments.trial_config import TrialConfig
+from experiments.runs.records import EventLog
+from experiments.session.endings import LeaveSession
+from experiments.session.first_person import FilmConfig, FirstPersonRenderer
+from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.trial_config import TrialConfig
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.files import replacing

@@ -9,10 +9,10 @@ import time
 import pyarrow.parquet as pq
 import pytest
 
-from experiments.batch import run_batch
-from experiments.design import Design, factorial
 from experiments.errors import ConfigError
-from experiments.records import METRICS
+from experiments.runs.records import METRICS
+from experiments.trials.batch import run_batch
+from experiments.trials.design import Design, factorial
 
 COMMAND = [
     sys.executable,

@@ -6,16 +6,16 @@ import sys
 
 import pytest
 
-from experiments import records
-from experiments.batch import run_batch
-from experiments.batch_folder import read_trial, read_trials, trial_name
-from experiments.batch_plan import check_trials, plan_batch
-from experiments.design import Design, confounded, factorial
 from experiments.errors import ConfigError, RecordError
-from experiments.fingerprint import source_hash, trial_inputs
 from experiments.house import House
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.trials.batch import run_batch
+from experiments.trials.batch_folder import read_trial, read_trials, trial_name
+from experiments.trials.batch_plan import check_trials, plan_batch
+from experiments.trials.design import Design, confounded, factorial
+from experiments.trials.fingerprint import source_hash, trial_inputs
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from hud.errors import ConditionError
 from mjsim.errors import AssetError, EpisodeError, SamplingError
 from mjsim.model.catalogue import Catalogue

@@ -8,7 +8,7 @@ import pytest
 from experiments.cli import main
 from experiments.commands.bench import benchmark, benchmark_names
 from experiments.errors import ConfigError
-from experiments.trial_config import TrialConfig
+from experiments.trials.trial_config import TrialConfig
 
 
 def test_the_benchmarks_of_the_checkout_are_found() -> None:

@@ -11,8 +11,8 @@ from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Choice
 from experiments.participants.boltzmann import draw
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from planner.plan import Visit, VisitKind
 from planner.regret_evaluator import RegretEvaluator
 

@@ -9,8 +9,8 @@ from scipy.stats import ttest_rel
 from experiments.analysis.comparison import METRICS, compare, mean_interval, missing_pairs, read_blocks
 from experiments.cli import main
 from experiments.errors import ConfigError, RecordError
-from experiments.table import write_tables
-from experiments.trial_config import TrialConfig
+from experiments.trials.table import write_tables
+from experiments.trials.trial_config import TrialConfig
 
 
 def row(assistance, seed, value, **options):

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments import records
 from experiments.data_dictionary import data_dictionary
-from experiments.event_types import check_event
 from experiments.files import read_json
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.runs.event_types import check_event
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 
 PAGE = Path(__file__).parents[1] / "docs" / "data.md"
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments.design import numbers, read_design
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.records import EventLog
-from experiments.trial import prepare_session, trial_episode
-from experiments.trial_config import TrialConfig
+from experiments.runs.records import EventLog
+from experiments.trials.design import numbers, read_design
+from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 
 EXAMPLES = Path(__file__).parents[1] / "docs" / "designs"
@@ -147,7 +147,7 @@ def test_each_seed_decides_one_thing(house):
 def test_the_person_seed_reaches_the_participant(house, monkeypatch):
     drawn = []
     monkeypatch.setattr(
-        "experiments.trial.make_participant", lambda _name, _house, rng: drawn.append(rng.random())
+        "experiments.trials.trial.make_participant", lambda _name, _house, rng: drawn.append(rng.random())
     )
     for seeds in ({}, {"house_seed": 9, "order_seed": 9}, {"person_seed": 9}):
         start_of(house, **{"seed": 1, **seeds})

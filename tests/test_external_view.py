@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from experiments.first_person import FilmConfig
 from experiments.replaying.external_view import ExternalViewer, camera_path
+from experiments.session.first_person import FilmConfig
 from mjsim.model.footprint import Footprint
 from mjsim.world import World
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from benchmarks.support.agreement import run_in_tiers
-from experiments import records
 from experiments.errors import ReplayError
 from experiments.files import read_arrays, read_json
 from experiments.house import House
 from experiments.participants.base import WAIT, Moves
 from experiments.participants.visit_executor import VisitExecutor
-from experiments.records import EventLog, read_events
 from experiments.replaying.replay import replay
-from experiments.trial import prepare_session, run_trial, trial_episode
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.runs.records import EventLog, read_events
+from experiments.trials.trial import prepare_session, run_trial, trial_episode
+from experiments.trials.trial_config import TrialConfig
 from mjsim.actions import Move
 from mjsim.errors import PhysicsError
 from mjsim.health.monitor import HealthMonitor
@@ -29,7 +29,7 @@ def house():
 def frequent_checkpoints():
     """Every 2 s, so that walks are cut short by some."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.recording.CHECKPOINT_PERIOD", 2.0)
+        patch.setattr("experiments.runs.recording.CHECKPOINT_PERIOD", 2.0)
         yield
 
 

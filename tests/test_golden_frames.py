@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.conditions import TaskBoard
 from experiments.house import House
+from experiments.session.task_board import TaskBoard
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.markers import POLE_BANDS, breadcrumbs, flagpole, flagpoles

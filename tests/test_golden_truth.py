@@ -205,7 +205,7 @@ def test_maps_and_counts_agree_with_the_geom_ids(scene, data, renderer):
 
 DRAW = """
 import dataclasses, hashlib, sys
-from experiments.conditions import TaskBoard
+from experiments.session.task_board import TaskBoard
 from experiments.house import House
 from hud.compose import Compositor
 from hud.conditions import condition

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from experiments.health import summarise_health
+from experiments.runs.health import summarise_health
 from mjsim.actions import IDLE, EventKind, Pick
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.health.scan import is_path_clear, static_boxes

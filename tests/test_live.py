@@ -6,13 +6,13 @@ import threading
 import pytest
 from planning_cases import Task, two_rooms
 
-from experiments import records
 from experiments.cli import main
 from experiments.house import House
-from experiments.records import EventLog
 from experiments.replaying.logged_replanner import LoggedReplanner
-from experiments.trial import prepare_session
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.runs.records import EventLog
+from experiments.trials.trial import prepare_session
+from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from planner.checker import check
 from planner.errors import ProblemError, UnreachableError

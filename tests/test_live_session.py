@@ -8,9 +8,9 @@ import pytest
 
 from experiments.house import House
 from experiments.replaying.replay import replay
-from experiments.run_directory import run_directory
-from experiments.trial_config import TrialConfig
-from experiments.trial_record import save_record
+from experiments.runs.run_directory import run_directory
+from experiments.trials.trial_config import TrialConfig
+from experiments.trials.trial_record import save_record
 from experiments.web.controls import Input
 from experiments.web.journal import read_journal
 from experiments.web.live_session import LiveSession, open_journal, result_of
@@ -26,7 +26,7 @@ def house():
 @pytest.fixture(scope="module", autouse=True)
 def frequent_checkpoints():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.recording.CHECKPOINT_PERIOD", 2.0)
+        patch.setattr("experiments.runs.recording.CHECKPOINT_PERIOD", 2.0)
         yield
 
 

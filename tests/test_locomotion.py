@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from experiments.locomotion import BACK_OFF, BACK_OFF_TIME, LocomotionController
 from experiments.participants.base import Moves, Percept, WalkAlong
 from experiments.participants.visit_executor import CLOSER, MIN_STOP_DISTANCE, STOP_SHARE, VisitExecutor
+from experiments.session.locomotion import BACK_OFF, BACK_OFF_TIME, LocomotionController
 from mjsim.actions import ActionResult, Move, Pick, Refusal
 from mjsim.errors import ActionError
 from mjsim.observation import ObjectStatus, Observation

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.metrics import compute_metrics
+from experiments.runs.metrics import compute_metrics
 
 DEFAULTS = {"deviated": False, "alternatives": 1, "tied_alternatives": 0, "tied": False}
 

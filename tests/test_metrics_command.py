@@ -6,11 +6,11 @@ import shutil
 
 import pytest
 
-from experiments import records
 from experiments.cli import main
 from experiments.files import read_json, write_json
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 
 
 @pytest.fixture(scope="module")

@@ -11,18 +11,18 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments import records
 from experiments.cli import main
-from experiments.design import read_design
 from experiments.errors import ConfigError, ReplayError
 from experiments.house import House
 from experiments.participants.follower import Follower
-from experiments.person_distribution import Distribution, PersonDistribution
-from experiments.records import EventLog, read_events
 from experiments.replaying.replay import replay
 from experiments.replaying.run_record import load_run
-from experiments.trial import draw_person, prepare_session, run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.runs.records import EventLog, read_events
+from experiments.trials.design import read_design
+from experiments.trials.person_distribution import Distribution, PersonDistribution
+from experiments.trials.trial import draw_person, prepare_session, run_trial
+from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from mjsim.options import FIDELITIES
 from mjsim.person_parameters import RANGES, PersonParameters

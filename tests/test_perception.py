@@ -7,10 +7,10 @@ import pytest
 
 from experiments.house import House
 from experiments.participants.base import WAIT
-from experiments.records import EventLog
-from experiments.session import INTERRUPTED
-from experiments.trial import prepare_session
-from experiments.trial_config import TrialConfig
+from experiments.runs.records import EventLog
+from experiments.session.session import INTERRUPTED
+from experiments.trials.trial import prepare_session
+from experiments.trials.trial_config import TrialConfig
 from hud.messages import TEXTS
 from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus

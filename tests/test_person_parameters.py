@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from experiments.errors import ConfigError
 from experiments.house import WALL_GAP, House
-from experiments.path_following import Pace
+from experiments.session.path_following import Pace
 from mjsim.actions import Move, Pick
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.errors import PersonError

@@ -5,8 +5,8 @@ import threading
 import pytest
 from planning_cases import Task, two_rooms
 
-from experiments import regrets
-from experiments.regrets import LiveRegrets, Regrets
+from experiments.session import regrets
+from experiments.session.regrets import LiveRegrets, Regrets
 from planner.plan import VisitKind
 from planner.regret_evaluator import RegretEvaluator
 from planner.replanner import Replanner

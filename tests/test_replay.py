@@ -12,19 +12,19 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from experiments import records
-from experiments.checksums import write_checksums
 from experiments.cli import main
 from experiments.errors import RecordError, ReplayError
 from experiments.files import read_arrays, read_json
-from experiments.first_person import FilmConfig
 from experiments.house import House
-from experiments.records import read_events
 from experiments.replaying.replay import ReplayFilm, replay
 from experiments.replaying.run_record import load_run
-from experiments.session import Session
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.runs.checksums import write_checksums
+from experiments.runs.records import read_events
+from experiments.session.first_person import FilmConfig
+from experiments.session.session import Session
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from mjsim.errors import PhysicsError
 
 DT = 0.04
@@ -50,7 +50,7 @@ STATES = (
 def frequent_checkpoints():
     """Every 2 s instead of every 10 s, so that short runs have several. A replay takes them from the record."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.recording.CHECKPOINT_PERIOD", 2.0)
+        patch.setattr("experiments.runs.recording.CHECKPOINT_PERIOD", 2.0)
         yield
 
 
@@ -540,7 +540,7 @@ def test_a_replay_shows_the_list_scrolled_as_it_was(house, tmp_path):
 
     config = TrialConfig(objects=6, assistance="optimal", seed=3, time_limit=5.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.video.VideoWriter.write", lambda _, frame: frames.append(frame))
+        patch.setattr("experiments.session.video.VideoWriter.write", lambda _, frame: frames.append(frame))
         run_trial(config, tmp_path / "plain", film=SMALL, topdown=False, house=house)
         plain, frames[:] = frames.copy(), []
         with patch.context() as scroll:
@@ -562,7 +562,8 @@ def test_a_replay_from_a_checkpoint_films_the_same_frames(film, house, tmp_path)
         frames = shown[start] = []
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(
-                "experiments.video.VideoWriter.write", lambda _, frame, frames=frames: frames.append(frame)
+                "experiments.session.video.VideoWriter.write",
+                lambda _, frame, frames=frames: frames.append(frame),
             )
             report = frames_of(film, house, tmp_path, start=start)
     assert report.first > 0

@@ -8,14 +8,14 @@ import av
 import numpy as np
 import pytest
 
-from experiments import records
 from experiments.errors import ConfigError, SessionError
 from experiments.files import read_json
-from experiments.first_person import FilmConfig
 from experiments.house import House
-from experiments.records import read_events
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.runs.records import read_events
+from experiments.session.first_person import FilmConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from mjsim.episode import Episode
 
 

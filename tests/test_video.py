@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from experiments.errors import RecordError
-from experiments.video import VideoWriter
+from experiments.session.video import VideoWriter
 
 
 def frames(count=30):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from experiments.path_following import (
+from experiments.session.path_following import (
     LOOK_AHEAD,
     LOOK_BEYOND,
     MIN_AHEAD,

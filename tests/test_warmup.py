@@ -15,7 +15,7 @@ from mjsim.actions import Move
 from mjsim.model.catalogue import Catalogue
 from mjsim.episode import Episode
 from mjsim.model.scene import compose
-from experiments.warmup import compile_kernels
+from experiments.trials.warmup import compile_kernels
 from mjsim.world import World
 
 def compiled():

@@ -9,10 +9,10 @@ from multiprocessing import get_context
 from typing import Any
 
 from experiments.house import House
-from experiments.metrics import compute_metrics
-from experiments.records import EventLog
-from experiments.trial import prepare_session, trial_episode
-from experiments.trial_config import TrialConfig
+from experiments.runs.metrics import compute_metrics
+from experiments.runs.records import EventLog
+from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus
 from mjsim.options import FIDELITIES

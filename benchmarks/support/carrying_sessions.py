@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from experiments.path_following import wrap_angle
+from experiments.session.path_following import wrap_angle
 from mjsim.actions import IDLE, Action, EventKind, Move, Pick
 from mjsim.episode import Episode
 from mjsim.model.scene import compose

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from experiments.house import House
-from experiments.records import EventLog
-from experiments.trial import prepare_session, trial_episode
-from experiments.trial_config import TrialConfig
+from experiments.runs.records import EventLog
+from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView

@@ -13,9 +13,9 @@ from typing import Any
 
 import pyarrow.csv
 
-from experiments import records
-from experiments.checksums import CHECKSUMS
-from experiments.table import NAME
+from experiments.runs import records
+from experiments.runs.checksums import CHECKSUMS
+from experiments.trials.table import NAME
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 POLL = 0.005  # s

@@ -8,9 +8,9 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from experiments.house import House
-from experiments.records import EventLog
-from experiments.trial import prepare_session
-from experiments.trial_config import TrialConfig
+from experiments.runs.records import EventLog
+from experiments.trials.trial import prepare_session
+from experiments.trials.trial_config import TrialConfig
 from mjsim.actions import Action
 from mjsim.model.sampling import POINTS, sample_episode
 from mjsim.model.scene import Scene, compose

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from experiments.analysis.statistics.noncentral import t_noncentrality
-from experiments.design import counted
 from experiments.errors import ConfigError, RecordError
-from experiments.table import NAME
-from experiments.trial_config import SEEDS
+from experiments.trials.design import counted
+from experiments.trials.table import NAME
+from experiments.trials.trial_config import SEEDS
 
 METRICS = ("completion_time_s", "task_distance_m", "ipl_stand", "nd_feasible", "total_regret_m")
 CIRCUMSTANCES = (

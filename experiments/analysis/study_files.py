@@ -16,8 +16,8 @@ from experiments.analysis.statistics.effects import FTest
 from experiments.analysis.study_analysis import Analysis, Result
 from experiments.analysis.study_table import StudyTable
 from experiments.files import write_json
-from experiments.run_directory import check_file
-from experiments.trial_config import SEEDS
+from experiments.runs.run_directory import check_file
+from experiments.trials.trial_config import SEEDS
 from mjsim.files import replacing, write_text_atomically
 
 FOLDER = "analysis"

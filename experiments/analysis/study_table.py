@@ -12,12 +12,12 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from experiments.analysis.measures import LIKERT_PREFIX, Measures, resolve
-from experiments.design import confounded_rows, counted
-from experiments.endings import ALL_DELIVERED
 from experiments.errors import RecordError
 from experiments.participants.human import NAME as HUMAN
-from experiments.table import NAME
-from experiments.trial_config import SEEDS
+from experiments.session.endings import ALL_DELIVERED
+from experiments.trials.design import confounded_rows, counted
+from experiments.trials.table import NAME
+from experiments.trials.trial_config import SEEDS
 
 SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 REQUIRED = ("assistance", "objects", "user")

@@ -13,7 +13,6 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from experiments.batch import BatchProgress, run_batch
 from experiments.commands.options import (
     TRIAL_OPTIONS,
     add_command,
@@ -26,9 +25,10 @@ from experiments.commands.options import (
 )
 from experiments.commands.person_options import PERSON_OPTIONS
 from experiments.commands.terminal import error_console, progress_bars
-from experiments.design import Design, counted, factorial, read_design
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
+from experiments.trials.batch import BatchProgress, run_batch
+from experiments.trials.design import Design, counted, factorial, read_design
 
 OBJECTS = 6
 ASSISTANCE = ("none", "highlight", "optimal")

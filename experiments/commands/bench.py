@@ -11,7 +11,7 @@ from typing import Any
 
 from experiments.commands.options import add_command, add_force, int_list
 from experiments.errors import ConfigError
-from experiments.run_directory import check_file
+from experiments.runs.run_directory import check_file
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.commands.options import HOUSE_HELP, add_command, add_force
-from experiments.run_directory import check_file
+from experiments.runs.run_directory import check_file
 from mjsim.model.validation.report import Report, check_path
 
 UNUSABLE = 2

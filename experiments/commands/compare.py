@@ -21,7 +21,7 @@ from experiments.analysis.comparison import (
 )
 from experiments.commands.options import add_command, text_list
 from experiments.errors import ConfigError
-from experiments.run_directory import check_file
+from experiments.runs.run_directory import check_file
 from mjsim.files import replacing
 
 WIDTH = 160  # characters, where there is no terminal

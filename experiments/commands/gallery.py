@@ -8,12 +8,12 @@ from typing import Any
 
 from experiments.commands.options import add_command, add_force, add_frame, film_config
 from experiments.commands.terminal import error_console
-from experiments.first_person import FilmConfig
 from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
-from experiments.records import TOPDOWN
-from experiments.run_directory import check_file
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs.records import TOPDOWN
+from experiments.runs.run_directory import check_file
+from experiments.session.first_person import FilmConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from mjsim.files import replacing
 
 SEED = 7

@@ -7,7 +7,7 @@ from typing import Any
 from experiments.commands.options import add_command, add_force, add_house, add_points
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.run_directory import check_file
+from experiments.runs.run_directory import check_file
 from mjsim.model.export import export_house
 from mjsim.model.sampling import POINTS
 from mjsim.model.scene import compose

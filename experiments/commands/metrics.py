@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.batch_folder import read_trial
 from experiments.commands.options import add_command, add_force
 from experiments.errors import RecordError, ReplayError
-from experiments.metrics import DEFINITIONS
 from experiments.replaying.run_record import check_log
-from experiments.run_directory import TRIALS, check_file, is_batch, is_run
+from experiments.runs.metrics import DEFINITIONS
+from experiments.runs.run_directory import TRIALS, check_file, is_batch, is_run
+from experiments.trials.batch_folder import read_trial
 from mjsim.files import write_text_atomically
 
 DESCRIPTION = f"""\

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from experiments.commands.person_options import add_person_options, person_options
-from experiments.design import numbers
 from experiments.errors import ConfigError
-from experiments.first_person import FilmConfig
 from experiments.participants import DEFAULT_PARTICIPANT, participant_names
-from experiments.trial_config import SEEDS, TrialConfig, episode_settings
+from experiments.session.first_person import FilmConfig
+from experiments.trials.design import numbers
+from experiments.trials.trial_config import SEEDS, TrialConfig, episode_settings
 from hud.conditions import condition_names
 from hud.options import option_names
 from mjsim.episode import CAPACITY

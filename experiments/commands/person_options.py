@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from experiments.person_distribution import PersonDistribution
+from experiments.trials.person_distribution import PersonDistribution
 from mjsim.person_parameters import RANGES, PersonParameters
 
 _VALUES = {

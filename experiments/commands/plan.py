@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.check is not None:
         return _check(arguments.file, arguments.check)
     if arguments.certificate is not None:
-        from experiments.run_directory import check_file  # loaded only where it is needed
+        from experiments.runs.run_directory import check_file  # loaded only where it is needed
 
         check_file(arguments.certificate, replace=arguments.force)
     seconds = arguments.time_limit

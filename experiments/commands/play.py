@@ -24,7 +24,7 @@ from experiments.commands.options import (
 )
 from experiments.errors import ConfigError, RecordError
 from experiments.participants.human import NAME as HUMAN
-from experiments.trial_config import LARGEST_SEED, TrialConfig
+from experiments.trials.trial_config import LARGEST_SEED, TrialConfig
 from hud.conditions import condition
 from planner.solver import solver
 

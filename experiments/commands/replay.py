@@ -18,7 +18,7 @@ from experiments.commands.terminal import error_console, progress_bars
 from experiments.errors import ConfigError, ReplayError
 from experiments.replaying.external_view import CAMERAS, FIRST_PERSON
 from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
-from experiments.run_directory import check_file
+from experiments.runs.run_directory import check_file
 
 DESCRIPTION = """\
 Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one

@@ -20,11 +20,11 @@ from experiments.commands.options import (
     trial_options,
 )
 from experiments.commands.terminal import error_console, progress_bars
-from experiments.endings import INTERRUPTED
-from experiments.session import Progress as SessionProgress
+from experiments.session.endings import INTERRUPTED
+from experiments.session.session import Progress as SessionProgress
 from experiments.signals import exit_code
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 
 SHOWN_METRICS = (
     ("delivered", "objects delivered", "{}"),

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.locomotion import LocomotionController
 from experiments.participants.base import Percept, Point, WalkAlong, positions_of
 from experiments.participants.nearest import Nearest
+from experiments.session.locomotion import LocomotionController
 from mjsim.actions import IDLE, Action, ActionResult, Move, Pick
 from mjsim.environments.core import ObservationDict, Rearrangement
 from mjsim.model.scene import Scene

@@ -20,6 +20,8 @@ from planner.plan import Visit
 
 Point = NDArray[np.float64]
 
+TIME_TOLERANCE = 1e-6  # s; times are sums of many steps, and no decision may depend on their rounding
+
 NEARBY = 1.3  # m
 USUAL_PERSON = PersonParameters()
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from experiments.house import House
-from experiments.locomotion import TIME_TOLERANCE
-from experiments.participants.base import WAIT, Decision, Participant, Percept, Point
+from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Participant, Percept, Point
 from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor, nearest_visit
 from planner.plan import Visit, VisitKind

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.locomotion import TIME_TOLERANCE
-from experiments.participants.base import WAIT, Decision, Guidance, Percept, Point, WalkAlong
+from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Guidance, Percept, Point, WalkAlong
 from mjsim.actions import Pick, Place
 from planner.errors import PlannerError
 from planner.plan import Visit, VisitKind

@@ -5,10 +5,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from experiments.endings import BROKEN_OFF
-from experiments.records import EVENTS, RECORDING, TRAJECTORY, Event
 from experiments.replaying.replayer import Replayer
 from experiments.replaying.run_record import PER_STEP, WORLD_EVENTS, Mismatch
+from experiments.runs.records import EVENTS, RECORDING, TRAJECTORY, Event
+from experiments.session.endings import BROKEN_OFF
 
 # Events that follow from the physics, and what the assistant makes of them. Searches of the planner are not repeated:
 # its plans and regrets are those of the log, and the hashes of the log protect them.

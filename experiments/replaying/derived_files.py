@@ -4,13 +4,13 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from experiments import records
-from experiments.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.errors import RecordError
 from experiments.files import read_json
-from experiments.metrics import measure
-from experiments.records import Event
 from experiments.replaying.run_record import Mismatch, RunRecord
+from experiments.runs import records
+from experiments.runs.checksums import CHECKSUMS, read_checksums, sha256_of
+from experiments.runs.metrics import measure
+from experiments.runs.records import Event
 
 # What metrics.json says beyond the log and the trajectory; the checksum of the file protects it.
 CIRCUMSTANCES = ("frames_sha256", "renderer", "wall_s")

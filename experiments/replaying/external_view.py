@@ -6,8 +6,8 @@ from types import TracebackType
 
 import numpy as np
 
-from experiments.first_person import FilmConfig
-from experiments.video import VideoWriter
+from experiments.session.first_person import FilmConfig
+from experiments.session.video import VideoWriter
 from hud.projection import CameraView
 from hud.state import HudState, Marker, Rgba, Vec3
 from mjsim.model.scene import Scene

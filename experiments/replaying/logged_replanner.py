@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from experiments.errors import ReplayError
-from experiments.records import Event
+from experiments.runs.records import Event
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.route import Route, TaskState
 

@@ -2,12 +2,12 @@
 
 from typing import Never
 
-from experiments import records
-from experiments.endings import PHYSICS_ERROR, LeaveSession
 from experiments.errors import RecordError
 from experiments.participants.base import WAIT, Decision, Moves, Percept
-from experiments.recording import Recording
 from experiments.replaying.run_record import Mismatch, RunRecord
+from experiments.runs import records
+from experiments.runs.recording import Recording
+from experiments.session.endings import PHYSICS_ERROR, LeaveSession
 from mjsim.world import World
 
 MAX_ROLLOUT = 250  # control steps

@@ -5,17 +5,17 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments import records
 from experiments.errors import ConfigError, RecordError, ReplayError
 from experiments.files import read_json
-from experiments.first_person import FilmConfig, Filming, FirstPersonRenderer
 from experiments.house import House
 from experiments.replaying.external_view import CAMERAS, FIRST_PERSON, FREE, ExternalViewer, camera_path
 from experiments.replaying.replayer import Replayer, mismatch_error
 from experiments.replaying.run_record import RunRecord, load_run
 from experiments.replaying.verdicts import Verdict, all_mismatches, verdicts
-from experiments.session import Viewer
-from experiments.video import VideoWriter
+from experiments.runs import records
+from experiments.session.first_person import FilmConfig, Filming, FirstPersonRenderer
+from experiments.session.session import Viewer
+from experiments.session.video import VideoWriter
 from mjsim.errors import AssetError
 from mjsim.files import replacing
 from mjsim.person_parameters import PersonParameters

@@ -6,17 +6,17 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from experiments.assistant import Assistant
-from experiments.conditions import TaskBoard
-from experiments.endings import INTERRUPTED
 from experiments.errors import ReplayError
 from experiments.house import House
-from experiments.recording import Recording, provenance
-from experiments.records import RECORDING, Event, EventLog
 from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.recorded_participant import EndOfReplay, RecordedParticipant
 from experiments.replaying.run_record import EXTERNAL, WORLD_EVENTS, Mismatch, RunRecord
-from experiments.session import Progress, Session, Viewer
+from experiments.runs.recording import Recording, provenance
+from experiments.runs.records import RECORDING, Event, EventLog
+from experiments.session.assistant import Assistant
+from experiments.session.endings import INTERRUPTED
+from experiments.session.session import Progress, Session, Viewer
+from experiments.session.task_board import TaskBoard
 from mjsim.actions import WorldEvent
 from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.model.scene import compose

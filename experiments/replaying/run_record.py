@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments import records
-from experiments.endings import COMPLETE, PHYSICS_ERROR
 from experiments.errors import RecordError, ReplayError
-from experiments.event_types import check_event
 from experiments.files import TEXT, Layout, read_arrays
-from experiments.recording import Recorded, action_hashes
-from experiments.records import STATUS_CODE, Event, LogDigest, decode_action
+from experiments.runs import records
+from experiments.runs.event_types import check_event
+from experiments.runs.recording import Recorded, action_hashes
+from experiments.runs.records import STATUS_CODE, Event, LogDigest, decode_action
+from experiments.session.endings import COMPLETE, PHYSICS_ERROR
 from mjsim.actions import Action, EventKind
 from mjsim.episode import Episode
 from mjsim.errors import EpisodeError, PersonError

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from experiments import records
-from experiments.checksums import CHECKSUMS
 from experiments.replaying.comparison import simulated_mismatches
 from experiments.replaying.derived_files import checksum_mismatches, derived_mismatches
 from experiments.replaying.replayer import Replayer
 from experiments.replaying.run_record import Mismatch, RunRecord
+from experiments.runs import records
+from experiments.runs.checksums import CHECKSUMS
 
 SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # by simulating the run again
 DERIVED = (records.PLAN, records.METRICS)  # follow from those

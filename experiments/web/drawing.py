@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.first_person import FilmConfig, FirstPersonRenderer
 from experiments.house import House
+from experiments.session.first_person import FilmConfig, FirstPersonRenderer
 from experiments.web.encoders import Encoder, H264Encoder, JpegEncoder
 from experiments.web.messages import Frame, View
 from hud.projection import CameraView

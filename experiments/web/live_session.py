@@ -7,15 +7,15 @@ from typing import Any
 from experiments.errors import RecordError
 from experiments.house import House
 from experiments.participants.base import Decision, Percept
-from experiments.person_distribution import PersonDistribution
-from experiments.recording import Recording
-from experiments.records import EventLog
 from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.replayer import catch_up
-from experiments.session import Viewer
-from experiments.trial import draw_person, prepare_session, trial_episode
-from experiments.trial_config import TrialConfig
-from experiments.trial_record import SessionResult
+from experiments.runs.recording import Recording
+from experiments.runs.records import EventLog
+from experiments.session.session import Viewer
+from experiments.trials.person_distribution import PersonDistribution
+from experiments.trials.trial import draw_person, prepare_session, trial_episode
+from experiments.trials.trial_config import TrialConfig
+from experiments.trials.trial_record import SessionResult
 from experiments.web.controls import Controls, Input, control_step
 from experiments.web.journal import JOURNAL, Journal
 from experiments.web.resuming_planner import ResumingPlanner

@@ -16,8 +16,8 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
-from experiments import records
 from experiments.errors import RecordError
+from experiments.runs import records
 from experiments.web.browser_socket import BrowserSocket
 from experiments.web.guards import Addresses, Guards, Rate
 from experiments.web.pages import message_page, page, play_page, result_page, story_page

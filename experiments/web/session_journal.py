@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from experiments.recording import Recorded, action_hashes
-from experiments.records import EventLog, Trajectory
 from experiments.replaying.run_record import RunRecord
+from experiments.runs.recording import Recorded, action_hashes
+from experiments.runs.records import EventLog, Trajectory
 from experiments.web.controls import Controls
 from mjsim.episode import Episode
 from mjsim.model.scene import Scene

@@ -12,8 +12,8 @@ from typing import Any, Literal
 
 import msgspec
 
-from experiments import records
 from experiments.errors import RecordError
+from experiments.runs import records
 from experiments.web.journal import sync_folder
 from mjsim.files import write_text_atomically
 

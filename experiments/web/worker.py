@@ -16,14 +16,15 @@ from typing import Any
 
 import msgspec
 
-from experiments import records, warmup
-from experiments.endings import INTERRUPTED
 from experiments.house import House
-from experiments.run_directory import is_run, run_directory
-from experiments.session import Viewer
-from experiments.trial_config import TrialConfig
-from experiments.trial_record import draw_floor_plan, save_record
-from experiments.user_code import describe
+from experiments.runs import records
+from experiments.runs.run_directory import is_run, run_directory
+from experiments.session.endings import INTERRUPTED
+from experiments.session.session import Viewer
+from experiments.session.user_code import describe
+from experiments.trials import warmup
+from experiments.trials.trial_config import TrialConfig
+from experiments.trials.trial_record import draw_floor_plan, save_record
 from experiments.web import messages
 from experiments.web.drawing import Drawer
 from experiments.web.inbox import Inbox

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from experiments import records
 from experiments.cli import main
 from experiments.errors import UserCodeError
 from experiments.files import read_json
-from experiments.records import read_events
 from experiments.replaying.replay import replay
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.runs.records import read_events
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from faults.conftest import FAST, one_line
 
 PARTICIPANT = """

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments import records
 from experiments.errors import RecordError
 from experiments.files import read_json
-from experiments.first_person import FilmConfig
 from experiments.replaying.replay import replay
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.session.first_person import FilmConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from faults.conftest import FAST
 
 CONFIG = TrialConfig(objects=2, assistance="optimal", seed=0, fidelity="event", regret=False)
@@ -74,7 +74,7 @@ def full(*_args, **_options):
 
 
 def test_a_full_disk_at_the_floor_plan_costs_the_floor_plan_alone(house, tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.analysis.topdown.draw_topdown", full)
+    monkeypatch.setattr("experiments.runs.topdown.draw_topdown", full)
     warnings = []
     run_trial(CONFIG, tmp_path / "out", house=house, on_warning=warnings.append)
     assert warnings == ["no floor plan: OSError: [Errno 28] No space left on device"]
@@ -82,7 +82,7 @@ def test_a_full_disk_at_the_floor_plan_costs_the_floor_plan_alone(house, tmp_pat
 
 
 def test_where_nothing_can_be_written_that_is_said(house, tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.trial_record.save_arrays", full)
+    monkeypatch.setattr("experiments.trials.trial_record.save_arrays", full)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with pytest.raises(OSError, match="No space left"):
         run_trial(CONFIG, tmp_path / "out", topdown=False, house=house)

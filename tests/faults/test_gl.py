@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from experiments import records
 from experiments.files import read_json
+from experiments.runs import records
 from faults.conftest import FAST, one_line
 
 PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}

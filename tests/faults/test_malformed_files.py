@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from faults.conftest import one_line
 
 DEEP = 200_000  # brackets in brackets

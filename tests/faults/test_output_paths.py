@@ -7,8 +7,8 @@ import pytest
 
 from experiments.cli import main
 from experiments.errors import RecordError
-from experiments.records import EPISODE, EVENTS, METRICS
-from experiments.run_directory import run_directory
+from experiments.runs.records import EPISODE, EVENTS, METRICS
+from experiments.runs.run_directory import run_directory
 
 PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
 

@@ -6,15 +6,15 @@ import shutil
 import numpy as np
 import pytest
 
-from experiments import records
-from experiments.checksums import CHECKSUMS, write_checksums
 from experiments.errors import ExperimentError
 from experiments.files import read_arrays, read_json, save_arrays, write_json
 from experiments.house import House
 from experiments.replaying.derived_files import CIRCUMSTANCES, checksum_mismatches, derived_mismatches
 from experiments.replaying.replay import replay
 from experiments.replaying.run_record import load_run
-from experiments.trial import TrialConfig, run_trial
+from experiments.runs import records
+from experiments.runs.checksums import CHECKSUMS, write_checksums
+from experiments.trials.trial import TrialConfig, run_trial
 
 FLIPS_PER_FILE = 24
 FILES = (

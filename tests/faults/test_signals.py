@@ -8,13 +8,13 @@ import time
 
 import pytest
 
-from experiments import records
 from experiments.files import read_json
-from experiments.records import Trajectory, read_events
 from experiments.replaying.replay import replay
+from experiments.runs import records
+from experiments.runs.records import Trajectory, read_events
 from experiments.signals import PATIENCE, Stopped, signals_postponed, signals_raised
-from experiments.trial import run_trial
-from experiments.trial_config import TrialConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from faults.conftest import FAST, ROOT, one_line
 
 PARTICIPANT = """

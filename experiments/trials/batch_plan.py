@@ -6,14 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.batch_folder import OUTDATED, StoredTrial, put_aside, read_trials, trial_name
-from experiments.design import counted
 from experiments.errors import ConfigError
-from experiments.fingerprint import Inputs, changes, trial_inputs
 from experiments.house import House
 from experiments.participants import participant
-from experiments.run_directory import TRIALS
-from experiments.trial_config import TrialConfig
+from experiments.runs.run_directory import TRIALS
+from experiments.trials.batch_folder import OUTDATED, StoredTrial, put_aside, read_trials, trial_name
+from experiments.trials.design import counted
+from experiments.trials.fingerprint import Inputs, changes, trial_inputs
+from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition
 from mjsim.episode import Episode
 from mjsim.errors import EpisodeError

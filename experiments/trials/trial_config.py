@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
-from experiments.person_distribution import PersonDistribution
+from experiments.trials.person_distribution import PersonDistribution
 from mjsim.episode import CAPACITY, Episode
 from mjsim.model.sampling import POINTS
 from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.health import summarise_health
-from experiments.records import PARTICIPANT, Event
+from experiments.runs.health import summarise_health
+from experiments.runs.records import PARTICIPANT, Event
 
 REGRETFUL = 0.01  # m; smaller regrets are ties
 COSTLY = 0.1  # m; what a deviation must cost to count in `nd_regret_10cm`

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.files import TEXT, Layout, read_arrays, save_arrays
-from experiments.records import EventLog
+from experiments.runs.records import EventLog
 from mjsim.observation import Observation
 from mjsim.world import World
 from mjsim.world_state import (

@@ -14,17 +14,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments import records
-from experiments.checksums import read_checksums, sha256_of
-from experiments.design import confounded_rows, counted
-from experiments.endings import COMPLETE
 from experiments.errors import RecordError
 from experiments.files import read_arrays, read_json
-from experiments.fingerprint import Inputs
-from experiments.metrics import measure
-from experiments.records import HEALTH, read_events
-from experiments.run_directory import TRIALS
-from experiments.trial_config import SEEDS, TrialConfig
+from experiments.runs import records
+from experiments.runs.checksums import read_checksums, sha256_of
+from experiments.runs.metrics import measure
+from experiments.runs.records import HEALTH, read_events
+from experiments.runs.run_directory import TRIALS
+from experiments.session.endings import COMPLETE
+from experiments.trials.design import confounded_rows, counted
+from experiments.trials.fingerprint import Inputs
+from experiments.trials.trial_config import SEEDS, TrialConfig
 
 OUTDATED = "outdated"
 NOT_IN_THE_LOG = ("frames_sha256", "renderer", "wall_s")

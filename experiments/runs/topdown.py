@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.records import Event
+from experiments.runs.records import Event
 from mjsim.files import replacing
 from mjsim.model.scene import Scene
 from mjsim.render import largest_scale, render_floorplan

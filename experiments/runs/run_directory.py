@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from experiments import records
-from experiments.checksums import CHECKSUMS
 from experiments.errors import RecordError
+from experiments.runs import records
+from experiments.runs.checksums import CHECKSUMS
 from mjsim.files import exchange, work_folder
 
 SHOWN_NAMES = 3  # of what is in the way

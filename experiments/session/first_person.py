@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import ConfigError, RecordError
 from experiments.house import House
-from experiments.video import VideoWriter
+from experiments.session.video import VideoWriter
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView

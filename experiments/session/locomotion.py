@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import ARRIVED_WITHIN
-from experiments.participants.base import WalkAlong
-from experiments.path_following import Obstacles, Pace, follow, turn_towards
+from experiments.participants.base import TIME_TOLERANCE, WalkAlong
+from experiments.session.path_following import Obstacles, Pace, follow, turn_towards
 from mjsim.actions import IDLE, Action, Move, Pick, Place
 from mjsim.fidelity.body_state import HEADING, X, Y
 from mjsim.fidelity.kinematics import LocomotionState
@@ -25,7 +25,6 @@ FACING_WITHIN = 0.25  # rad
 MIN_PROGRESS = 0.05  # m
 BACK_OFF = Move(forward=-0.4, left=0.3)
 BACK_OFF_TIME = 0.6  # s
-TIME_TOLERANCE = 1e-6  # s; times are sums of many steps, and no decision may depend on their rounding
 
 WALKING, TURNING, ARRIVED, BLOCKED = range(4)  # phases of a walk
 SHORTEST_LEFT, SINCE = range(2)  # progress of a walk: shortest distance left so far, m, and when that was, s

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.conditions import TaskBoard
 from experiments.participants.base import Choice, Guidance
-from experiments.reach_bound import reach_bound
-from experiments.records import EventLog
-from experiments.regrets import Regrets
-from experiments.shown_path import TOLERANCE, PathsToNext
-from experiments.user_code import shown_by
-from experiments.visit_fields import PlaceDistances, alternatives, as_json
+from experiments.runs.records import EventLog
+from experiments.session.reach_bound import reach_bound
+from experiments.session.regrets import Regrets
+from experiments.session.shown_path import TOLERANCE, PathsToNext
+from experiments.session.task_board import TaskBoard
+from experiments.session.user_code import shown_by
+from experiments.session.visit_fields import PlaceDistances, alternatives, as_json
 from hud.conditions import condition
 from hud.markers import BREADCRUMB, GOAL
 from hud.projection import CameraView

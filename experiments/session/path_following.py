@@ -1,7 +1,7 @@
 """Walking along a polyline the way a person does: look ahead, slow down for sharp turns, pass objects beside the feet.
 
 Compiled, because this runs at every control step of every participant. The same kernels run step by step and in
-rollouts (`experiments.locomotion`), so both give the same numbers to the last bit.
+rollouts (`experiments.session.locomotion`), so both give the same numbers to the last bit.
 """
 
 import math

@@ -17,11 +17,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from experiments.participants import participant_names
-from experiments.trial_config import TrialConfig
+from experiments.trials.trial_config import TrialConfig
 from mjsim.model.catalogue import Catalogue
 
 LIBRARIES = ("mujoco", "numpy", "numba", "ortools", "scipy", "shapely")
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PACKAGES = ("experiments", "hud", "mjsim", "planner")
 # What looks at trials, draws or trains. No record of a trial depends on these.
 NO_INFLUENCE = {

@@ -10,17 +10,17 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from experiments import records
-from experiments.checksums import write_checksums
 from experiments.errors import RecordError
 from experiments.files import save_arrays, write_json
 from experiments.house import House
-from experiments.metrics import measure
-from experiments.recording import Recorded
-from experiments.records import Event, EventLog
-from experiments.run_directory import free_name
-from experiments.session import Session
-from experiments.user_code import describe
+from experiments.runs import records
+from experiments.runs.checksums import write_checksums
+from experiments.runs.metrics import measure
+from experiments.runs.recording import Recorded
+from experiments.runs.records import Event, EventLog
+from experiments.runs.run_directory import free_name
+from experiments.session.session import Session
+from experiments.session.user_code import describe
 from mjsim.model.scene import Scene
 
 NOTHING_FILMED = "none: nothing was filmed"  # in place of the renderer's name
@@ -99,7 +99,7 @@ def draw_floor_plan(folder: Path, house: House, scene: Scene, result: SessionRes
     if not result.plans:
         return None
     try:
-        from experiments.analysis.topdown import draw_topdown  # matplotlib: batches do without
+        from experiments.runs.topdown import draw_topdown  # matplotlib: batches do without
 
         draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], result.arrays)
         write_checksums(folder, records.FILES)

@@ -13,8 +13,8 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from experiments.errors import ConfigError
-from experiments.person_distribution import PersonDistribution
-from experiments.trial_config import SEEDS, TrialConfig, episode_settings
+from experiments.trials.person_distribution import PersonDistribution
+from experiments.trials.trial_config import SEEDS, TrialConfig, episode_settings
 
 T = TypeVar("T")
 

@@ -7,16 +7,16 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.assistant import Assistant
-from experiments.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
 from experiments.errors import SessionError, UserCodeError
-from experiments.locomotion import LocomotionController
 from experiments.participants.base import Decision, Moves, Participant, Wait, WalkAlong
-from experiments.perception import SessionPercept
-from experiments.recording import Recording
-from experiments.records import Trajectory
+from experiments.runs.recording import Recording
+from experiments.runs.records import Trajectory
+from experiments.session.assistant import Assistant
+from experiments.session.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
+from experiments.session.locomotion import LocomotionController
+from experiments.session.perception import SessionPercept
+from experiments.session.user_code import decide, describe
 from experiments.signals import signal_of
-from experiments.user_code import decide, describe
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.actions import IDLE, Action, ActionResult, Move, WorldEvent

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.records import HEALTH, Event
+from experiments.runs.records import HEALTH, Event
 from mjsim.actions import EventKind
 
 # Name in the metrics -> kind of event.

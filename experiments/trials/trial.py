@@ -10,26 +10,26 @@ from typing import Any
 
 import numpy as np
 
-from experiments import records
-from experiments.assistant import Assistant
-from experiments.conditions import TaskBoard
-from experiments.endings import INTERRUPTED
 from experiments.errors import ConfigError, UserCodeError
-from experiments.fingerprint import fingerprint, trial_inputs
-from experiments.first_person import FilmConfig, TrialFilm
 from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Participant
-from experiments.person_distribution import PersonDistribution
-from experiments.recording import Recording, provenance
-from experiments.records import EventLog
-from experiments.regrets import LiveRegrets, Regrets
-from experiments.run_directory import run_directory
-from experiments.session import OnProgress, Progress, Session, Viewer
+from experiments.runs import records
+from experiments.runs.recording import Recording, provenance
+from experiments.runs.records import EventLog
+from experiments.runs.run_directory import run_directory
+from experiments.session.assistant import Assistant
+from experiments.session.endings import INTERRUPTED
+from experiments.session.first_person import FilmConfig, TrialFilm
+from experiments.session.regrets import LiveRegrets, Regrets
+from experiments.session.session import OnProgress, Progress, Session, Viewer
+from experiments.session.task_board import TaskBoard
+from experiments.session.user_code import make_participant
 from experiments.signals import Stopped, signals_postponed
-from experiments.trial_config import TrialConfig
-from experiments.trial_record import NOTHING_FILMED, SessionResult, draw_floor_plan, save_record
-from experiments.user_code import make_participant
+from experiments.trials.fingerprint import fingerprint, trial_inputs
+from experiments.trials.person_distribution import PersonDistribution
+from experiments.trials.trial_config import TrialConfig
+from experiments.trials.trial_record import NOTHING_FILMED, SessionResult, draw_floor_plan, save_record
 from mjsim.episode import Episode
 from mjsim.errors import PhysicsError
 from mjsim.model.scene import Scene, compose

@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from experiments.assistant import Assistant
 from experiments.participants.base import Choice, Guidance, Percept, Point, positions_of
+from experiments.session.assistant import Assistant
 from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
 from mjsim.actions import ActionResult

@@ -10,17 +10,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.batch_folder import folder_notes, read_trials, trial_key
-from experiments.batch_plan import BatchPlan, check_trials, plan_batch
-from experiments.design import Design, confounded
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.run_directory import TRIALS, check_batch_folder
+from experiments.runs.run_directory import TRIALS, check_batch_folder
 from experiments.signals import signals_postponed
-from experiments.table import write_tables
-from experiments.trial import run_trial
-from experiments.trial_config import SEEDS, TrialConfig
-from experiments.workers import worker_pool
+from experiments.trials.batch_folder import folder_notes, read_trials, trial_key
+from experiments.trials.batch_plan import BatchPlan, check_trials, plan_batch
+from experiments.trials.design import Design, confounded
+from experiments.trials.table import write_tables
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import SEEDS, TrialConfig
+from experiments.trials.workers import worker_pool
 from mjsim.files import remove_leftovers
 
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for

@@ -1,6 +1,6 @@
 """Compiles all kernels ahead of their first use; later processes load them from disk.
 
-Run once after installing: `python -m experiments.warmup`. It takes a minute, and seconds where all is compiled.
+Run once after installing: `python -m experiments.trials.warmup`. It takes a minute, and seconds where all is compiled.
 """
 
 import math
@@ -8,9 +8,9 @@ import math
 import numpy as np
 
 from experiments.house import House
-from experiments.records import EventLog
-from experiments.trial import prepare_session
-from experiments.trial_config import TrialConfig
+from experiments.runs.records import EventLog
+from experiments.trials.trial import prepare_session
+from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition_names
 from mjsim.actions import Move, Pick, Place
 from mjsim.episode import Episode, PlacedObject, StartPose
