@@ -21,8 +21,8 @@ from experiments.trials.trial_config import SEEDS
 from mjsim.files import replacing, write_text_atomically
 
 FOLDER = "analysis"
-STATISTICS, PEOPLE, TESTS = "stats.json", "people", "tests.csv"
-FILES = (STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)
+REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "tests.csv"
+FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)
 TEST_COLUMNS = (
     *("origin", "measure", "column", "test", "effect", "objects", "statistic", "df1", "df2", "people", "p"),
     *("partial_eta_squared", "low", "high", "reason"),
@@ -39,8 +39,8 @@ def check_files(folder: Path, *, replace: bool) -> None:
         check_file(folder / name, replace=replace)
 
 
-def write_analysis(folder: Path, analysis: Analysis) -> None:
-    """Write all files, each whole or not at all."""
+def write_analysis(folder: Path, analysis: Analysis, report: str) -> None:
+    """Write all files, each whole or not at all; `report` is the page."""
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / STATISTICS, analysis.as_json())
     table = people_table(analysis.table)
@@ -49,6 +49,7 @@ def write_analysis(folder: Path, analysis: Analysis) -> None:
     with replacing(folder / f"{PEOPLE}.csv") as temporary:
         pa.csv.write_csv(table, temporary)
     write_text_atomically(folder / TESTS, _tests_csv(analysis))
+    write_text_atomically(folder / REPORT, report)
 
 
 def people_table(table: StudyTable) -> pa.Table:

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +57,17 @@ class StudyTable:
     def levels(self) -> list[int]:
         """Numbers of objects, rising."""
         return sorted(set(self.objects.tolist()))
+
+    def take(self, people: NDArray[np.int64]) -> "StudyTable":
+        """The people of these numbers, (m,); somebody may be named several times."""
+        return replace(
+            self,
+            rows=[self.rows[k] for k in people],
+            assistance=self.assistance[people],
+            objects=self.objects[people],
+            houses=self.houses[people],
+            columns={name: values[people] for name, values in self.columns.items()},
+        )
 
     def groups(self, name: str, objects: int | None = None) -> dict[str, NDArray[np.float64]]:
         """Known values of a column by condition, of one level or all; conditions without any are left out."""

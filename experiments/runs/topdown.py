@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.runs.records import Event
+from mjsim.episode import Episode
 from mjsim.files import replacing
 from mjsim.model.scene import Scene
 from mjsim.render import largest_scale, render_floorplan
@@ -48,7 +49,7 @@ def draw_topdown(
     axes = figure.add_subplot()
     axes.imshow(floor.rgb, extent=(x_min, x_max, y_min, y_max), interpolation="bilinear")
     _draw_rooms(axes, house)
-    planned = planned_path(house, scene, plan)
+    planned = planned_path(house, scene.episode, plan)
     _draw_line(axes, planned, PLANNED, "--", f"planned at the start, {_length(planned):.1f} m")
     walked = arrays["position"]
     _draw_line(axes, walked, WALKED, "-", f"walked, {_length(walked):.1f} m")
@@ -69,9 +70,8 @@ def _scale(bounds: tuple[float, float, float, float]) -> float:
     return min(PIXELS_PER_METRE, LARGEST_SIDE / max(x_max - x_min, y_max - y_min), largest_scale(bounds))
 
 
-def planned_path(house: House, scene: Scene, plan: Event) -> NDArray[np.float64]:
+def planned_path(house: House, episode: Episode, plan: Event) -> NDArray[np.float64]:
     """Floor points of the tour of a `plan` event, m, shape (k, 2)."""
-    episode = scene.episode
     places = {o.name: np.array(o.position[:2]) for o in episode.objects}
     here = house.navmesh.snap(np.array([episode.start.x, episode.start.y]))
     points = [here[None]]

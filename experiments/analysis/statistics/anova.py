@@ -12,7 +12,7 @@ from experiments.analysis.statistics.effects import FTest
 from experiments.errors import StatisticsError
 
 Values = NDArray[np.float64]
-TYPES = (2, 3)
+EFFECTS = ("first", "second", "both")
 
 
 @dataclass(frozen=True)
@@ -118,22 +118,32 @@ def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int
     Raises:
         StatisticsError: A cell is empty, each has one person only, or nothing varies within cells.
     """
+    return TwoWay(*(FTest.of(*one, len(values)) for one in two_way_statistics(values, first, second, kind)))
+
+
+def two_way_statistics(
+    values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2
+) -> list[tuple[float, int, int]]:
+    """As `two_way`, but F and its degrees of freedom alone: first factor, second factor, interaction."""
     blocks = Design.of(first, second).blocks
     residual, freedom = _residual(values, blocks)
     if freedom < 1:
         raise StatisticsError("each cell has one person only; nothing is known about how people differ")
     if residual <= 1e-20 * max(1.0, float((values**2).sum())):
         raise StatisticsError("the values do not vary within any cell")
-    tests = []
-    for effect in ("first", "second", "both"):
+    columns = [blocks[effect].shape[1] for effect in EFFECTS]
+    gains = two_way_squares(values, blocks, kind)
+    return [(g / df1 / (residual / freedom), df1, freedom) for g, df1 in zip(gains, columns, strict=True)]
+
+
+def two_way_squares(values: Values, blocks: Mapping[str, Values], kind: int = 2) -> list[float]:
+    """Sums of squares of both factors and their interaction; `blocks` are those of a `Design`."""
+    gains = []
+    for effect in EFFECTS:
         larger = [n for n in blocks if kind == 3 or effect == "both" or n != "both"]
-        gain = (
-            _residual(values, {n: blocks[n] for n in larger if n != effect})[0]
-            - _residual(values, {n: blocks[n] for n in larger})[0]
-        )
-        df1 = blocks[effect].shape[1]
-        tests.append(FTest.of(max(gain, 0.0) / df1 / (residual / freedom), df1, freedom, len(values)))
-    return TwoWay(*tests)
+        without = _residual(values, {n: blocks[n] for n in larger if n != effect})[0]
+        gains.append(max(without - _residual(values, {n: blocks[n] for n in larger})[0], 0.0))
+    return gains
 
 
 @dataclass(frozen=True)

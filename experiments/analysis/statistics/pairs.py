@@ -11,6 +11,7 @@ from scipy import stats
 
 from experiments.analysis.statistics.anova import Values, check_groups, varies
 from experiments.analysis.statistics.effects import ALPHA, CONFIDENCE, Interval, hedges_g
+from experiments.errors import StatisticsError
 
 DIFFERENT, EQUIVALENT, UNDECIDED = "different", "equivalent", "undecided"
 
@@ -91,6 +92,21 @@ def tukey_p(statistic: float, groups: int, freedom: float) -> float:
     Source: Tukey 1953 and Kramer 1956, doi:10.2307/3001469, for unequal numbers of people.
     """
     return float(stats.studentized_range.sf(statistic * math.sqrt(2), groups, freedom))
+
+
+def tukey_differs(groups: Mapping[str, Values], first: str, second: str) -> bool:
+    """Whether Tukey's test finds a difference of two of several groups at .05; quicker than its p.
+
+    Raises:
+        StatisticsError: The groups cannot be compared, or one of the two is not there.
+    """
+    check_groups(groups)
+    if missing := [name for name in (first, second) if name not in groups]:
+        raise StatisticsError(f"nobody is in {missing[0]}")
+    one, other = groups[first], groups[second]
+    error = pooled_deviation(groups) * math.sqrt(1 / len(one) + 1 / len(other))
+    freedom = sum(len(v) for v in groups.values()) - len(groups)
+    return bool(abs(other.mean() - one.mean()) > tukey_quantile(len(groups), freedom) * error)
 
 
 @lru_cache(maxsize=256)
