@@ -21,6 +21,7 @@ COMMANDS = (
     "study",
     "plan",
     "house",
+    "flythrough",
     "check",
     "import",
     "gallery",

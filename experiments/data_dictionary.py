@@ -143,6 +143,8 @@ def _type_name(hint: Any) -> str:
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is None:
         return _NAMES.get(hint.__name__, str(hint.__name__))
+    if origin is typing.Literal:
+        return "str"
     if origin in (list, dict, tuple):
         return f"{origin.__name__}[{', '.join(map(_type_name, arguments))}]"
     return " | ".join(_type_name(argument) for argument in arguments)

@@ -41,6 +41,7 @@ class House:
         receptacles: Receptacle key -> geometry.
         bounds: (x_min, y_min, x_max, y_max) of the floor, m.
         person: Whose size and reach count.
+        seen: Receptacles that a participant has seen; None for all of them.
     """
 
     catalogue: Catalogue
@@ -51,6 +52,7 @@ class House:
     receptacles: Mapping[str, ReceptacleGeometry]
     bounds: tuple[float, float, float, float]
     person: PersonParameters
+    seen: frozenset[str] | None = None
 
     @classmethod
     def load(cls, name: str = "apartment") -> "House":

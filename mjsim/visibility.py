@@ -116,7 +116,7 @@ def visible_objects(
     seen: set[int] = set()
     for owner, ray in zip(owners.tolist(), rays, strict=True):
         if owner not in seen:
-            geom = _first_hit(scene.model, data, gaze.eye, ray, sight.person)
+            geom, _ = first_hit(scene.model, data, gaze.eye, ray, sight.person)
             if geom >= 0 and scene.index.geom_owner[geom] == owner:
                 seen.add(owner)
     return tuple(names[i] for i in sorted(seen))
@@ -139,21 +139,28 @@ def in_field_of_view(
     return np.asarray((np.abs(left) <= forward * gaze.slopes[0]) & (np.abs(up) <= forward * gaze.slopes[1]))
 
 
-def _first_hit(
+def persons_geoms(scene: Scene) -> NDArray[np.bool_]:
+    """Which geoms belong to the person, shape (ngeom,)."""
+    return scene.once("sight", lambda: _sight_geometry(scene)).person
+
+
+def first_hit(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     eye: NDArray[np.float64],
     ray: NDArray[np.float64],
     person: NDArray[np.bool_],
-) -> int:
-    """Geom that a ray (3,) from the eye meets first, the person's aside; -1 for none."""
+) -> tuple[int, float]:
+    """Geom that a ray (3,), m, from the eye (3,) meets first, -1 for none, and where, as a share of the ray's length.
+
+    It passes through the geoms of the person (ngeom,): the hands are drawn, but hide nothing from the person.
+    """
     geom = np.full(1, -1, np.int32)
     distance = mujoco.mj_ray(model, data, eye, ray, DRAWN_GROUPS, True, -1, geom)
-    # The hands are drawn, but they do not hide anything from the person.
     while geom[0] >= 0 and person[geom[0]]:
         distance += SKIP
         distance += mujoco.mj_ray(model, data, eye + distance * ray, ray, DRAWN_GROUPS, True, -1, geom)
-    return int(geom[0])
+    return int(geom[0]), float(distance)
 
 
 def _sight_geometry(scene: Scene) -> SightGeometry:

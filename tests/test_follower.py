@@ -58,3 +58,8 @@ def test_one_hand_carries_one_object(house, assistance, fidelity):
     assert [kind for kind, _ in plan["visits"]] == ["pick", "place"] * 2
     assert np.count_nonzero(arrays["object_status"][-1] == 2) == 2
     assert world.options.capacity == 1
+
+
+def test_who_looks_down_at_a_bin_looks_up_again_for_flagpoles(house):
+    """After placing, the gaze is on the bin; the poles of what is left are far away and far above it."""
+    assert played(house, assistance="highlight", seed=0)[1][-1]["reason"] == "all delivered"

@@ -111,7 +111,9 @@ def test_completion_time_is_that_of_the_last_delivery():
 
 
 def test_completion_time_over_the_own_familiarisation():
-    metrics = measured({"t": 0.0, "event": "familiarisation", "duration_s": 80.0}, end=20.0)
+    metrics = measured(
+        {"t": 0.0, "event": "phase_ended", "phase": "flythrough", "duration_s": 80.0}, end=20.0
+    )
     assert metrics.completion_over_familiarisation == 0.25
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from experiments.commands.person_options import add_person_options, person_options
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT, participant_names
+from experiments.runs.phases import PHASES
 from experiments.session.first_person import FilmConfig
 from experiments.trials.design import numbers
 from experiments.trials.trial_config import SEEDS, TrialConfig, episode_settings
@@ -171,13 +172,33 @@ def add_trial_options(parser: argparse.ArgumentParser, *, several_users: bool = 
         metavar="FILE",
         help="run this episode (an episode.json) instead of sampling one; its objects, house and seed hold",
     )
+    parser.add_argument(
+        "--phases",
+        metavar="NAME,..",
+        help=f"what the participant goes through: any of {', '.join(PHASES)} in this order, the task last "
+        f"(docs/procedure.md; default: {TrialConfig.phases})",
+    )
+    parser.add_argument(
+        "--story", type=Path, metavar="FILE", help="text to read in the phase story, instead of the usual one"
+    )
     for name, what in SEEDS.items():
         option = f"--{name.replace('_', '-')}"
         parser.add_argument(option, type=int, metavar="S", help=f"seed of {what} (default: the seed)")
     add_person_options(parser)
 
 
-TRIAL_OPTIONS = ("house", "planner", "fidelity", "regret", "time_limit", "points", "capacity", *SEEDS)
+TRIAL_OPTIONS = (
+    "house",
+    "planner",
+    "fidelity",
+    "regret",
+    "time_limit",
+    "points",
+    "capacity",
+    "phases",
+    "story",
+    *SEEDS,
+)
 
 
 def given_options(arguments: argparse.Namespace, names: Sequence[str]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from hud.state import HudState
 from mjsim.actions import Action, ActionResult, Move, Pick, Place
 from mjsim.episode import CAPACITY
 from mjsim.errors import ActionError
+from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.person_parameters import PersonParameters
 from planner.plan import Visit
@@ -79,6 +80,7 @@ class Percept:
         time: Simulated time, s.
         position: Own floor position, m, shape (2,).
         heading: Own heading, rad.
+        pitch: Elevation of the own gaze, rad, positive upwards.
         hands: Object in the left and in the right hand.
         hands_full: Whether no other object can be carried.
         busy: Whether a pick or place is under way.
@@ -99,7 +101,8 @@ class Percept:
         person: PersonParameters = USUAL_PERSON,
     ) -> None:
         self._seen = seen
-        self.time, self.position, self.heading = seen.time, seen.position, seen.heading
+        self.time, self.position = seen.time, seen.position
+        self.heading, self.pitch = seen.heading, seen.pitch
         self.hands, self.busy = seen.hands, seen.busy
         self.hands_full = len(seen.carried) >= capacity
         self.targets, self.answer, self.blocked = targets, answer, blocked
@@ -119,6 +122,10 @@ class Percept:
     def look(self) -> Mapping[str, Point]:
         """Misplaced objects in view at this moment -> floor position, m, shape (2,)."""
         return {}
+
+    def look_for(self, receptacles: Mapping[str, ReceptacleGeometry]) -> frozenset[str]:  # noqa: ARG002 - for a session
+        """Keys of those of the receptacles that are in view at this moment."""
+        return frozenset()
 
     def hud(self) -> HudState | None:
         """What the HUD shows; None without one."""

@@ -6,6 +6,7 @@ from experiments.participants.base import Decision, Percept
 from mjsim.actions import Move
 
 TURNING = 0.8  # of the turning speed
+LOOK_GAIN = 4.0  # rad/s per rad of pitch
 FULL_TURN = 2.0 * math.pi
 
 
@@ -14,13 +15,20 @@ class FullTurn:
 
     Args:
         heading: Where the turn begins, rad.
+        level: Whether to look straight ahead meanwhile, for what is far away; else where the gaze happens to be.
     """
 
-    def __init__(self, heading: float) -> None:
-        self._turned, self._heading = 0.0, heading
+    def __init__(self, heading: float, *, level: bool = False) -> None:
+        self._turned, self._heading, self._level = 0.0, heading, level
 
     def act(self, percept: Percept) -> Decision | None:
         """Turn on; None once the turn is complete."""
         step = (percept.heading - self._heading + math.pi) % FULL_TURN - math.pi
         self._turned, self._heading = self._turned + step, percept.heading
-        return Move(turn=TURNING * percept.person.turning_speed) if self._turned < FULL_TURN else None
+        if self._turned >= FULL_TURN:
+            return None
+        look, fastest = -LOOK_GAIN * percept.pitch, percept.person.looking_speed
+        return Move(
+            turn=TURNING * percept.person.turning_speed,
+            look=min(max(look, -fastest), fastest) if self._level else 0.0,
+        )

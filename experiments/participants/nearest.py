@@ -5,7 +5,7 @@ import numpy as np
 from experiments.house import House
 from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Participant, Percept, Point
 from experiments.participants.looking import FullTurn
-from experiments.participants.visit_executor import VisitExecutor, nearest_visit
+from experiments.participants.visit_executor import VisitExecutor
 from planner.plan import Visit, VisitKind
 
 
@@ -31,7 +31,7 @@ class Nearest:
             return WAIT
         self._look(percept)
         if not self._known and not percept.carried and self._turn is None:
-            self._turn = FullTurn(percept.heading)
+            self._turn = FullTurn(percept.heading, level=True)
         if self._turn is not None:
             turning = self._turn.act(percept)
             if turning is not None:
@@ -41,6 +41,7 @@ class Nearest:
 
     def _look(self, percept: Percept) -> None:
         """Learn where flagpoles are; forget those of objects in a hand, and of one that is not where it was."""
+        self._executor.look_for_bins(percept)
         for name in percept.carried:
             self._known.pop(name, None)
         refused = percept.answer is not None and not percept.answer.applied
@@ -57,7 +58,7 @@ class Nearest:
         if not feasible:
             return WAIT
         if self._choice not in feasible:
-            self._choice = nearest_visit(self._house, percept, feasible, self._known)
+            self._choice = self._executor.nearest_visit(percept, feasible, self._known)
         return self._executor.act(percept, self._choice, self._known)
 
 

@@ -4,8 +4,9 @@ import numpy as np
 
 from experiments.house import House
 from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Participant, Percept, Point
+from experiments.participants.distances import estimated_distances
 from experiments.participants.looking import FullTurn
-from experiments.participants.visit_executor import VisitExecutor, estimated_distances, nearest_visit
+from experiments.participants.visit_executor import VisitExecutor
 from mjsim.actions import IDLE
 from planner.plan import Visit, VisitKind
 
@@ -43,6 +44,7 @@ class Searcher:
         return self._executor.act(percept, visit, self._remembered, until=self._next_look)
 
     def _look(self, percept: Percept) -> None:
+        self._executor.look_for_bins(percept)
         for name in percept.carried:
             self._remembered.pop(name, None)
         if percept.time < self._next_look - TIME_TOLERANCE:
@@ -58,7 +60,7 @@ class Searcher:
         if not feasible:
             return None
         if self._choice not in feasible:
-            self._choice = nearest_visit(self._house, percept, feasible, self._remembered)
+            self._choice = self._executor.nearest_visit(percept, feasible, self._remembered)
         kind, name = self._choice
         if kind is VisitKind.PICK and self._has_gone(percept, name):
             del self._remembered[name]

@@ -7,19 +7,21 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Guidance, Percept, Point, WalkAlong
+from experiments.participants.bin_search import BinSearch
+from experiments.participants.distances import estimated_distances
 from mjsim.actions import Pick, Place
-from planner.errors import PlannerError
 from planner.plan import Visit, VisitKind
 from planner.polyline import project
 
 STOP_SHARE = 0.72  # of the reach, from the goal: near enough to reach, far enough not to kick it
 CLOSER = 0.12  # m nearer after every refusal
 MIN_STOP_DISTANCE = 0.30  # m
-FAR = 1e6  # m
 
 
 class VisitExecutor:
     """Carries out one visit after the other; goes nearer after a refusal, and takes another path when blocked.
+
+    A bin that the person has not seen is searched for first.
 
     Args:
         house: What the participant knows of the house.
@@ -27,6 +29,7 @@ class VisitExecutor:
 
     def __init__(self, house: House) -> None:
         self._house = house
+        self._bins = BinSearch(house)
         self._visit: Visit | None = None
         self._stop_distance = MIN_STOP_DISTANCE
         self._read_until = 0.0
@@ -46,12 +49,15 @@ class VisitExecutor:
         """
         if percept.busy:
             return WAIT
+        self.look_for_bins(percept)
         self._take_up(percept, visit)
         if self._is_reading(percept):
             return WAIT
+        if not self._knows(percept, visit):
+            return self._bins.act(percept, percept.targets[visit.object], self.walk_to)
         goal, stand = self._find_places(percept, visit, objects)
         path = self._path_to(percept, stand)
-        return WalkAlong(path, goal, self._stop_distance, _action(visit), until)
+        return WalkAlong(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
 
     def follow(self, percept: Percept, guidance: Guidance) -> Decision:
         """Walk along the path that is shown, and do what is shown at its end."""
@@ -73,7 +79,28 @@ class VisitExecutor:
         self, percept: Percept, goal: Point, stop_distance: float, *, until: float | None = None
     ) -> Decision:
         """Walk the shortest known path to a place, m, shape (2,), up to `stop_distance` m from it."""
-        return WalkAlong(self._path_to(percept, goal), goal, stop_distance, until=until)
+        return WalkAlong(self._path_to(percept, goal), goal, stop_distance, until=self._bins.until(until))
+
+    def look_for_bins(self, percept: Percept) -> None:
+        """Notice bins that the person has not seen yet; to be called whenever it looks around."""
+        self._bins.look(percept)
+
+    def nearest_visit(self, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]) -> Visit:
+        """The visit of one or more with the shortest path to it; `objects` says where objects are, m, shape (2,)."""
+        stands = [self._likely_stand(percept, visit, objects) for visit in visits]
+        distances = estimated_distances(self._house, percept.position, stands)
+        ranked = zip(distances, visits, strict=True)
+        return min(ranked, key=lambda pair: (pair[0], pair[1].kind.value, pair[1].object))[1]
+
+    def _knows(self, percept: Percept, visit: Visit) -> bool:
+        """Whether the person knows where a visit takes place."""
+        return visit.kind is VisitKind.PICK or self._bins.knows(percept.targets[visit.object])
+
+    def _likely_stand(self, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> Point:
+        """Where the path to a visit ends, or where to begin to look for its bin, m, shape (2,)."""
+        if self._knows(percept, visit):
+            return places(self._house, percept, visit, objects)[1]
+        return self._bins.likely_place(percept.position, percept.targets[visit.object])
 
     def _take_up(self, percept: Percept, visit: Visit) -> None:
         if visit != self._visit:
@@ -117,32 +144,6 @@ def places(house: House, percept: Percept, visit: Visit, objects: Mapping[str, P
         return goal, house.navmesh.snap(goal)
     receptacle = percept.targets[visit.object]
     return house.receptacles[receptacle].center[:2], house.approaches[receptacle]
-
-
-def nearest_visit(
-    house: House, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]
-) -> Visit:
-    """The visit of one or more with the shortest path to it; `objects` says where objects are, m, shape (2,)."""
-    stands = [places(house, percept, visit, objects)[1] for visit in visits]
-    distances = estimated_distances(house, percept.position, stands)
-    ranked = zip(distances, visits, strict=True)
-    return min(ranked, key=lambda pair: (pair[0], pair[1].kind.value, pair[1].object))[1]
-
-
-def estimated_distance(house: House, start: Point, goal: Point) -> float:
-    """Walking distance, m, between two points (2,), m, as a person estimates it; `FAR` when there is no path."""
-    try:
-        return house.geodesics.shortest_path(start, goal).geodesic_distance
-    except PlannerError:
-        return FAR
-
-
-def estimated_distances(house: House, start: Point, goals: Sequence[Point]) -> list[float]:
-    """Walking distances, m, from one point to several, each m, shape (2,), as `estimated_distance`."""
-    try:
-        return [float(gap) for gap in house.geodesics.distances_from(start, np.array(goals))]
-    except PlannerError:  # one of them cannot be reached
-        return [estimated_distance(house, start, goal) for goal in goals]
 
 
 def _action(visit: Visit) -> Pick | Place:

@@ -119,6 +119,9 @@ def replay(
         found = verdicts(replayer, mismatches)
         if mismatches:
             raise replayer.error(mismatches[0], found)
+    if (directory / records.TRAINING).is_dir():
+        training = replay(directory / records.TRAINING, house=house)
+        found = (*found, Verdict(records.TRAINING, True, f"{training.steps} steps of a run of its own"))
     frames = video.frames_sha256 if video else None
     return ReplayReport(
         first=replayer.first,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from experiments.replaying.comparison import simulated_mismatches
 from experiments.replaying.derived_files import checksum_mismatches, derived_mismatches
+from experiments.replaying.phases import phase_mismatches
 from experiments.replaying.replayer import Replayer
 from experiments.replaying.run_record import Mismatch, RunRecord
 from experiments.runs import records
@@ -37,7 +38,8 @@ def all_mismatches(replayer: Replayer) -> list[Mismatch]:
 
     The earliest step comes first; that a file has another checksum comes last, as it says the least.
     """
-    found = sorted(simulated_mismatches(replayer), key=lambda mismatch: mismatch.step)
+    simulated = (*phase_mismatches(replayer), *simulated_mismatches(replayer))
+    found = sorted(simulated, key=lambda mismatch: mismatch.step)
     if not found:
         found += derived_mismatches(replayer.record)
     return [*found, *checksum_mismatches(replayer.record)]

@@ -1,6 +1,6 @@
 """The events of a log, one type for each line of `events.jsonl`; docs/data.md is made from them."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -153,14 +153,30 @@ class Regret(Logged, frozen=True):
     suggested_regret_m: Metres | None = None
 
 
-class Familiarisation(Logged, frozen=True):
-    """The person got to know the house before the task.
+class PhaseBegun(Logged, frozen=True, tag="phase_begun"):
+    """A phase before the task began; the clock of the task stands still. Without these events there was only the task.
 
     Attributes:
-        duration_s: For how long, s.
+        phase: `story`, `flythrough` or `training`.
     """
 
+    phase: Literal["story", "flythrough", "training"]
+
+
+class PhaseEnded(Logged, frozen=True, tag="phase_ended"):
+    """A phase before the task ended.
+
+    Attributes:
+        phase: As above.
+        duration_s: How long the person took, s: of reading, watching, or training.
+        bins: Of a simulated participant's fly-through: receptacle -> time at which it came into view, s.
+        reason: Why the training ended, as in `end`; the run directory `training` holds its record.
+    """
+
+    phase: Literal["story", "flythrough", "training"]
     duration_s: Seconds
+    bins: dict[str, Seconds] | None = None
+    reason: str | None = None
 
 
 class End(Logged, frozen=True):
@@ -246,7 +262,8 @@ OUTCOMES = {
 TYPES: tuple[type[Logged], ...] = (
     Start,
     Participant,
-    Familiarisation,
+    PhaseBegun,
+    PhaseEnded,
     Plan,
     Attempt,
     Visit,

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.runs.health import summarise_health
-from experiments.runs.records import PARTICIPANT, Event
+from experiments.runs.phases import FLYTHROUGH
+from experiments.runs.records import PARTICIPANT, PHASE_ENDED, Event
 
 REGRETFUL = 0.01  # m; smaller regrets are ties
 COSTLY = 0.1  # m; what a deviation must cost to count in `nd_regret_10cm`
@@ -46,7 +47,7 @@ class Metrics:
             walked; 1 is perfect and never exceeded.
         task_distance_m: Distance walked, m.
         completion_time_s: Time until the last object was delivered, or until the end if some are left, s.
-        completion_over_familiarisation: Completion time over the duration of the familiarisation; None where there was
+        completion_over_familiarisation: Completion time over the duration of the fly-through; None where there was
             none.
         planned_distance_m: Length of the plan at the start, from place to place, m. Who reaches walks less.
         reach_bound_m: Least walk for somebody who reaches as far as the rules allow, m; None where nothing was planned.
@@ -184,8 +185,10 @@ def _nd_regret(visits: Sequence[Event], regrets: Mapping[int, float]) -> float |
 
 
 def _over_familiarisation(events: Sequence[Event], completion: float) -> float | None:
-    durations = [float(e["duration_s"]) for e in events if e["event"] == "familiarisation"]
-    return completion / sum(durations) if sum(durations) > 0 else None
+    """The fly-through is the paper's familiarisation."""
+    ended = [e for e in events if e["event"] == PHASE_ENDED and e["phase"] == FLYTHROUGH]
+    watched = sum(float(event["duration_s"]) for event in ended)
+    return completion / watched if watched > 0 else None
 
 
 def _regrets(events: Sequence[Event], visits: Sequence[Event], name: str) -> dict[int, float]:

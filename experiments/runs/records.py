@@ -42,6 +42,8 @@ HEALTH = {
     "settle_s": 1,
 }
 PARTICIPANT = "participant"  # event with all values of the person
+PHASE_BEGUN, PHASE_ENDED = "phase_begun", "phase_ended"  # events of what came before the task
+TRAINING = "training"  # run directory inside that of the task
 STATUS_CODE = {ObjectStatus.LOOSE: 0, ObjectStatus.CARRIED: 1, ObjectStatus.DELIVERED: 2}
 
 _FIRST_CAPACITY = 4096  # rows of a trajectory; doubled when they are full

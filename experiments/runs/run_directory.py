@@ -55,7 +55,8 @@ def check_run_directory(path: Path, *, replace: bool = False) -> Path:
     names = sorted(entry.name for entry in place.iterdir())
     if not names:
         return place
-    foreign = [name for name in names if name not in (*records.FILES, CHECKSUMS)]
+    ours = {*records.FILES, CHECKSUMS, *([records.TRAINING] if is_run(place / records.TRAINING) else [])}
+    foreign = [name for name in names if name not in ours]
     if is_batch(place):
         raise RecordError(f"{path} holds a batch, which a run never replaces; choose another --out")
     if foreign or not is_run(place):

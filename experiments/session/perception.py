@@ -10,8 +10,10 @@ from experiments.session.assistant import Assistant
 from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
 from mjsim.actions import ActionResult
+from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.visibility import FieldOfView, in_field_of_view, visible_objects
+from mjsim.receptacle_visibility import visible_receptacles
+from mjsim.visibility import FieldOfView, in_field_of_view, persons_geoms, visible_objects
 from mjsim.world import World
 
 
@@ -53,6 +55,20 @@ class SessionPercept(Percept):
         loose = seen.names_with(ObjectStatus.LOOSE)
         names = visible_objects(world.scene, world.data, seen.eye, seen.heading, seen.pitch, among=loose)
         return positions_of(seen, names)
+
+    def look_for(self, receptacles: Mapping[str, ReceptacleGeometry]) -> frozenset[str]:
+        """Those in view, by rays from the eye."""
+        seen, world = self._seen, self._world
+        return visible_receptacles(
+            world.scene.model,
+            world.data,
+            receptacles,
+            seen.eye,
+            seen.heading,
+            seen.pitch,
+            field=FieldOfView.of(self.person),
+            own=persons_geoms(world.scene),
+        )
 
     def hud(self) -> HudState:
         """What the HUD shows."""

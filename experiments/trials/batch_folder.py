@@ -159,4 +159,4 @@ def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) ->
 
 
 def _is_of_the_design(name: str) -> bool:
-    return name in ("house", "episode") or name.startswith("module ")
+    return name in ("house", "episode", "story") or name.startswith("module ")

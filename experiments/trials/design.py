@@ -19,7 +19,7 @@ from experiments.trials.trial_config import SEEDS, TrialConfig, episode_settings
 T = TypeVar("T")
 
 LONGEST_LIST = 1_000_000  # numbers
-PATHS = ("house", "episode")  # relative to the design's file
+PATHS = ("house", "episode", "story")  # relative to the design's file
 # What may differ by accident between the conditions of a comparison.
 CONFOUNDERS = (
     "user",
@@ -30,6 +30,8 @@ CONFOUNDERS = (
     "points",
     "capacity",
     "time_limit",
+    "phases",
+    "story",
     "person",
 )
 
@@ -114,6 +116,8 @@ class _Cell(msgspec.Struct, forbid_unknown_fields=True):
     regret: bool | UnsetType = UNSET
     points: _Count | UnsetType = UNSET
     capacity: _Count | UnsetType = UNSET
+    phases: list[_Text] | UnsetType = UNSET
+    story: _Text | UnsetType = UNSET
     person: dict[str, Any] | UnsetType = UNSET
 
     def given(self) -> dict[str, Any]:
@@ -158,7 +162,7 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
     """The trials of one cell; paths are relative to `folder`."""
     seeds, settings = _cell_seeds(values), {n: v for n, v in values.items() if n not in _PEOPLE}
     for name in PATHS:
-        if name in settings and (name == "episode" or settings[name].endswith(".toml")):
+        if name in settings and (name != "house" or settings[name].endswith(".toml")):
             settings[name] = str(folder / settings[name])
     if "episode" in settings:
         if "objects" in settings or "house_seeds" in values:
@@ -167,6 +171,8 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
             )
         settings = {**episode_settings(Path(settings["episode"])), **settings}
         seeds = [{n: s for n, s in person.items() if n != "house_seed"} for person in seeds]
+    if "phases" in settings:
+        settings["phases"] = ",".join(settings["phases"])
     if "person" in settings:
         settings["person"] = PersonDistribution.of(settings["person"])
     missing = [name for name in ("objects", "assistance") if name not in settings]

@@ -16,7 +16,9 @@ from importlib.machinery import ModuleSpec
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from experiments.familiarisation.story import story_text
 from experiments.participants import participant_names
+from experiments.runs.phases import STORY
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.catalogue import Catalogue
 
@@ -38,6 +40,8 @@ NO_INFLUENCE = {
     "mjsim": ("diagnostics.py", "environments", "render", "testing"),
 }
 
+PATHS = ("house", "episode", "story")
+
 Inputs = Mapping[str, str]
 
 
@@ -49,17 +53,21 @@ def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
         catalogue: Of its house.
 
     Raises:
+        ConfigError: The story cannot be read.
         OSError: The episode cannot be read.
     """
     inputs = {"house": catalogue.content, "code of mjsim": _code_hash(), **_libraries()}
     if config.episode is not None:
         inputs["episode"] = hashlib.sha256(Path(config.episode).read_bytes()).hexdigest()
+    if STORY in config.phase_names:
+        text = story_text(None if config.story is None else Path(config.story))
+        inputs["story"] = hashlib.sha256(text.encode()).hexdigest()
     return inputs | {f"module {name}": source_hash(name) for name in own_modules(config)}
 
 
 def fingerprint(config: TrialConfig, inputs: Inputs) -> str:
     """16 hex digits over a trial's options and inputs. Where the files lie does not count, only what is in them."""
-    options = {name: value for name, value in config.settings().items() if name not in ("house", "episode")}
+    options = {name: value for name, value in config.settings().items() if name not in PATHS}
     return hashlib.sha256(json.dumps([options, sorted(inputs.items())]).encode()).hexdigest()[:16]
 
 

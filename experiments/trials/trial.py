@@ -1,5 +1,6 @@
 """One trial: an episode, an assistance condition, a participant and a seed, recorded into a run directory."""
 
+import dataclasses
 import hashlib
 import time
 from collections.abc import Callable
@@ -11,10 +12,12 @@ from typing import Any
 import numpy as np
 
 from experiments.errors import ConfigError, UserCodeError
+from experiments.familiarisation.familiarise import Familiarisation, familiarise
 from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Participant
 from experiments.runs import records
+from experiments.runs.phases import TRAINING
 from experiments.runs.recording import Recording, provenance
 from experiments.runs.records import EventLog
 from experiments.runs.run_directory import run_directory
@@ -28,6 +31,7 @@ from experiments.session.user_code import make_participant
 from experiments.signals import Stopped, signals_postponed
 from experiments.trials.fingerprint import fingerprint, trial_inputs
 from experiments.trials.person_distribution import PersonDistribution
+from experiments.trials.training import training_config
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_record import NOTHING_FILMED, SessionResult, draw_floor_plan, save_record
 from mjsim.episode import Episode
@@ -84,13 +88,13 @@ def run_trial(
             person = draw_person(config)
             house = (house or House.load(config.house)).for_person(person)
             scene = compose(trial_episode(config, house), house.catalogue, person=person)
-            trial = _Trial(config, house, scene, folder, film)
 
             def progress(now: Progress) -> None:
                 on_progress(now)
                 signals.check()
 
-            result = trial.run(progress)
+            known = _before_the_task(config, house, person, folder, lambda _: signals.check())
+            result = _Trial(config, house, scene, folder, film, known).run(progress)
             if result.error is not None and not result.has_steps:
                 raise result.error
             signals.save()
@@ -160,6 +164,7 @@ class _Trial:
     scene: Scene
     folder: Path
     film: FilmConfig | None
+    known: Familiarisation
 
     def run(self, on_progress: OnProgress) -> SessionResult:
         """Run the session; log and video are complete in the folder afterwards."""
@@ -167,7 +172,8 @@ class _Trial:
         if isinstance(result.error, PhysicsError):
             # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
             for path in self.folder.iterdir():
-                path.unlink()
+                if path.is_file():
+                    path.unlink()
             result = self._run_once(on_progress, rollouts=False)
         return result
 
@@ -183,8 +189,16 @@ class _Trial:
                 live = LiveReplanner(self.house.geodesics, planner, capacity=self.config.capacity)
                 replanner = stack.enter_context(live)
             session, _ = prepare_session(
-                self.config, self.house, self.scene, log, film, replanner, rollouts=rollouts
+                self.config,
+                self.house,
+                self.scene,
+                log,
+                film,
+                replanner,
+                rollouts=rollouts,
+                user=self._make_user(),
             )
+            self.known.log(log)
             try:
                 session.run(on_progress)
             except Exception as failure:
@@ -198,6 +212,33 @@ class _Trial:
             renderer=film.renderer_name or NOTHING_FILMED,
             no_film=film.failure,
         )
+
+    def _make_user(self) -> Participant:
+        house, seen = self.house, self.known.seen
+        return simulated_user(self.config, house if seen is None else dataclasses.replace(house, seen=seen))
+
+
+def _before_the_task(
+    config: TrialConfig, house: House, person: PersonParameters, folder: Path, on_progress: OnProgress
+) -> Familiarisation:
+    """Go through the phases before the task; the training is a run of its own in the run directory."""
+    known = familiarise(config.phase_names, config.story, house, person)
+    if TRAINING not in config.phase_names:
+        return known
+    started, training = time.perf_counter(), training_config(config)
+    place = folder / records.TRAINING
+    place.mkdir()
+    scene = compose(trial_episode(training, house), house.catalogue, person=person)
+    result = _Trial(training, house, scene, place, None, Familiarisation((), known.seen)).run(on_progress)
+    if result.error is not None and not result.has_steps:
+        raise result.error
+    save_record(place, place, scene, result, time.perf_counter() - started)
+    return known.trained(result.log.events)
+
+
+def simulated_user(config: TrialConfig, house: House) -> Participant:
+    """The participant that a trial names; `house` is what it knows."""
+    return make_participant(config.user, house, _session_rng(config.person_seed, _CHANCE))
 
 
 def prepare_session(
@@ -232,7 +273,7 @@ def prepare_session(
     session = Session(
         world,
         _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
-        user or make_participant(config.user, house, _session_rng(config.person_seed, _CHANCE)),
+        user or simulated_user(config, house),
         Recording(world, log),
         walls=house.navmesh.outline,
         time_limit=config.limit,

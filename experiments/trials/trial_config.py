@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
+from experiments.runs.phases import STORY, TASK, phases_of
 from experiments.trials.person_distribution import PersonDistribution
 from mjsim.episode import CAPACITY, Episode
 from mjsim.model.sampling import POINTS
@@ -46,6 +47,10 @@ class TrialConfig:
         points: Points of the house where objects may lie; levels of difficulty share them (PAPER section 4).
         capacity: How many objects are carried at most.
         episode: Path of an episode to run instead of sampling one; it is made absolute.
+        phases: What the participant goes through, in order, joined by commas: `story`, `flythrough` and `training` may
+            come before the `task` (docs/procedure.md). Only with `flythrough` does a simulated participant have to find
+            the bins that it did not see; else it knows them all.
+        story: Path of a text to read instead of the usual story; it is made absolute.
         person: How speeds, reach, size and senses of the participant are distributed (docs/people.md).
 
     Raises:
@@ -68,6 +73,8 @@ class TrialConfig:
     points: int = POINTS
     capacity: int = CAPACITY
     episode: str | None = None
+    phases: str = TASK
+    story: str | None = None
     person: PersonDistribution = field(default_factory=PersonDistribution)
 
     def __post_init__(self, seed: int | None) -> None:
@@ -77,8 +84,10 @@ class TrialConfig:
             _check_seed(name if getattr(self, name) != seed else "seed", getattr(self, name))
         if self.house.endswith(".toml"):
             object.__setattr__(self, "house", str(Path(self.house).absolute()))
-        if self.episode is not None:
-            object.__setattr__(self, "episode", str(Path(self.episode).absolute()))
+        for name in ("episode", "story"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, str(Path(getattr(self, name)).absolute()))
+        object.__setattr__(self, "phases", ",".join(phases_of(self.phases)))
         self._check()
 
     def _check(self) -> None:
@@ -94,6 +103,15 @@ class TrialConfig:
             raise ConfigError(f"capacity is {self.capacity}; a person with two hands carries 1 or 2 objects")
         if self.time_limit is not None and not 0 < self.time_limit < math.inf:
             raise ConfigError(f"time limit must be positive, got {self.time_limit} s")
+        if self.story is not None and STORY not in self.phase_names:
+            raise ConfigError(
+                f"there is a story, {self.story}, but no phase to read it in; add story to the phases"
+            )
+
+    @property
+    def phase_names(self) -> tuple[str, ...]:
+        """The phases, one by one."""
+        return phases_of(self.phases)
 
     @property
     def limit(self) -> float:

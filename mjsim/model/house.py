@@ -47,6 +47,13 @@ class CompiledHouse:
             return self._spec.copy().compile()
 
     @cached_property
+    def data(self) -> mujoco.MjData:
+        """Its state, in which nothing moves."""
+        data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, data)
+        return data
+
+    @cached_property
     def rooms(self) -> RoomMap:
         """Which room a point lies in."""
         return RoomMap.from_model(self.model, self.catalogue.rooms)

@@ -1,0 +1,29 @@
+"""The training trial: one object, as long as it takes (PAPER section 7)."""
+
+import dataclasses
+
+import numpy as np
+
+from experiments.trials.trial_config import TrialConfig
+
+TRAINING_LIMIT = 3600.0  # s; nobody who trains is hurried
+_TRAINING_SEED = 7  # sets the house of the training apart from that of the task
+
+
+def training_config(config: TrialConfig) -> TrialConfig:
+    """The training trial that belongs to a trial: one object in the same house, without limit of time.
+
+    Person, assistance and fidelity are those of the trial. The object lies where the house's seed says, but elsewhere
+    than in the task.
+    """
+    seed = int(np.random.SeedSequence([config.house_seed, _TRAINING_SEED]).generate_state(1)[0])
+    return dataclasses.replace(
+        config,
+        objects=1,
+        points=1,
+        house_seed=seed,
+        episode=None,
+        phases=TrialConfig.phases,
+        story=None,
+        time_limit=TRAINING_LIMIT,
+    )
