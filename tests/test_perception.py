@@ -94,8 +94,8 @@ def numbers_in(value):
 
 
 def told(percept):
-    """Everything that a participant can read off a percept, but for the regrets of models of compliance."""
-    public = [n for n in dir(percept) if not n.startswith("_") and n != "choices"]
+    """All that a participant can read off a percept, but for the regrets of models of compliance and which bins it sees."""
+    public = [n for n in dir(percept) if not n.startswith("_") and n not in ("choices", "look_for")]
     return [value() if callable(value) else value for value in (getattr(percept, n) for n in public)]
 
 
