@@ -94,7 +94,7 @@ def numbers_in(value):
 
 
 def told(percept):
-    """All that a participant can read off a percept, but for the regrets of models of compliance and which bins it sees."""
+    """All that a participant can read off a percept, but for regrets (models of compliance) and which bins it sees."""
     public = [n for n in dir(percept) if not n.startswith("_") and n not in ("choices", "look_for")]
     return [value() if callable(value) else value for value in (getattr(percept, n) for n in public)]
 
