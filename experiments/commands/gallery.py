@@ -19,7 +19,7 @@ from mjsim.files import replacing
 SEED = 7
 CONDITIONS = ("none", "highlight", "optimal")
 SHOTS = (
-    Shot("optimal", TrialConfig(objects=12, assistance="optimal", seed=SEED), after(0.4)),
+    Shot("guided", TrialConfig(objects=12, assistance="guided", seed=SEED), after(0.4)),
     Shot("optimal_carrying", TrialConfig(objects=12, assistance="optimal", seed=SEED), carrying_two),
     Shot("highlight", TrialConfig(objects=12, assistance="highlight", seed=SEED), after(1.3)),
     Shot("none", TrialConfig(objects=12, assistance="none", seed=0), after(6.0)),
