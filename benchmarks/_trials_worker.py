@@ -37,9 +37,9 @@ PARTS = {
     ),
     "recording": (
         "experiments.runs.records.EventLog.append",
-        "experiments.runs.records.Trajectory.append",
-        "experiments.runs.records.Trajectory.extend",
-        "experiments.runs.records.Trajectory.arrays",
+        "experiments.runs.trajectory.Trajectory.append",
+        "experiments.runs.trajectory.Trajectory.extend",
+        "experiments.runs.trajectory.Trajectory.arrays",
         "experiments.runs.recording.Recording.append",
         "experiments.runs.recording.Recording.extend",
         "experiments.runs.recording.Recording.save",

@@ -11,7 +11,7 @@ from typing import Any
 from experiments.runs.event_types import OUTCOMES, TYPES, Logged, Outcome
 from experiments.runs.health import COUNTED
 from experiments.runs.metrics import Metrics
-from experiments.runs.records import HEALTH
+from experiments.runs.trajectory import HEALTH
 from experiments.trials.trial_config import TrialConfig
 from mjsim.person_parameters import PersonParameters
 

@@ -15,7 +15,8 @@ from experiments.files import TEXT, Layout, read_arrays
 from experiments.runs import records
 from experiments.runs.event_types import check_event
 from experiments.runs.recording import Recorded, action_hashes
-from experiments.runs.records import STATUS_CODE, Event, LogDigest, decode_action
+from experiments.runs.records import Event, LogDigest
+from experiments.runs.trajectory import STATUS_CODE, decode_action
 from experiments.session.endings import COMPLETE, PHYSICS_ERROR
 from mjsim.actions import Action, EventKind
 from mjsim.episode import Episode

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runs.records import HEALTH, Event
+from experiments.runs.records import Event
+from experiments.runs.trajectory import HEALTH
 from mjsim.actions import EventKind
 
 # Name in the metrics -> kind of event.

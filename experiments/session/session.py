@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from experiments.errors import SessionError, UserCodeError
 from experiments.participants.base import Decision, Moves, Participant, Wait, WalkAlong
 from experiments.runs.recording import Recording
-from experiments.runs.records import Trajectory
+from experiments.runs.trajectory import Trajectory
 from experiments.session.assistant import Assistant
 from experiments.session.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
 from experiments.session.locomotion import LocomotionController

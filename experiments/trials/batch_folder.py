@@ -19,8 +19,9 @@ from experiments.files import read_arrays, read_json
 from experiments.runs import records
 from experiments.runs.checksums import read_checksums, sha256_of
 from experiments.runs.metrics import measure
-from experiments.runs.records import HEALTH, read_events
+from experiments.runs.records import read_events
 from experiments.runs.run_directory import TRIALS
+from experiments.runs.trajectory import HEALTH
 from experiments.session.endings import COMPLETE
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.fingerprint import Inputs

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from experiments.replaying.run_record import RunRecord
 from experiments.runs.recording import Recorded, action_hashes
-from experiments.runs.records import EventLog, Trajectory
+from experiments.runs.records import EventLog
+from experiments.runs.trajectory import Trajectory
 from experiments.web.controls import Controls
 from mjsim.episode import Episode
 from mjsim.model.scene import Scene

@@ -11,7 +11,8 @@ import pytest
 from experiments.files import read_json
 from experiments.replaying.replay import replay
 from experiments.runs import records
-from experiments.runs.records import Trajectory, read_events
+from experiments.runs.records import read_events
+from experiments.runs.trajectory import Trajectory
 from experiments.signals import PATIENCE, Stopped, signals_postponed, signals_raised
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
