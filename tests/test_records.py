@@ -12,16 +12,9 @@ from hypothesis import strategies as st
 
 from experiments.errors import RecordError
 from experiments.files import read_json
-from experiments.runs.records import (
-    EPISODE,
-    EVENTS,
-    METRICS,
-    EventLog,
-    Trajectory,
-    decode_action,
-    read_events,
-)
+from experiments.runs.records import EPISODE, EVENTS, METRICS, EventLog, read_events
 from experiments.runs.run_directory import run_directory
+from experiments.runs.trajectory import Trajectory, decode_action
 from mjsim.actions import Move, Pick, Place
 from mjsim.health.values import HealthSample
 from mjsim.observation import ObjectStatus, Observation
