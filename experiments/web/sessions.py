@@ -16,6 +16,7 @@ from experiments.web.visits import PLAYED, Visit
 LOG = logging.getLogger("mjsim.play")
 DEATHS = 3  # of workers in a row, without an input taken in between, after which a session fails
 QUEUE_PATIENCE = 10.0  # s that a place in the queue is kept without a connection
+WATCH_PERIOD = 5.0  # s between two looks for sessions whose person is gone
 MAX_AHEAD = 1000  # inputs that may be on their way
 FAILED = (
     "The session cannot go on at the moment. Nothing of it is lost: load this page again to try once more."
@@ -280,10 +281,10 @@ class Sessions:
             self._sessions[visit.name] = PlayedSession(visit, self._pool, self._places)
         return self._sessions[visit.name]
 
-    async def watch(self, period: float = 5.0) -> None:
+    async def watch(self) -> None:
         """Release sessions whose person is gone, for ever."""
         while True:
-            await asyncio.sleep(period)
+            await asyncio.sleep(WATCH_PERIOD)
             await self.release(lambda session: time.monotonic() - session.heard > self._idle)
 
     async def release(self, which: Callable[[PlayedSession], bool] = lambda _: True) -> None:

@@ -35,7 +35,8 @@ export class Help {
     this.#fill();
     this.#say("");
     if (!this.#dialog.open) this.#dialog.showModal();
-    this.#dialog.querySelector("#help-close").focus();
+    this.#dialog.querySelector("#help-close").focus({ preventScroll: true });
+    this.#dialog.scrollTop = 0;
   }
 
   #fill() {
@@ -63,7 +64,9 @@ export class Help {
   #key(event) {
     const action = this.#changing;
     if (!action) {
-      if (this.#bindings.action(event.code)?.name === "help") this.#dialog.close();
+      if (this.#bindings.action(event.code)?.name !== "help") return;
+      event.stopPropagation(); // else the view, which listens again, opens the table anew
+      this.#dialog.close();
       return;
     }
     if (event.code === "Tab") return;

@@ -202,6 +202,11 @@ function watchPage() {
   });
 }
 
+byId("panel").addEventListener("keydown", (event) => {
+  if (!state.paused || bindings.action(event.code)?.name !== "pause") return;
+  event.stopPropagation(); // else the view, which listens again, pauses anew
+  resume();
+});
 byId("help-button").addEventListener("click", openHelp);
 byId("pause-button").addEventListener("click", () => commands.pause());
 byId("end-button").addEventListener("click", askToEnd);

@@ -1,0 +1,464 @@
+"""The server of `mjsim play` in front of a worker that is scripted: links, checks, messages, the visit."""
+
+import asyncio
+import json
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from experiments import records
+from experiments.trial_config import TrialConfig
+from experiments.web import messages, protocol
+from experiments.web.guards import Addresses
+from experiments.web.server import PlayConfig, PlayServer
+from experiments.web.visits import VISIT, Visits, token_hash
+
+ORIGIN = "http://127.0.0.1:8000"
+TASK = TrialConfig(objects=6, assistance="optimal", seed=0, user="human", live=True).settings()
+TRIALS = {"training": {**TASK, "objects": 1}, "task": TASK}
+METRICS = {
+    "ended": "all delivered",
+    "objects": 6,
+    "delivered": 6,
+    "completion_time_s": 125.0,
+    "task_distance_m": 70.2,
+    "ipl_stand": 0.93,
+    "total_regret_m": 3.25,
+    "regretful_visits": 2,
+}
+
+
+class ScriptedWorker:
+    """Answers as a worker does, at once; keeps what it was told."""
+
+    def __init__(self):
+        self.alive = True
+        self.told = []
+        self._said = asyncio.Queue()
+        self._loop = asyncio.get_running_loop()
+        self._run = None
+
+    def send(self, message):
+        self.told.append(message)
+        if isinstance(message, messages.Open):
+            self._run = message.run
+            self.say(messages.Ready(0, 0, False, False))
+        elif isinstance(message, messages.Inputs):
+            self.say(messages.Taken(message.inputs[-1].number, 1))
+        elif isinstance(message, messages.Leave):
+            self.finish()
+
+    def say(self, message):
+        self._said.put_nowait(message)
+
+    def finish(self):
+        Path(self._run).mkdir()
+        (Path(self._run) / records.METRICS).write_text(json.dumps(METRICS))
+        self.say(messages.Over("all delivered", METRICS))
+
+    def die(self):
+        self.alive = False
+        self._loop.call_soon_threadsafe(self._said.put_nowait, None)
+
+    async def receive(self):
+        return await self._said.get()
+
+
+class ScriptedPool:
+    """Gives scripted workers; `workers` holds those given."""
+
+    def __init__(self):
+        self.workers = []
+        self.discarded = []
+        self.given = threading.Condition()
+
+    def warm_up(self):
+        pass
+
+    async def take(self):
+        with self.given:
+            self.workers.append(ScriptedWorker())
+            self.given.notify_all()
+        return self.workers[-1]
+
+    def discard(self, worker):
+        self.discarded.append(worker)
+
+    async def close(self):
+        pass
+
+
+@pytest.fixture
+def pool():
+    return ScriptedPool()
+
+
+@contextmanager
+def serving(folder, pool, **options):
+    server = PlayServer(PlayConfig(TRIALS, folder, **options), pool)
+    with TestClient(server.app(Addresses(8000)), base_url=ORIGIN, follow_redirects=False) as client:
+        yield client
+
+
+@pytest.fixture
+def client(tmp_path, pool):
+    with serving(tmp_path, pool) as client:
+        yield client
+
+
+def begin(client):
+    """Begin a visit; its link."""
+    answer = client.post("/visits", headers={"Origin": ORIGIN})
+    assert answer.status_code == 303
+    return answer.headers["location"]
+
+
+def hello(phase="training", tab="tab-00000001"):
+    view = {"type": "view", "width": 640, "height": 480, "codec": "none"}
+    return {"type": "hello", "tab": tab, "phase": phase, "view": view}
+
+
+@contextmanager
+def connected(client, link, origin=ORIGIN):
+    with client.websocket_connect(link, headers={"Origin": origin, "Host": "127.0.0.1:8000"}) as socket:
+        yield socket
+
+
+def until(socket, kind):
+    """Messages up to the first one of a type."""
+    said = []
+    while not said or said[-1]["type"] != kind:
+        said.append(socket.receive_json())
+    return said
+
+
+def begun(socket, phase="training", **kw):
+    socket.send_json(hello(phase, **kw))
+    ready = until(socket, "ready")[-1]
+    socket.send_json({"type": "begin"})
+    return ready
+
+
+def inputs(*numbers, **values):
+    return {"type": "inputs", "inputs": [{"number": number, **values} for number in numbers]}
+
+
+def test_a_visit_from_the_story_to_the_result(client, pool):
+    assert "Tidy the apartment" in client.get("/").text
+    link = begin(client)
+    for phase in ("training", "task"):
+        assert f'data-phase="{phase}"' in client.get(link).text
+        with connected(client, link) as socket:
+            begun(socket, phase)
+            socket.send_json(inputs(1, forward=1.0))
+            assert until(socket, "taken")[-1]["input"] == 1
+            socket.send_json({"type": "leave"})
+            assert until(socket, "over")[-1]["reason"] == "all delivered"
+    text = client.get(link).text
+    for shown in ("6 of 6", "2 min 5 s", "70 m", "3.2 m", "0.93", "2 of your visits"):
+        assert shown in text
+    assert len(pool.workers) == 1  # the same worker for training and task
+    asked = [told for told in pool.workers[0].told if isinstance(told, messages.Open)]
+    assert [opened.config["objects"] for opened in asked] == [1, 6]
+
+
+def test_a_film_comes_first_where_there_is_one(tmp_path, pool):
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"0123456789")
+    with serving(tmp_path / "visits", pool, film=film) as client:
+        link = begin(client)
+        assert "<video" in client.get(link).text
+        assert client.get(f"{link}/film", headers={"Range": "bytes=2-4"}).content == b"234"
+        assert client.post(f"{link}/film", headers={"Origin": ORIGIN}).status_code == 303
+        assert 'data-phase="training"' in client.get(link).text
+
+
+def test_only_the_hash_of_a_token_is_kept(client, tmp_path, caplog):
+    caplog.set_level("INFO", "mjsim.play")
+    token = begin(client).removeprefix("/play/")
+    assert token not in caplog.text and token_hash(token)[:12] in caplog.text
+    assert (tmp_path / token_hash(token) / VISIT).is_file()
+    assert not [p for p in tmp_path.rglob("*") if token in p.name or (p.is_file() and token in p.read_text())]
+
+
+@pytest.mark.parametrize(
+    "token", ["x", "x" * 43, "%2e%2e", "..%2f..%2fetc", "a" * 5000, "%00", "é" * 43]
+)
+def test_an_unknown_token_is_no_visit(client, token):
+    assert client.get(f"/play/{token}").status_code == 404
+    with pytest.raises(WebSocketDisconnect), connected(client, f"/play/{token}"):
+        pass
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/static/../server.py",
+        "/static/%2e%2e/server.py",
+        "/static/..%2fserver.py",
+        "/static//etc/passwd",
+        "/static/",
+    ],
+)
+def test_static_files_cannot_be_left(client, path):
+    assert client.get(path).status_code == 404
+
+
+@pytest.mark.parametrize("path", ["/", "/nothing", "/static/play.js", "/static/nothing"])
+def test_every_answer_has_strict_headers(client, path):
+    headers = client.get(path).headers
+    policy = headers["content-security-policy"]
+    assert "default-src 'none'" in policy and "script-src 'self';" in policy and "unsafe" not in policy
+    assert headers["x-content-type-options"] == "nosniff" and headers["x-frame-options"] == "DENY"
+
+
+def test_no_page_has_a_script_or_style_of_its_own(client):
+    for text in (client.get("/").text, client.get(begin(client)).text):
+        assert (
+            "<script>" not in text
+            and "<style" not in text
+            and " style=" not in text
+            and " on" + "click" not in text
+        )
+        assert "http" not in text.replace("http-equiv", "")
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1:9999", "", "user@127.0.0.1:8000", "127.0.0.1:x", "[::1"]
+)
+def test_another_host_is_refused(client, host):
+    assert client.get("/", headers={"Host": host}).status_code == 421
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8000", "localhost:8000", "[::1]:8000", "192.168.7.9:8000"])
+def test_own_addresses_are_served(client, host):
+    assert client.get("/", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "", "http://127.0.0.1:9999", "https://127.0.0.1:8000"]
+)
+def test_another_origin_is_refused(client, origin):
+    link = begin(client)
+    assert client.post("/visits", headers={"Origin": origin}).status_code == 403
+    with pytest.raises(WebSocketDisconnect), connected(client, link, origin):
+        pass
+
+
+def test_a_proxy_may_make_it_public():
+    addresses = Addresses(8000, "https://play.example.org")
+    assert addresses.origin("play.example.org") == "https://play.example.org"
+    assert addresses.origin("other.example.org") is None
+
+
+def test_large_bodies_and_many_visits_are_refused(client):
+    assert client.post("/visits", headers={"Origin": ORIGIN}, content=b"x" * 5000).status_code == 413
+    answers = [client.post("/visits", headers={"Origin": ORIGIN}).status_code for _ in range(40)]
+    assert answers.count(303) == 30 and answers.count(429) == 10
+
+
+@pytest.mark.parametrize(
+    ("message", "code"),
+    [
+        ("", "malformed"),
+        ("{", "malformed"),
+        ("[" * 50000, "malformed"),
+        ('"hello"', "malformed"),
+        ('{"type":"open","folder":"/","run":"/"}', "malformed"),
+        ('{"type":"seen","frame":-1}', "malformed"),
+        ('{"type":"begin","more":1}', "malformed"),
+        ('{"type":"inputs","inputs":[{"number":1,"forward":2}]}', "malformed"),
+        ('{"type":"inputs","inputs":[{"number":1,"forward":NaN}]}', "malformed"),
+        (json.dumps(inputs(*range(1, 70))), "malformed"),
+        (json.dumps(inputs(2, 1)), "out of order"),
+        (json.dumps(inputs(1, 1)), "out of order"),
+        (json.dumps(inputs(2**53)), "out of order"),
+        (json.dumps(hello()), "out of order"),
+        ('{"type":"takeover"}', "out of order"),
+    ],
+)
+def test_a_bad_message_gets_a_typed_error_and_stops_nothing(client, message, code):
+    with connected(client, begin(client)) as socket:
+        begun(socket)
+        socket.send_text(message)
+        error = until(socket, "error")[-1]
+        assert error["code"] == code and "Traceback" not in error["message"]
+        socket.send_json(inputs(1))
+        assert until(socket, "taken")[-1]["input"] == 1
+
+
+def test_binary_messages_are_malformed(client):
+    with connected(client, begin(client)) as socket:
+        begun(socket)
+        socket.send_bytes(b"\0" * 100)
+        assert until(socket, "error")[-1]["code"] == "malformed"
+
+
+@pytest.mark.parametrize(
+    "message", [{"type": "begin"}, inputs(1), {"type": "seen", "frame": 1}, {"type": "takeover"}]
+)
+def test_nothing_comes_before_hello(client, message):
+    with connected(client, begin(client)) as socket:
+        socket.send_json(message)
+        assert socket.receive_json()["code"] == "too early"
+
+
+def test_inputs_before_the_clock_runs_are_too_early(client):
+    with connected(client, begin(client)) as socket:
+        socket.send_json(hello())
+        until(socket, "ready")
+        socket.send_json(inputs(1))
+        assert until(socket, "error")[-1]["code"] == "too early"
+
+
+def test_a_flood_is_cut_off_and_others_are_not_disturbed(tmp_path, pool):
+    with (
+        serving(tmp_path, pool, sessions=2) as client,
+        connected(client, begin(client)) as quiet,
+        connected(client, begin(client)) as loud,
+    ):
+        begun(quiet)
+        begun(loud)
+        with pytest.raises(WebSocketDisconnect) as closed:
+            for _ in range(2000):
+                loud.send_json({"type": "resume"})
+            until(loud, "nothing")
+        assert closed.value.code == protocol.TOO_MUCH
+        quiet.send_json(inputs(1))
+        assert until(quiet, "taken")[-1]["input"] == 1
+
+
+def test_what_is_sent_again_counts_once(client, pool):
+    with connected(client, begin(client)) as socket:
+        begun(socket)
+        for batch in ((1, 2), (1, 2, 3), (3,), (4,)):
+            socket.send_json(inputs(*batch))
+        while socket.receive_json().get("input") != 4:
+            pass
+    forwarded = [
+        new.number
+        for told in pool.workers[0].told
+        if isinstance(told, messages.Inputs)
+        for new in told.inputs
+    ]
+    assert forwarded == [1, 2, 3, 4]
+
+
+def test_a_second_page_takes_over_by_asking_and_the_first_is_told(client, monkeypatch):
+    monkeypatch.setattr("experiments.web.browser_socket.OLD_PATIENCE", 0.1)
+    link = begin(client)
+    with connected(client, link) as first:
+        begun(first)
+        with connected(client, link) as second:
+            second.send_json(hello(tab="tab-00000002"))
+            assert second.receive_json()["type"] == "occupied"
+            first.send_json(inputs(1))
+            assert until(first, "taken")[-1]["input"] == 1
+            second.send_json({"type": "takeover"})
+            assert until(first, "replaced")
+            with pytest.raises(WebSocketDisconnect) as closed:
+                first.receive_json()
+            assert closed.value.code == protocol.REPLACED
+            ready = until(second, "ready")[-1]
+            assert ready["begun"] and ready["input"] == 1
+            assert until(second, "paused")[-1]["reason"] == "taken over"
+
+
+def test_a_page_that_connects_again_need_not_ask(client, pool):
+    link = begin(client)
+    with connected(client, link) as first:
+        begun(first)
+        with connected(client, link) as second:
+            second.send_json(hello())
+            assert until(second, "ready")[-1]["begun"]
+
+
+def test_without_a_browser_the_clock_stands(client, pool):
+    link = begin(client)
+    with connected(client, link) as socket:
+        begun(socket)
+        socket.send_json(inputs(1))
+        until(socket, "taken")
+    with connected(client, link) as socket:
+        socket.send_json(hello(tab="tab-00000002"))
+        assert until(socket, "paused")[-1]["reason"] == "disconnected"
+    assert messages.Pause("disconnected") in pool.workers[0].told
+
+
+def test_a_dead_worker_is_replaced(client, pool):
+    with connected(client, begin(client)) as socket:
+        begun(socket)
+        pool.workers[0].die()
+        assert until(socket, "recovering")
+        until(socket, "ready")
+    assert len(pool.workers) == 2 and pool.discarded[0] is pool.workers[0]
+
+
+def test_workers_that_die_again_and_again_are_not_replaced_for_ever(client, pool):
+    with connected(client, begin(client)) as socket:
+        begun(socket)
+        for _ in range(3):
+            with pool.given:
+                pool.workers[-1].die()
+            said = socket.receive_json()
+            while said["type"] not in ("ready", "failed"):
+                said = socket.receive_json()
+        assert said["type"] == "failed"
+
+
+def test_beyond_the_limit_people_wait_in_a_queue(client):
+    with connected(client, begin(client)) as first, connected(client, begin(client)) as second:
+        begun(first)
+        second.send_json(hello())
+        assert until(second, "queue")[-1]["position"] == 1
+        with connected(client, begin(client)) as third:
+            third.send_json(hello())
+            assert until(third, "queue")[-1]["position"] == 2
+        for phase in ("training", "task"):
+            first.send_json({"type": "leave"})
+            until(first, "over")
+            if phase == "training":
+                until(first, "ready")
+        until(second, "ready")
+
+
+def test_a_server_that_was_killed_goes_on_with_the_same_link(tmp_path, pool):
+    with serving(tmp_path, pool) as client:
+        link = begin(client)
+        with connected(client, link) as socket:
+            begun(socket)
+            socket.send_json({"type": "leave"})
+            until(socket, "over")
+    with serving(tmp_path, ScriptedPool()) as client:
+        assert 'data-phase="task"' in client.get(link).text
+
+
+def test_an_idle_session_gives_its_place_back(tmp_path, pool, monkeypatch):
+    monkeypatch.setattr("experiments.web.sessions.WATCH_PERIOD", 0.05)
+    with serving(tmp_path, pool, idle=0.1) as client, connected(client, begin(client)) as socket:
+        begun(socket)
+        assert until(socket, "error")[-1]["code"] == "idle"
+        with pytest.raises(WebSocketDisconnect) as closed:
+            socket.receive_json()
+        assert closed.value.code == protocol.IDLE
+    assert pool.discarded
+
+
+def test_a_damaged_visit_is_named_in_the_log_only(client, tmp_path, caplog):
+    token = Visits(tmp_path).create(TRIALS, "training")
+    path = tmp_path / token_hash(token) / VISIT
+    path.write_text("{")
+    answer = client.get(f"/play/{token}")
+    assert answer.status_code == 500 and str(tmp_path) not in answer.text
+    assert "is damaged" in caplog.text
+
+
+def test_frames_have_a_fixed_head():
+    frame = messages.Frame(7, 8, 2**40, "h264", True, 640, 480, 12.5, b"picture")
+    data = protocol.packed_frame(frame)
+    assert protocol.FRAME_HEAD.size == 28 and data[28:] == b"picture"
+    assert protocol.FRAME_HEAD.unpack(data[:28]) == (1, 2, 1, 0, 640, 480, 7, 8, 2**40, 12.5)
