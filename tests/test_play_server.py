@@ -368,7 +368,7 @@ def test_a_second_page_takes_over_by_asking_and_the_first_is_told(client, monkey
             assert until(second, "paused")[-1]["reason"] == "taken over"
 
 
-def test_a_page_that_connects_again_need_not_ask(client, pool):
+def test_a_page_that_connects_again_need_not_ask(client):
     link = begin(client)
     with connected(client, link) as first:
         begun(first)
