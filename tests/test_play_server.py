@@ -10,8 +10,8 @@ import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from experiments import records
-from experiments.trial_config import TrialConfig
+from experiments.runs import records
+from experiments.trials.trial_config import TrialConfig
 from experiments.web import messages, protocol
 from experiments.web.guards import Addresses
 from experiments.web.server import PlayConfig, PlayServer
@@ -185,9 +185,7 @@ def test_only_the_hash_of_a_token_is_kept(client, tmp_path, caplog):
     assert not [p for p in tmp_path.rglob("*") if token in p.name or (p.is_file() and token in p.read_text())]
 
 
-@pytest.mark.parametrize(
-    "token", ["x", "x" * 43, "%2e%2e", "..%2f..%2fetc", "a" * 5000, "%00", "é" * 43]
-)
+@pytest.mark.parametrize("token", ["x", "x" * 43, "%2e%2e", "..%2f..%2fetc", "a" * 5000, "%00", "é" * 43])
 def test_an_unknown_token_is_no_visit(client, token):
     assert client.get(f"/play/{token}").status_code == 404
     with pytest.raises(WebSocketDisconnect), connected(client, f"/play/{token}"):

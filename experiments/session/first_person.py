@@ -45,15 +45,22 @@ class FirstPersonRenderer:
         scene: The scene to render.
         house: The house, for the pictures of its objects and receptacles.
         film: Frame size and render profile.
+        pictures: What `render_pictures` made of the house's catalogue, to use again; None to make them.
 
     Raises:
         RenderError: No off-screen GL context could be made, or the size or profile is unusable.
     """
 
-    def __init__(self, scene: Scene, house: House, film: FilmConfig) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        house: House,
+        film: FilmConfig,
+        pictures: dict[str, NDArray[np.uint8]] | None = None,
+    ) -> None:
         self._renderer = Renderer(scene.model, width=film.width, height=film.height, profile=film.profile)
         self._house = house
-        self._pictures = render_pictures(house.catalogue)
+        self._pictures = render_pictures(house.catalogue) if pictures is None else pictures
         self._compositor = Compositor(self._pictures)
         self._size = (film.width, film.height)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from experiments.house import House
 from experiments.session.first_person import FilmConfig, FirstPersonRenderer
-from experiments.web.encoders import Encoder, H264Encoder, JpegEncoder
+from experiments.web.encoders import Encoder, H264Encoder, Image, JpegEncoder
 from experiments.web.messages import Frame, View
 from hud.projection import CameraView
 from hud.state import HudState
@@ -43,11 +43,14 @@ class Drawer:
     Args:
         scene: The scene.
         house: The house, for pictures.
+        pictures: What `render_pictures` made of the house's catalogue.
         send: Takes the frames; called from the drawing thread.
     """
 
-    def __init__(self, scene: Scene, house: House, send: Callable[[Frame], None]) -> None:
-        self._scene, self._house, self._send = scene, house, send
+    def __init__(
+        self, scene: Scene, house: House, pictures: dict[str, Image], send: Callable[[Frame], None]
+    ) -> None:
+        self._scene, self._house, self._pictures, self._send = scene, house, pictures, send
         self._changed = threading.Condition()
         self._view: View | None = None
         self._snapshot: Snapshot | None = None
@@ -150,7 +153,8 @@ class Drawer:
     def _renderer(self, size: int) -> FirstPersonRenderer:
         if size not in self._renderers:
             width, height = SIZES[size]
-            self._renderers[size] = FirstPersonRenderer(self._scene, self._house, FilmConfig(width, height))
+            film = FilmConfig(width, height)
+            self._renderers[size] = FirstPersonRenderer(self._scene, self._house, film, self._pictures)
         return self._renderers[size]
 
 

@@ -27,6 +27,7 @@ from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_record import draw_floor_plan, save_record
 from experiments.web import messages
 from experiments.web.drawing import Drawer
+from experiments.web.encoders import Image
 from experiments.web.inbox import Inbox
 from experiments.web.journal import JOURNAL, read_journal
 from experiments.web.live_session import LiveSession, config_of, is_over, open_journal, result_of
@@ -35,6 +36,7 @@ from hud import schema
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.observation import Observation
+from mjsim.render import render_pictures
 from mjsim.world import World
 
 LATE = 0.02  # s after its time at which a control step counts as late
@@ -125,12 +127,14 @@ class Worker:
         self._window = Window(self._connection)
         self._view: messages.View | None = None
         self._houses: dict[str, House] = {}
+        self._pictures: dict[int, dict[str, Image]] = {}
 
     def run(self) -> None:
         """Serve until the server is gone."""
         house = self._house()
         warmup.plan()
         warmup.act(house)
+        self._pictures_of(house)
         threading.Thread(target=self._receive, name="receiving", daemon=True).start()
         while (opened := self._next_session()) is not None:
             try:
@@ -191,7 +195,7 @@ class Worker:
                 return
             live = LiveSession(journal, house, config, self._window)
             inbox = self._inbox
-            with Drawer(live.scene, live.house, self._connection.send) as drawer:
+            with Drawer(live.scene, live.house, self._pictures_of(house), self._connection.send) as drawer:
                 self._window.live, self._window.drawer = live, drawer
                 inbox.set(last=live.input, begun=inbox.begun or live.resumed)
                 self._connection.send(
@@ -211,6 +215,12 @@ class Worker:
         if name not in self._houses:
             self._houses[name] = House.load(name)
         return self._houses[name]
+
+    def _pictures_of(self, house: House) -> dict[str, Image]:
+        """Pictures of a house's objects and receptacles; made once."""
+        if id(house) not in self._pictures:
+            self._pictures[id(house)] = render_pictures(house.catalogue)
+        return self._pictures[id(house)]
 
     def _finish(self, folder: Path, run: Path, house: House) -> None:
         """Make the run directory of a session that is over, where it is not there yet."""
