@@ -8,9 +8,6 @@ import argparse
 import os
 import socket
 import threading
-import time
-from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,19 +16,19 @@ import msgspec
 from experiments.house import House
 from experiments.runs import records
 from experiments.runs.run_directory import is_run, run_directory
-from experiments.session.endings import INTERRUPTED
 from experiments.session.session import Viewer
 from experiments.session.user_code import describe
 from experiments.trials import warmup
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_record import draw_floor_plan, save_record
 from experiments.web import messages
+from experiments.web.clock import Clock
+from experiments.web.connection import Connection
 from experiments.web.drawing import Drawer
 from experiments.web.encoders import Image
 from experiments.web.inbox import Inbox
 from experiments.web.journal import JOURNAL, read_journal
 from experiments.web.live_session import LiveSession, config_of, is_over, open_journal, result_of
-from experiments.web.messages import Message, packed
 from hud import schema
 from hud.projection import CameraView
 from hud.state import HudState
@@ -39,41 +36,7 @@ from mjsim.observation import Observation
 from mjsim.render import render_pictures
 from mjsim.world import World
 
-LATE = 0.02  # s after its time at which a control step counts as late
-ASLEEP = 1.0  # s behind at which the process must have been stopped, and the clock goes on from now
 STATE_PERIOD = 2  # control steps between two states
-
-
-class Connection:
-    """The socket to the server; several threads send, one receives."""
-
-    def __init__(self, link: socket.socket) -> None:
-        self._link = link
-        self._lock = threading.Lock()
-
-    def send(self, message: Message) -> None:
-        """Send a message; nothing happens if the server is gone, which the receiving thread notices."""
-        with self._lock, suppress(OSError):
-            self._link.sendall(packed(message))
-
-    def receive(self) -> Iterator[Any]:
-        """Messages until the server closes the connection."""
-        while (head := self._read(messages.LENGTH.size)) is not None:
-            content = self._read(messages.LENGTH.unpack(head)[0])
-            if content is None:
-                return
-            yield messages.decode_to_worker(content)
-
-    def _read(self, count: int) -> bytes | None:
-        parts = bytearray()
-        while len(parts) < count:
-            with suppress(OSError):
-                part = self._link.recv(count - len(parts))
-                if part:
-                    parts += part
-                    continue
-            return None
-        return bytes(parts)
 
 
 class Window(Viewer):
@@ -202,7 +165,7 @@ class Worker:
                     messages.Ready(live.session.recording.step, live.input, live.resumed, inbox.begun)
                 )
                 self._apply_view()
-                reason = _Clock(live, inbox, journal.sync, self._connection, self._window).run()
+                reason = Clock(live, inbox, journal.sync, self._connection).run()
                 self._window.live = self._window.drawer = None
             if reason is None:
                 live.close()
@@ -228,99 +191,6 @@ class Worker:
             _save(folder, run, house)
         metrics = msgspec.json.decode((run / records.METRICS).read_bytes())
         self._connection.send(messages.Over(metrics["ended"], metrics))
-
-
-class _Clock:
-    """Steps a session in real time until it is over, left, or the server is gone."""
-
-    def __init__(
-        self, live: LiveSession, inbox: Inbox, sync: Any, connection: Connection, window: Window
-    ) -> None:
-        self._live, self._inbox, self._connection, self._window = live, inbox, connection, window
-        self._sync = _Sync(sync, connection)
-
-    def run(self) -> str | None:
-        """Why the session is over; None if the server is gone."""
-        live, inbox = self._live, self._inbox
-        deadline, paused = time.monotonic(), False
-        try:
-            while (reason := live.end_reason) is None:
-                if not inbox.runs:
-                    if inbox.closed:
-                        return None
-                    if inbox.leave:
-                        return INTERRUPTED
-                    if inbox.begun and not paused:
-                        paused = self._pause(inbox.paused or "")
-                    live.session.show()
-                    inbox.wait_until_running(0.1)
-                    deadline = time.monotonic()
-                    continue
-                if paused:
-                    paused = self._resume()
-                deadline = self._step_at(deadline)
-        finally:
-            self._sync.close()
-        return reason
-
-    def _step_at(self, deadline: float) -> float:
-        """Take a control step at its time; when the next one is due."""
-        late = time.monotonic() - deadline
-        if late < 0.0:
-            time.sleep(-late)
-        elif late > ASLEEP:
-            self._live.session.note("overrun", seconds=round(late, 3), skipped=True)
-            deadline += late
-        elif late > LATE:
-            self._live.session.note("overrun", seconds=round(late, 3), skipped=False)
-        self._live.step(self._inbox.take())
-        self._sync.request(self._live.input, self._live.session.recording.step)
-        return deadline + self._live.world.control_timestep
-
-    def _pause(self, reason: str) -> bool:
-        self._live.session.note("pause", reason=reason, wall=round(time.time(), 3))
-        self._connection.send(messages.Paused(reason))
-        return True
-
-    def _resume(self) -> bool:
-        self._live.session.note("resume", wall=round(time.time(), 3))
-        self._connection.send(messages.Paused(None))
-        return False
-
-
-class _Sync:
-    """Writes the journal through to the disk in a thread of its own, then acknowledges."""
-
-    def __init__(self, sync: Any, connection: Connection) -> None:
-        self._sync, self._connection = sync, connection
-        self._changed = threading.Condition()
-        self._wanted: tuple[int, int] | None = None
-        self._closed = False
-        self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
-        self._thread.start()
-
-    def request(self, number: int, step: int) -> None:
-        """Everything up to this input and control step is in the journal."""
-        with self._changed:
-            self._wanted = number, step
-            self._changed.notify()
-
-    def close(self) -> None:
-        """Write through what is left."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify()
-        self._thread.join()
-
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._wanted is not None or self._closed)
-                if self._wanted is None:
-                    return
-                (number, step), self._wanted = self._wanted, None
-            self._sync()
-            self._connection.send(messages.Taken(number, step))
 
 
 def _save(folder: Path, run: Path, house: House) -> None:
