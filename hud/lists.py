@@ -26,13 +26,13 @@ def bins(view: TaskView) -> tuple[BinEntry, ...]:
     return tuple(BinEntry(r.label, r.room, r.picture) for r in view.receptacles)
 
 
-def inventory(view: TaskView) -> tuple[InventorySlot, InventorySlot]:
-    """What the left and the right hand hold."""
+def inventory(view: TaskView) -> tuple[InventorySlot | None, InventorySlot]:
+    """What the left and the right hand hold; who carries one object at most does so in the right one."""
     left, right = (
         InventorySlot() if name is None else InventorySlot(view.object(name).label, view.object(name).picture)
         for name in view.hands
     )
-    return left, right
+    return left if view.capacity > 1 else None, right
 
 
 def random_order(view: TaskView) -> tuple[TaskObject, ...]:

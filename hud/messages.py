@@ -29,7 +29,7 @@ TEXTS: Final = MappingProxyType(
         "busy": (_NO, "One moment: your hands are still moving."),
         "nothing_in_reach": (_NO, "Nothing in reach. Walk closer to an object or a bin."),
         "out_of_reach": (_NO, "Walk closer to reach the {object}."),
-        "hands_full": (_NO, "Both hands are full. Put something away first."),
+        "hands_full": (_NO, "You cannot carry more. Put something away first."),
         "hands_empty": (_NO, "Your hands are empty. Pick something up first."),
         "not_carried": (_NO, "You are not holding the {object}."),
         "already_carried": (_NO, "You are already holding the {object}."),

@@ -38,11 +38,14 @@ def draw_bins(
     return canvas.patch()
 
 
-def draw_inventory(stencils: Stencils, rect: Rect, slots: tuple[InventorySlot, InventorySlot]) -> Patch:
-    """Two hands, at the left and the right end: a picture and a name each, or a word that it is empty."""
+def draw_inventory(
+    stencils: Stencils, rect: Rect, slots: tuple[InventorySlot | None, InventorySlot]
+) -> Patch:
+    """The hands, at the left and the right end: a picture and a name each, or a word that it is empty."""
     canvas = Canvas(stencils, rect.width, rect.height)
     for slot, hand, at_the_left in zip(slots, ("Left hand", "Right hand"), (True, False), strict=True):
-        _draw_hand(canvas, slot, hand, at_the_left)
+        if slot is not None:
+            _draw_hand(canvas, slot, hand, at_the_left)
     return canvas.patch()
 
 

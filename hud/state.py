@@ -137,7 +137,7 @@ class HudState:
         checklist_title: Heading of the task list ("Objects to find", "Your plan").
         checklist: Rows, in the order shown.
         bins: The list of receptacles.
-        inventory: Left and right hand.
+        inventory: Left and right hand; no left one for a person who carries one object at most.
         message: Message bar, or None.
         markers: World-locked objects.
         rerouted: Whether the breadcrumbs start at the person and lead anew when the person leaves them.
@@ -152,7 +152,7 @@ class HudState:
     checklist_title: str
     checklist: tuple[ChecklistItem, ...]
     bins: tuple[BinEntry, ...]
-    inventory: tuple[InventorySlot, InventorySlot]
+    inventory: tuple[InventorySlot | None, InventorySlot]
     message: Message | None = None
     markers: tuple[Marker, ...] = ()
     rerouted: bool = False

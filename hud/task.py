@@ -85,6 +85,7 @@ class TaskView:
         receptacles: All receptacles, in the order in which they are listed.
         order: Object names in this participant's random order (PAPER section 5).
         hands: Object name in the left and in the right hand, or None.
+        capacity: How many objects are carried at most.
         steps_done: Successful picks and places so far, in order.
         plan: Remaining steps in planned order, the next one first; empty without a planner.
         segment: Shortest floor path from where the last step was done, or the start, to the next one, m, shape (k, 2);
@@ -111,6 +112,7 @@ class TaskView:
     receptacles: tuple[TaskReceptacle, ...]
     order: tuple[str, ...]
     hands: tuple[str | None, str | None] = (None, None)
+    capacity: int = 2
     steps_done: tuple[TaskStep, ...] = ()
     plan: tuple[TaskStep, ...] = ()
     segment: NDArray[np.float64] | None = None

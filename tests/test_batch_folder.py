@@ -1,19 +1,22 @@
 """A batch knows what it ran: what changed is run again, what is there is in the tables, and nothing is mistaken."""
 
+import dataclasses
 import json
 import shutil
 import sys
 
 import pytest
 
-from experiments.errors import ConfigError, RecordError
+from experiments.errors import ConfigError, RecordError, SessionError, UserCodeError
 from experiments.house import House
 from experiments.runs import records
 from experiments.trials.batch import run_batch
+from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import read_trial, read_trials, trial_name
-from experiments.trials.batch_plan import check_trials, plan_batch
+from experiments.trials.batch_plan import plan_batch
 from experiments.trials.design import Design, confounded, factorial
 from experiments.trials.fingerprint import source_hash, trial_inputs
+from experiments.trials.person_distribution import PersonDistribution
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from hud.errors import ConditionError
@@ -189,12 +192,34 @@ def test_unlike_trials_have_unlike_names():
         ({"planner": "collections:Counter"}, PlannerError, "no method solve"),
         ({"house": "castle"}, AssetError, "no house 'castle'"),
         ({"episode": "/nowhere/episode.json"}, EpisodeError, "cannot read episode"),
+        (
+            {"user": "nearest"},
+            SessionError,
+            r"needs \['flagpole'\] markers but the assistance condition shows none",
+        ),
+        ({"assistance": "builtins:id"}, UserCodeError, "must return a HudState"),
+        ({"user": "builtins:max"}, UserCodeError, "participant 'builtins:max' raised TypeError"),
     ],
 )
 def test_everything_is_checked_before_the_first_trial(options, error, fault, tmp_path):
     with pytest.raises(error, match=fault):
         run_batch(Design((brief(), brief(seed=1, **options))), tmp_path / "b", workers=1)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reach_too_short_for_one_of_many_people_is_named_before_the_first_trial(house, monkeypatch):
+    bin_ = house.receptacles["office_box"]
+    farther = dataclasses.replace(bin_, center=bin_.center + 0.3 * bin_.rotation[:, 1])
+    wide = dataclasses.replace(house, receptacles={**house.receptacles, "office_box": farther})
+    monkeypatch.setattr(House, "load", lambda _: wide)
+    people = PersonDistribution.of({"reach": {"uniform": [0.6, 1.0]}})
+    with pytest.raises(ConfigError, match="m is too short for 'office_box'"):
+        check_trials([brief(seed=seed, person=people) for seed in range(8)])
+    check_trials([brief(person=PersonDistribution.of({"reach": 1.2, "body_radius": 0.22}))])
+
+
+def test_participants_who_are_shown_what_they_need_pass():
+    check_trials([brief(user="nearest", assistance="highlight"), brief(user="boltzmann:2"), brief()])
 
 
 def test_a_house_too_small_for_the_points_is_named_before_the_first_trial(small_house):

@@ -6,6 +6,7 @@ import hud_sample as sample
 import numpy as np
 import pytest
 
+from hud.compose import Compositor, compose
 from hud.conditions import condition, condition_names
 from hud.errors import ConditionError, HudError, MessageError, TaskViewError
 from hud.lists import in_sentence
@@ -13,7 +14,8 @@ from hud.markers import breadcrumbs, flagpoles
 from hud.messages import FADE, SHOWN, TEXTS, fade, message
 from hud.options import option_names
 from hud.options.reroute import CLEARANCE
-from hud.state import ChecklistItem, HudState, MessageKind
+from hud.schema import from_dict, to_dict
+from hud.state import ChecklistItem, HudState, InventorySlot, MessageKind
 from hud.task import Alternative, TaskStep, TaskView
 
 COUNTS = (6, 12, 18, 24)
@@ -69,9 +71,24 @@ def test_hands_progress_clock_and_message_pass_through(name: str) -> None:
     view = sample.task(12, steps=6, message=text, clock=12.5)
     state = shown(name, view)
     labels = {o.name: o.label for o in view.objects}
-    assert [s.label for s in state.inventory] == [None if h is None else labels[h] for h in view.hands]
+    assert [slot and slot.label for slot in state.inventory] == [
+        None if h is None else labels[h] for h in view.hands
+    ]
     assert (state.delivered, state.total, state.clock, state.message) == (2, 12, 12.5, text)
-    assert sum(s.label is not None for s in state.inventory) == 2
+    assert all(slot is not None and slot.label for slot in state.inventory)
+
+
+def test_who_carries_one_object_has_one_hand_on_show() -> None:
+    view = dataclasses.replace(sample.task(6), capacity=1)
+    state = shown("none", view)
+    assert state.inventory == (None, InventorySlot())
+    assert from_dict(to_dict(state)) == state
+    frame, two = sample.backdrop(640, 480), shown("none", sample.task(6))
+    rect = Compositor({}).layout(state, 640, 480).panels["inventory"]
+    drawn, other = (compose(frame, s, {}) for s in (state, two))
+    middle = rect.x + rect.width // 2
+    assert np.array_equal(drawn[rect.y :, rect.x : middle], frame[rect.y :, rect.x : middle])
+    assert np.array_equal(drawn[:, middle:], other[:, middle:])
 
 
 @pytest.mark.parametrize("name", ["none", "highlight"])

@@ -137,6 +137,7 @@ class Assistant:
             visits=self._route.visits if self._route else (),
             segment=None if self._next is None else self._paths.segment.points,
             path=None if self._next is None else self._paths.path.ahead(observation.position),
+            capacity=self._options.capacity,
             camera=camera,
             regrets=self._regrets.known,
         )

@@ -106,6 +106,16 @@ class Session:
             SessionError: The participant needs guidance that the assistance condition does not show.
             PhysicsError: The physics failed; the log says when.
         """
+        self.begin()
+        return self.finish(on_progress)
+
+    def begin(self) -> None:
+        """Make the first plan and show it; nothing is simulated yet.
+
+        Raises:
+            SessionError: The participant needs guidance that the assistance condition does not show.
+            UserCodeError: A condition of somebody's own failed.
+        """
         self._now = self._world.reset()
         try:
             self.assistant.begin(self._now)
@@ -113,7 +123,6 @@ class Session:
             self._log_end(self._now.time, ERROR, error=describe(error))
             raise
         self.start(self._now)
-        return self.finish(on_progress)
 
     def start(self, observation: Observation) -> None:
         """Start from where the world and the assistant are now.

@@ -12,7 +12,7 @@ from hud.messages import fade, message
 from hud.projection import CameraView
 from hud.state import Message, Vec3
 from hud.task import Alternative, TaskObject, TaskReceptacle, TaskStep, TaskView
-from mjsim.episode import Episode
+from mjsim.episode import CAPACITY, Episode
 from mjsim.observation import ObjectStatus, Observation
 from planner.plan import Visit, VisitKind
 from planner.regret import Regret
@@ -91,6 +91,7 @@ class TaskBoard:
         visits: Sequence[Visit] = (),
         segment: NDArray[np.float64] | None = None,
         path: NDArray[np.float64] | None = None,
+        capacity: int = CAPACITY,
         camera: CameraView | None = None,
         regrets: Callable[[], Mapping[Visit, Regret]] = dict,
     ) -> TaskView:
@@ -101,6 +102,7 @@ class TaskBoard:
             visits: Remaining visits in planned order.
             segment: Floor points of the plan's segment to the next visit, m, shape (k, 2).
             path: Floor points of the path from the person to the next visit, m, shape (k, 2).
+            capacity: How many objects the person carries at most.
             camera: The eye camera.
             regrets: Gives the regrets of visits that are possible next.
         """
@@ -109,6 +111,7 @@ class TaskBoard:
             receptacles=self._receptacles,
             order=self._order,
             hands=observation.hands,
+            capacity=capacity,
             steps_done=tuple(self._done),
             plan=tuple(task_step(visit) for visit in visits),
             segment=segment,

@@ -14,8 +14,9 @@ from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.runs.run_directory import TRIALS, check_batch_folder
 from experiments.signals import signals_postponed
+from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import folder_notes, read_trials, trial_key
-from experiments.trials.batch_plan import BatchPlan, check_trials, plan_batch
+from experiments.trials.batch_plan import BatchPlan, plan_batch
 from experiments.trials.design import Design, confounded
 from experiments.trials.table import write_tables
 from experiments.trials.trial import run_trial

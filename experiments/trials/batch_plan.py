@@ -1,26 +1,15 @@
-"""What a batch has to do: everything checked before the first trial, and compared with what its folder holds."""
+"""What a batch has to do: its design compared with what its folder holds."""
 
-import functools
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.errors import ConfigError
-from experiments.house import House
-from experiments.participants import participant
 from experiments.runs.run_directory import TRIALS
 from experiments.trials.batch_folder import OUTDATED, StoredTrial, put_aside, read_trials, trial_name
 from experiments.trials.design import counted
-from experiments.trials.fingerprint import Inputs, changes, trial_inputs
+from experiments.trials.fingerprint import Inputs, changes
 from experiments.trials.trial_config import TrialConfig
-from hud.conditions import condition
-from mjsim.episode import Episode
-from mjsim.errors import EpisodeError
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.sampling import POINTS
-from mjsim.model.scene import compose
-from planner.solver import solver
 
 SHOWN = 3  # names or reasons in a line
 
@@ -87,44 +76,3 @@ def _notes(reasons: Counter[str], out: Path) -> Iterable[str]:
     if reasons:
         why = "; ".join(f"{reason} ({count})" for reason, count in reasons.most_common(SHOWN))
         yield f"run again: {counted(reasons.total(), 'trial')}: {why}; what was complete is kept in {out / OUTDATED}"
-
-
-def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
-    """Check that every trial can be run, as far as that shows without running it; what each depends on.
-
-    Raises:
-        ConfigError: There is no such participant, or an episode does not fit its trial.
-        AssetError, EpisodeError, SamplingError: A house or an episode is unusable, or a house too small.
-        PlannerError, HudError: There is no such planner or assistance condition.
-    """
-    for check, names in (
-        (participant, {trial.user for trial in trials}),
-        (condition, {trial.assistance for trial in trials}),
-        (solver, {trial.planner for trial in trials}),
-    ):
-        for name in sorted(names):
-            check(name)
-    catalogue = functools.cache(Catalogue.load)
-    house = functools.cache(House.load)
-    for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():
-        _check_episode(trial, catalogue(trial.house))
-    for name, seed, points in dict.fromkeys(
-        (t.house, t.house_seed, t.points) for t in trials if _may_be_small(t)
-    ):
-        house(name).sample_points(seed=seed, points=points)
-    return [trial_inputs(trial, catalogue(trial.house)) for trial in trials]
-
-
-def _may_be_small(trial: TrialConfig) -> bool:
-    """The houses that come with the package have room for the usual points."""
-    return trial.episode is None and (trial.house.endswith(".toml") or trial.points > POINTS)
-
-
-def _check_episode(trial: TrialConfig, catalogue: Catalogue) -> None:
-    episode = Episode.load(Path(str(trial.episode)))
-    if len(episode.objects) != trial.objects:
-        raise ConfigError(f"objects is {trial.objects}, but {trial.episode} holds {len(episode.objects)}")
-    try:
-        compose(episode, catalogue)
-    except EpisodeError as error:
-        raise EpisodeError(f"{trial.episode}: {error}") from error

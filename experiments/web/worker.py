@@ -224,7 +224,7 @@ def _text(state: HudState) -> messages.Text:
         message="" if state.message is None else state.message.text,
         title=state.checklist_title,
         rows=rows,
-        hands=[slot.label or "empty" for slot in state.inventory],
+        hands=[slot.label or "empty" for slot in state.inventory if slot is not None],
     )
 
 

@@ -1,0 +1,111 @@
+"""Whether the trials of a batch can be run, as far as that shows before the first one starts."""
+
+import dataclasses
+import functools
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from experiments.errors import ConfigError
+from experiments.house import House
+from experiments.participants import DEFAULT_PARTICIPANT, participant
+from experiments.runs import records
+from experiments.runs.records import EventLog
+from experiments.trials.fingerprint import Inputs, trial_inputs
+from experiments.trials.trial import draw_person, prepare_session, trial_episode
+from experiments.trials.trial_config import TrialConfig
+from hud.conditions import condition, condition_names
+from mjsim.episode import Episode
+from mjsim.errors import EpisodeError, PersonError
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.sampling import POINTS
+from mjsim.model.scene import compose
+from mjsim.person_parameters import PersonParameters
+from planner.solver import solver
+
+Houses = Callable[[str], House]
+
+
+def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
+    """Check that every trial can be run, as far as that shows without running it; what each depends on.
+
+    Raises:
+        ConfigError: There is no such participant, an episode does not fit its trial, or somebody's reach is too short.
+        SessionError: A participant needs guidance that the assistance condition does not show.
+        UserCodeError: A participant or condition of somebody's own fails before the first step.
+        AssetError, EpisodeError, SamplingError: A house or an episode is unusable, or a house too small.
+        PlannerError, HudError: There is no such planner or assistance condition.
+    """
+    for check, names in (
+        (participant, {trial.user for trial in trials}),
+        (condition, {trial.assistance for trial in trials}),
+        (solver, {trial.planner for trial in trials}),
+    ):
+        for name in sorted(names):
+            check(name)
+    catalogue = functools.cache(Catalogue.load)
+    house = functools.cache(House.load)
+    for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():
+        _check_episode(trial, catalogue(trial.house))
+    for name, seed, points in dict.fromkeys(
+        (t.house, t.house_seed, t.points) for t in trials if _may_be_small(t)
+    ):
+        house(name).sample_points(seed=seed, points=points)
+    _check_people(trials, house)
+    for trial in {(t.house, t.user, t.assistance): t for t in reversed(trials) if _may_not_fit(t)}.values():
+        _begin(trial, house(trial.house))
+    return [trial_inputs(trial, catalogue(trial.house)) for trial in trials]
+
+
+def _may_be_small(trial: TrialConfig) -> bool:
+    """The houses that come with the package have room for the usual points."""
+    return trial.episode is None and (trial.house.endswith(".toml") or trial.points > POINTS)
+
+
+def _check_episode(trial: TrialConfig, catalogue: Catalogue) -> None:
+    episode = Episode.load(Path(str(trial.episode)))
+    if len(episode.objects) != trial.objects:
+        raise ConfigError(f"objects is {trial.objects}, but {trial.episode} holds {len(episode.objects)}")
+    try:
+        compose(episode, catalogue)
+    except EpisodeError as error:
+        raise EpisodeError(f"{trial.episode}: {error}") from error
+
+
+def _check_people(trials: Iterable[TrialConfig], house: Houses) -> None:
+    """Check that everybody reaches every receptacle."""
+    usual = PersonParameters()
+    people: dict[str, dict[tuple[float, float], PersonParameters]] = {}
+    for trial in trials:
+        person = draw_person(trial)
+        people.setdefault(trial.house, {})[person.body_radius, person.reach] = person
+    for name, sizes in people.items():
+        sizes.pop((usual.body_radius, usual.reach), None)
+        if sizes:
+            _check_sizes(house(name), sizes)
+
+
+def _check_sizes(house: House, sizes: dict[tuple[float, float], PersonParameters]) -> None:
+    """If who is as broad as the broadest and reaches as far as the shortest arm gets along, so do all others."""
+    radii, reaches = zip(*sizes, strict=True)
+    try:
+        house.for_person(dataclasses.replace(PersonParameters(), body_radius=max(radii), reach=min(reaches)))
+    except (ConfigError, PersonError):
+        for person in sizes.values():
+            house.for_person(person)
+
+
+def _may_not_fit(trial: TrialConfig) -> bool:
+    """The default participant makes do with whatever a condition of this package shows."""
+    return trial.user != DEFAULT_PARTICIPANT or trial.assistance.partition("-")[0] not in condition_names()
+
+
+def _begin(trial: TrialConfig, house: House) -> None:
+    """Begin the trial with a single object, so that participant and condition meet; nothing is kept."""
+    small = dataclasses.replace(trial, objects=1, episode=None, live=False)
+    person = draw_person(small)
+    house = house.for_person(person)
+    scene = compose(trial_episode(small, house), house.catalogue, person=person)
+    with tempfile.TemporaryDirectory() as folder, EventLog(Path(folder) / records.EVENTS) as log:
+        session, _ = prepare_session(small, house, scene, log)
+        session.begin()
