@@ -11,6 +11,7 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from experiments.runs import records
+from experiments.runs.phases import PHASES
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import messages, protocol
 from experiments.web.guards import Addresses
@@ -99,7 +100,7 @@ def pool():
 
 @contextmanager
 def serving(folder, pool, **options):
-    server = PlayServer(PlayConfig(TRIALS, folder, **options), pool)
+    server = PlayServer(PlayConfig(PHASES, TRIALS, folder, story="A story.", **options), pool)
     with TestClient(server.app(Addresses(8000)), base_url=ORIGIN, follow_redirects=False) as client:
         yield client
 
@@ -148,7 +149,7 @@ def inputs(*numbers, **values):
 
 
 def test_a_visit_from_the_story_to_the_result(client, pool):
-    assert "Tidy the apartment" in client.get("/").text
+    assert "<p>A story.</p>" in client.get("/").text
     link = begin(client)
     for phase in ("training", "task"):
         assert f'data-phase="{phase}"' in client.get(link).text
@@ -447,7 +448,7 @@ def test_an_idle_session_gives_its_place_back(tmp_path, pool, monkeypatch):
 
 
 def test_a_damaged_visit_is_named_in_the_log_only(client, tmp_path, caplog):
-    token = Visits(tmp_path).create(TRIALS, "training")
+    token = Visits(tmp_path).create(["training", "task"], TRIALS)
     path = tmp_path / token_hash(token) / VISIT
     path.write_text("{")
     answer = client.get(f"/play/{token}")

@@ -23,19 +23,22 @@ from experiments.commands.options import (
     trial_options,
 )
 from experiments.errors import ConfigError, RecordError
+from experiments.familiarisation.story import story_text
 from experiments.participants.human import NAME as HUMAN
-from experiments.trials.trial_config import LARGEST_SEED, TrialConfig
+from experiments.runs.phases import PHASES, STORY, TASK, TRAINING, phases_of
+from experiments.trials.training import training_config
+from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition
 from planner.solver import solver
 
 OBJECTS = 6
 PORT = 8000
 TRAINING_LIMIT = 24 * 3600.0  # s; as good as none
-TRAINING_HOUSE = 1_000_003  # added to the house's seed, so that the training does not show what the task will
 
 DESCRIPTION = """\
 Start a server on which people tidy the apartment in a browser: by keyboard and mouse, gamepad or touch. Prints its URL
-on a line of its own and opens it. A visit is a story, a training with one object, the task, and a page with the result.
+on a line of its own and opens it. A visit is a story, a film of the house (where --film names one), a training with one
+object, the task, and a page with the result; --phases leaves some out.
 
 Everything that is pressed is kept in --out at once: after a reload, a lost connection, or a crash of browser or server,
 the same link goes on in the same state. A trial that is over leaves a run directory as `mjsim run` does, which `mjsim
@@ -103,19 +106,18 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
         seed=arguments.seed,
         live=True,
         user=HUMAN,
-        **{"objects": OBJECTS, **given_options(arguments, ("objects",)), **trial_options(arguments)},
+        **{
+            "objects": OBJECTS,
+            **given_options(arguments, ("objects",)),
+            **trial_options(arguments),
+            "phases": TASK,  # the server leads through the others
+            "story": None,
+        },
     )
     condition(task.assistance)
     solver(task.planner)
-    training = dataclasses.replace(
-        task,
-        seed=None,
-        objects=1,
-        episode=None,
-        house_seed=(task.house_seed + TRAINING_HOUSE) % LARGEST_SEED,
-        time_limit=TRAINING_LIMIT,
-    )
-    return {"training": training.settings(), "task": task.settings()}
+    training = dataclasses.replace(training_config(task), time_limit=TRAINING_LIMIT)
+    return {TRAINING: training.settings(), TASK: task.settings()}
 
 
 def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], listener: socket.socket) -> None:
@@ -127,8 +129,15 @@ def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], lis
     from experiments.web.server import PlayConfig, PlayServer
 
     _log_to_stderr()
+    phases = phases_of(arguments.phases or ",".join(PHASES))
     config = PlayConfig(
-        trials, arguments.out.absolute(), arguments.sessions, max(arguments.idle, 1.0), arguments.film
+        phases=phases,
+        trials=trials,
+        folder=arguments.out.absolute(),
+        sessions=arguments.sessions,
+        idle=max(arguments.idle, 1.0),
+        film=arguments.film,
+        story=story_text(arguments.story) if STORY in phases else "",
     )
     host, port = listener.getsockname()[:2]
     app = PlayServer(config, Pool()).app(Addresses(port, arguments.public_url))

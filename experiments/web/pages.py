@@ -9,12 +9,13 @@ from typing import Any
 from starlette.responses import HTMLResponse
 
 PLAN = "A numbered plan says what to do next, and red dots on your way lead there."
-STORIES = {
+HELP = {
     "none": "A list names the objects to find.",
     "highlight": "A list names the objects to find, and flagpoles stand over them, also through walls.",
     "guided": PLAN,
     "optimal": f"{PLAN} You may do something else; the plan then follows you.",
 }
+TRAINING = "You begin with a short training: one object, and all the time you like."
 
 
 def page(name: str, title: str, *, status: int = 200, **values: object) -> HTMLResponse:
@@ -24,9 +25,9 @@ def page(name: str, title: str, *, status: int = 200, **values: object) -> HTMLR
         name: Of its template.
         title: Its title.
         status: HTTP status.
-        values: What is put into the template.
+        values: What is put into the template; of a list, each item becomes a paragraph.
     """
-    body = _template(name).substitute({key: html.escape(str(value)) for key, value in values.items()})
+    body = _template(name).substitute({key: _escaped(value) for key, value in values.items()})
     return HTMLResponse(_template("frame").substitute(title=html.escape(title), body=body), status)
 
 
@@ -35,16 +36,17 @@ def message_page(status: int, title: str, text: str) -> HTMLResponse:
     return page("message", title, status=status, title_text=title, text=text)
 
 
-def story_page(trial: Mapping[str, Any]) -> HTMLResponse:
-    """The first page: what the task is about."""
-    count = trial["objects"]
-    return page(
-        "story",
-        "Tidy the apartment",
-        objects="1 object lies" if count == 1 else f"{count} objects lie",
-        help=STORIES.get(str(trial["assistance"]).split("-")[0], "The display in front of you assists you."),
-        carried="two objects, one in each hand" if trial["capacity"] == 2 else "one object",
-    )
+def story_page(story: str, trial: Mapping[str, Any], *, training: bool) -> HTMLResponse:
+    """The first page: what the task is about.
+
+    Args:
+        story: Its text, with blank lines between paragraphs.
+        trial: Settings of the task.
+        training: Whether a training comes first.
+    """
+    condition = str(trial["assistance"]).split("-")[0]
+    texts = [*story.split("\n\n"), HELP.get(condition, ""), TRAINING if training else ""]
+    return page("story", "Tidy the apartment", paragraphs=[text for text in texts if text.strip()])
 
 
 def play_page(phase: str, count: int) -> HTMLResponse:
@@ -67,6 +69,12 @@ def result_page(link: str, metrics: Mapping[str, Any]) -> HTMLResponse:
         extra=_metres(metrics["total_regret_m"]),
         visits=_visits(metrics),
     )
+
+
+def _escaped(value: object) -> str:
+    if isinstance(value, list):
+        return "\n".join(f"<p>{html.escape(text)}</p>" for text in value)
+    return html.escape(str(value))
 
 
 def _duration(seconds: float) -> str:

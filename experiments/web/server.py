@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,12 +18,13 @@ from starlette.websockets import WebSocket
 
 from experiments.errors import RecordError
 from experiments.runs import records
+from experiments.runs.phases import FLYTHROUGH, STORY, TASK, TRAINING
 from experiments.web.browser_socket import BrowserSocket
 from experiments.web.guards import Addresses, Guards, Rate
 from experiments.web.pages import message_page, page, play_page, result_page, story_page
 from experiments.web.pool import Places, Pool
 from experiments.web.sessions import Sessions
-from experiments.web.visits import PLAYED, Visit, Visits, token_hash
+from experiments.web.visits import PLAYED, RESULT, Visit, Visits, token_hash
 
 LOG = logging.getLogger("mjsim.play")
 STATIC = Path(__file__).parent / "static"
@@ -36,18 +37,22 @@ class PlayConfig:
     """What is played and how.
 
     Attributes:
+        phases: What a visit consists of, in order; `flythrough` needs a film.
         trials: Settings of the trials of a visit: `training` and `task`.
         folder: Where visits are kept.
         sessions: How many people play at a time.
         idle: After so many seconds without a sign of a person, the place is given to somebody else.
-        film: A film to show before the training, MP4, or None.
+        film: The film of the fly-through, MP4, or None.
+        story: Text of the first page, with blank lines between paragraphs.
     """
 
+    phases: Sequence[str]
     trials: Mapping[str, dict[str, Any]]
     folder: Path
     sessions: int = 1
     idle: float = 1800.0
     film: Path | None = None
+    story: str = ""
 
 
 class PlayServer:
@@ -109,14 +114,18 @@ class PlayServer:
             await self._pool.close()
 
     async def _story(self, _: Request) -> Response:
-        return story_page(self._config.trials["task"])
+        return story_page(
+            self._config.story, self._config.trials[TASK], training=TRAINING in self._config.phases
+        )
 
     async def _begin(self, request: Request) -> Response:
         if not self._new.allows(request.client.host if request.client else ""):
             return message_page(429, "Too many visits", "Please wait a minute, then try again.")
         if self._places.waiting >= MAX_QUEUE:
             return message_page(503, "Everything is full", "Please come back later.")
-        token = self._visits.create(self._config.trials, "film" if self._config.film else "training")
+        left_out = (STORY,) if self._config.film else (STORY, FLYTHROUGH)
+        phases = [name for name in self._config.phases if name not in left_out]
+        token = self._visits.create(phases, self._config.trials)
         LOG.info("session %s begins", token_hash(token)[:12])
         return RedirectResponse(f"/play/{token}", 303)
 
@@ -125,13 +134,13 @@ class PlayServer:
         visit = self._visits.find(token)
         if visit is None:
             return await _not_found(request, None)
-        if visit.phase == "film" and self._config.film is None:
-            visit.finish("film")
-        if visit.phase == "film":
+        if visit.phase == FLYTHROUGH and self._config.film is None:
+            visit.finish(FLYTHROUGH)
+        if visit.phase == FLYTHROUGH:
             return page("film", "The apartment", link=f"/play/{token}/film")
         if visit.phase in PLAYED:
             return play_page(visit.phase, visit.settings(visit.phase)["objects"])
-        return result_page(f"/play/{token}", visit.metrics("task"))
+        return result_page(f"/play/{token}", visit.metrics(TASK))
 
     async def _film(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])
@@ -144,12 +153,12 @@ class PlayServer:
         visit = self._visits.find(token)
         if visit is None:
             return await _not_found(request, None)
-        visit.finish("film")
+        visit.finish(FLYTHROUGH)
         return RedirectResponse(f"/play/{token}", 303)
 
     async def _floor_plan(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])
-        if visit is None or visit.phase != "result" or not (picture := _floor_plan(visit)).is_file():
+        if visit is None or visit.phase != RESULT or not (picture := _floor_plan(visit)).is_file():
             return await _not_found(request, None)
         return FileResponse(picture, media_type="image/png")
 
@@ -167,7 +176,7 @@ class PlayServer:
 
 
 def _floor_plan(visit: Visit) -> Path:
-    return visit.run("task") / records.TOPDOWN
+    return visit.run(TASK) / records.TOPDOWN
 
 
 async def _not_found(request: Request, _: Any) -> Response:

@@ -6,35 +6,37 @@ A link holds a token that cannot be guessed. Only its SHA-256 is kept, as the na
 import hashlib
 import re
 import secrets
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
 from experiments.errors import RecordError
 from experiments.runs import records
+from experiments.runs.phases import TASK, TRAINING
 from experiments.web.journal import sync_folder
 from mjsim.files import write_text_atomically
 
 VISIT = "visit.json"
 JOURNALS = "journals"
 TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")
-Phase = Literal["film", "training", "task", "result"]
-PHASES: tuple[Phase, ...] = ("film", "training", "task", "result")
-PLAYED: tuple[Phase, ...] = ("training", "task")
+RESULT = "result"  # what follows the last phase
+PLAYED = (TRAINING, TASK)
 
 
 class _Stored(msgspec.Struct, frozen=True):
     """`visit.json`.
 
     Attributes:
-        phase: Part of the visit that is next or under way.
+        phase: Phase that is next or under way.
+        phases: All of them, in order.
         trials: Settings of its trials by phase.
         version: Of this format.
     """
 
-    phase: Phase
+    phase: str
+    phases: list[str]
     trials: dict[str, dict[str, Any]]
     version: int = 1
 
@@ -60,8 +62,8 @@ class Visit:
         return self.folder.name
 
     @property
-    def phase(self) -> Phase:
-        """Part of the visit that is next or under way."""
+    def phase(self) -> str:
+        """Phase that is next or under way; `result` after the last one."""
         return self._stored.phase
 
     def settings(self, phase: str) -> dict[str, Any]:
@@ -83,7 +85,8 @@ class Visit:
             OSError: The folder cannot be written.
         """
         if phase == self.phase:
-            self._stored = msgspec.structs.replace(self._stored, phase=PHASES[PHASES.index(phase) + 1])
+            after = self._stored.phases[self._stored.phases.index(phase) + 1 :]
+            self._stored = msgspec.structs.replace(self._stored, phase=after[0] if after else RESULT)
             self.save()
 
     def save(self) -> None:
@@ -120,12 +123,12 @@ class Visits:
         self._folder = folder
         self._known: dict[str, Visit] = {}
 
-    def create(self, trials: Mapping[str, dict[str, Any]], first: Phase) -> str:
+    def create(self, phases: Sequence[str], trials: Mapping[str, dict[str, Any]]) -> str:
         """Begin a visit; its token.
 
         Args:
+            phases: Its phases, in order.
             trials: Settings of its trials by phase.
-            first: Phase that it begins with.
 
         Raises:
             OSError: The folder cannot be written.
@@ -133,7 +136,7 @@ class Visits:
         token = secrets.token_urlsafe(32)
         folder = self._folder / token_hash(token)
         folder.mkdir()
-        visit = Visit(folder, _Stored(first, dict(trials)))
+        visit = Visit(folder, _Stored(phases[0], list(phases), dict(trials)))
         visit.save()
         sync_folder(self._folder)
         self._known[visit.name] = visit
