@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 import threading
 from contextlib import contextmanager
 from pathlib import Path
@@ -461,3 +462,27 @@ def test_frames_have_a_fixed_head():
     data = protocol.packed_frame(frame)
     assert protocol.FRAME_HEAD.size == 28 and data[28:] == b"picture"
     assert protocol.FRAME_HEAD.unpack(data[:28]) == (1, 2, 1, 0, 640, 480, 7, 8, 2**40, 12.5)
+
+
+def documented(section):
+    """Fields by type of message, as a table of docs/protocol.md has them."""
+    text = (Path(__file__).parents[1] / "docs" / "protocol.md").read_text("utf-8")
+    table = text.split(f"## {section}\n")[1].split("\n## ")[0]
+    rows = [row.split("|") for row in table.splitlines() if row.startswith("| `")]
+    return {row[1].strip(" `"): set(re.findall(r"`(\w+)`", row[2])) for row in rows if len(row) > 4}
+
+
+@pytest.mark.parametrize(
+    ("section", "union"), [("From the client", protocol.FromBrowser), ("From the server", protocol.ToBrowser)]
+)
+def test_the_protocol_is_documented(section, union):
+    types = {kind.__struct_config__.tag: set(kind.__struct_fields__) for kind in union.__args__}
+    found = documented(section)
+    assert {name: found[name] for name in types} == types
+
+
+def test_documented_close_codes_and_limits_are_those_of_the_code():
+    text = (Path(__file__).parents[1] / "docs" / "protocol.md").read_text("utf-8")
+    for code in (protocol.REFUSED, protocol.REPLACED, protocol.IDLE, protocol.TOO_MUCH, protocol.SLOW):
+        assert str(code) in text
+    assert set(re.findall(r"`([a-z ]+)` \(", text)) >= {"malformed", "too early", "out of order", "too much"}
