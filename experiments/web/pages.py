@@ -1,4 +1,4 @@
-"""The pages, from templates in `pages/`; everything that is put into them is escaped."""
+"""The pages, from the files in `templates/`; everything that is put into them is escaped."""
 
 import html
 from collections.abc import Mapping
@@ -96,4 +96,4 @@ def _visits(metrics: Mapping[str, Any]) -> str:
 
 
 def _template(name: str) -> Template:
-    return Template((resources.files(__package__) / "pages" / f"{name}.html").read_text("utf-8"))
+    return Template((resources.files(__package__) / "templates" / f"{name}.html").read_text("utf-8"))

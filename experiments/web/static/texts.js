@@ -8,5 +8,6 @@ export function showText({ message, title, rows, hands }) {
   if (byId("said").textContent !== message) byId("said").textContent = message;
   byId("list-title").textContent = title;
   byId("list").replaceChildren(...rows.map((row) => made("li", row)));
-  byId("hands").textContent = `Left hand: ${hands[0]}. Right hand: ${hands[1]}.`;
+  const names = hands.length === 1 ? ["Hand"] : ["Left hand", "Right hand"];
+  byId("hands").textContent = hands.map((held, i) => `${names[i]}: ${held}.`).join(" ");
 }
