@@ -30,7 +30,7 @@ from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info,
 from mjsim.render.cameras import View
 from mjsim.render.context import current_context
 from mjsim.render.markers import add_markers
-from mjsim.render.rasteriser import buffer_settings
+from mjsim.render.scene_settings import buffer_settings
 from mjsim.world import World
 from planner.plan import Visit, VisitKind
 

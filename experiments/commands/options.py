@@ -20,7 +20,7 @@ from mjsim.episode import CAPACITY
 from mjsim.model.sampling import POINTS
 from mjsim.options import CAPACITIES, FIDELITIES
 from mjsim.render import FAST, PROFILES
-from mjsim.render.rasteriser import MAX_SIDE
+from mjsim.render.scene_settings import MAX_SIDE
 from planner.solver import DEFAULT_SOLVER, SOLVERS
 
 HOUSE_HELP = "name of a house, or path of its catalogue.toml"

@@ -5,8 +5,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from experiments.replaying.record_checks import PER_STEP, Mismatch
 from experiments.replaying.replayer import Replayer
-from experiments.replaying.run_record import PER_STEP, WORLD_EVENTS, Mismatch
+from experiments.replaying.run_record import WORLD_EVENTS
 from experiments.runs.records import EVENTS, RECORDING, TRAJECTORY, Event
 from experiments.session.endings import BROKEN_OFF
 

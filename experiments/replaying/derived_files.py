@@ -6,7 +6,8 @@ from typing import Any
 
 from experiments.errors import RecordError
 from experiments.files import read_json
-from experiments.replaying.run_record import Mismatch, RunRecord
+from experiments.replaying.record_checks import Mismatch
+from experiments.replaying.run_record import RunRecord
 from experiments.runs import records
 from experiments.runs.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.runs.metrics import measure

@@ -6,8 +6,8 @@ from typing import Any
 from experiments.errors import RecordError
 from experiments.familiarisation.familiarise import watch_flythrough
 from experiments.participants.human import NAME as HUMAN
+from experiments.replaying.record_checks import Mismatch
 from experiments.replaying.replayer import Replayer
-from experiments.replaying.run_record import Mismatch
 from experiments.runs.phases import FLYTHROUGH, TASK, TRAINING, phases_of
 from experiments.runs.records import EVENTS, PHASE_ENDED, Event, read_events
 from experiments.runs.records import TRAINING as TRAINING_FOLDER

@@ -4,7 +4,8 @@ from typing import Never
 
 from experiments.errors import RecordError
 from experiments.participants.base import WAIT, Decision, Moves, Percept
-from experiments.replaying.run_record import Mismatch, RunRecord
+from experiments.replaying.record_checks import Mismatch
+from experiments.replaying.run_record import RunRecord
 from experiments.runs import records
 from experiments.runs.recording import Recording
 from experiments.session.endings import PHYSICS_ERROR, LeaveSession

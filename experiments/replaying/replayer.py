@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from experiments.errors import ReplayError
 from experiments.house import House
 from experiments.replaying.logged_replanner import LoggedReplanner
+from experiments.replaying.record_checks import Mismatch
 from experiments.replaying.recorded_participant import EndOfReplay, RecordedParticipant
-from experiments.replaying.run_record import EXTERNAL, WORLD_EVENTS, Mismatch, RunRecord
+from experiments.replaying.run_record import EXTERNAL, WORLD_EVENTS, RunRecord
 from experiments.runs.recording import Recording, provenance
 from experiments.runs.records import RECORDING, Event, EventLog
 from experiments.session.assistant import Assistant

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from experiments.replaying.comparison import simulated_mismatches
 from experiments.replaying.derived_files import checksum_mismatches, derived_mismatches
 from experiments.replaying.phases import phase_mismatches
+from experiments.replaying.record_checks import Mismatch
 from experiments.replaying.replayer import Replayer
-from experiments.replaying.run_record import Mismatch, RunRecord
+from experiments.replaying.run_record import RunRecord
 from experiments.runs import records
 from experiments.runs.checksums import CHECKSUMS
 

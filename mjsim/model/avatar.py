@@ -22,6 +22,7 @@ import mujoco
 import numpy as np
 
 from mjsim.errors import AssetError
+from mjsim.model.hand_look import draw_hand
 from mjsim.person_parameters import PersonParameters
 
 STATIC_BIT = 1
@@ -61,9 +62,6 @@ HAND_FORCE = 80.0
 WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
 
 _TORQUESCALE = 10  # index in a weld's data
-_VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
-_GLOVE = (0.93, 0.74, 0.22, 1.0)
-_SLEEVE = (0.24, 0.34, 0.47, 1.0)
 
 
 def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
@@ -254,38 +252,7 @@ def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, 
         )
         _add_actuator(spec, f"{hand}/{axis}", kp=HAND_KP, kv=HAND_KV, force=HAND_FORCE)
     node.add_site(name=f"{PREFIX}{hand}_grip", pos=[0, 0, 0], size=[0.005, 0.005, 0.005], group=4)
-    _draw_hand(node, hand, side)
-
-
-def _draw_hand(node: Any, hand: str, side: float) -> None:
-    """A cleaning glove and a sleeve, shown in first person only; they collide with nothing."""
-
-    def capsule(name: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
-        node.add_geom(
-            name=f"{PREFIX}{hand}_{name}",
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            size=[radius, 0, 0],
-            fromto=list(ends),
-            rgba=list(rgba),
-            **_VISUAL,
-        )
-
-    node.add_geom(
-        name=f"{PREFIX}{hand}_palm",
-        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-        size=[0.046, 0.040, 0.019],
-        pos=[-0.012, 0, 0.030],
-        rgba=list(_GLOVE),
-        **_VISUAL,
-    )
-    for i in range(4):
-        y = side * (0.030 - 0.020 * i)
-        x = 0.052 - 0.006 * abs(i - 1)
-        capsule(f"finger_{i}", _GLOVE, 0.0095, 0.02, y, 0.030, x, y, 0.008)
-        capsule(f"tip_{i}", _GLOVE, 0.0088, x, y, 0.008, x - 0.004, y, -0.022)
-    capsule("thumb", _GLOVE, 0.0105, -0.03, -side * 0.030, 0.024, 0.012, -side * 0.048, -0.012)
-    capsule("cuff", _GLOVE, 0.033, -0.045, 0, 0.034, -0.080, side * 0.012, 0.034)
-    capsule("sleeve", _SLEEVE, 0.036, -0.080, side * 0.012, 0.034, -0.150, side * 0.040, 0.030)
+    draw_hand(node, f"{PREFIX}{hand}", side)
 
 
 def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:

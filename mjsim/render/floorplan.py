@@ -14,7 +14,8 @@ from mjsim.model.house import compiled_house
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
-from mjsim.render.rasteriser import MAX_SIDE, TOP_DOWN_GROUPS, DirectionalLight, Rasteriser
+from mjsim.render.rasteriser import TOP_DOWN_GROUPS, Rasteriser
+from mjsim.render.scene_settings import MAX_SIDE, DirectionalLight
 
 _PAPER = 244  # grey level where there is no house
 # Above any house of one storey.

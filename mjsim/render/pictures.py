@@ -14,7 +14,8 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
-from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, DirectionalLight, Rasteriser
+from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Rasteriser
+from mjsim.render.scene_settings import DirectionalLight
 
 SUPERSAMPLING = 3
 # Share of the picture's side that its subject fills.

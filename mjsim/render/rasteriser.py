@@ -1,8 +1,6 @@
 """The rasteriser: a model's GL resources, its scene, and the two kinds of pass drawn from it."""
 
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple, Self
 
 import cv2
@@ -17,30 +15,22 @@ from mjsim.render.culling import outside, without
 from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, blend_hidden, in_view
 from mjsim.render.occlusion import BoxOccluders
 from mjsim.render.profiles import RenderProfile
+from mjsim.render.scene_settings import (
+    DirectionalLight,
+    buffer_settings,
+    checked_size,
+    set_flags,
+    set_lights,
+    visual_option,
+)
 from mjsim.render.shadows import ContactShadows
 
 FIRST_PERSON_GROUPS = (0, 1, 2)
 TOP_DOWN_GROUPS = (0, 2)
-MAX_SIDE = 8192
 
 _Flag = mujoco.mjtRndFlag
 _BACKGROUND = -1
 _FAR_UP = 1e4  # m; nothing up there throws a spot on the floor
-
-
-@dataclass(frozen=True)
-class DirectionalLight:
-    """A light at infinity that replaces the model's lights.
-
-    Attributes:
-        direction: Where its rays travel, any length.
-        diffuse: Strength where it falls upright.
-        ambient: Strength everywhere.
-    """
-
-    direction: tuple[float, float, float]
-    diffuse: float
-    ambient: float = 0.0
 
 
 class Layer(NamedTuple):
@@ -84,7 +74,7 @@ class Rasteriser:
         self._lights = lights
         scale = profile.supersampling
         self._drawn = checked_size(round(width * scale)), checked_size(round(height * scale))
-        self._option = _visual_option(groups, profile)
+        self._option = visual_option(groups, profile)
         shown = np.isin(model.geom_group, list(groups))
         self._occluders = BoxOccluders(model, shown)
         self._shadows = ContactShadows(model, shown) if profile.contact_shadows else None
@@ -145,12 +135,12 @@ class Rasteriser:
         category = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(self._model, data, self._option, None, self._camera, category, self._scene)
         if self._lights is not None:
-            _set_lights(self._scene, self._lights)
+            set_lights(self._scene, self._lights)
 
     def colour(self, view: View, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
         """Frame (height, width, 3) of the scene as last updated, rows from the top."""
         scene, model_geoms = self._scene, self._scene.ngeom
-        _set_flags(scene, self._profile)
+        set_flags(scene, self._profile)
         view.aim(scene)
         try:
             if self._shadows is not None:
@@ -207,7 +197,7 @@ class Rasteriser:
             lowest: Whether this is the lowest layer, which has the sky and the dark spots under objects.
         """
         scene, model_geoms = self._scene, self._scene.ngeom
-        _set_flags(scene, self._profile)
+        set_flags(scene, self._profile)
         scene.flags[_Flag.mjRND_SKYBOX] &= lowest
         view.aim(scene)
         layer = Layer(np.empty_like(self._colour), np.empty(self._colour.shape[:2], np.float32))
@@ -275,59 +265,3 @@ def reduced(drawn: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8
     slight = drawn.shape[1] < 1.5 * size[0]
     method = cv2.INTER_LINEAR_EXACT if slight else cv2.INTER_AREA
     return np.asarray(cv2.flip(cv2.resize(drawn, size, interpolation=method), 0), dtype=np.uint8)
-
-
-def checked_size(pixels: int) -> int:
-    """The number itself.
-
-    Raises:
-        RenderError: It is no integer from 1 to `MAX_SIDE`.
-    """
-    if not isinstance(pixels, int | np.integer) or not 1 <= pixels <= MAX_SIDE:
-        raise RenderError(f"frame sides must be integers from 1 to {MAX_SIDE} pixels, got {pixels!r}")
-    return int(pixels)
-
-
-def _visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
-    option = mujoco.MjvOption()
-    option.flags[:] = 0
-    option.flags[mujoco.mjtVisFlag.mjVIS_STATIC] = 1
-    option.flags[mujoco.mjtVisFlag.mjVIS_SKIN] = 1
-    option.flags[mujoco.mjtVisFlag.mjVIS_TEXTURE] = profile.textures
-    option.geomgroup[:] = [group in groups for group in range(len(option.geomgroup))]
-    option.sitegroup[:] = 0
-    return option
-
-
-@contextmanager
-def buffer_settings(model: Any, size: tuple[int, int], samples: int, shadow_size: int) -> Iterator[None]:
-    """Lend the model other buffer sizes, px, which a MuJoCo context only reads from its model."""
-    general, quality = model.vis.global_, model.vis.quality
-    kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
-    general.offwidth, general.offheight = size
-    quality.offsamples, quality.shadowsize = samples, shadow_size
-    try:
-        yield
-    finally:
-        general.offwidth, general.offheight, quality.offsamples, quality.shadowsize = kept
-
-
-def _set_flags(scene: Any, profile: RenderProfile) -> None:
-    scene.flags[:] = 0
-    scene.flags[_Flag.mjRND_CULL_FACE] = 1
-    scene.flags[_Flag.mjRND_SHADOW] = profile.shadow_size > 0
-    scene.flags[_Flag.mjRND_REFLECTION] = profile.reflections
-    scene.flags[_Flag.mjRND_SKYBOX] = profile.skybox
-
-
-def _set_lights(scene: Any, lights: Sequence[DirectionalLight]) -> None:
-    scene.nlight = len(lights)
-    for target, light in zip(scene.lights, lights, strict=False):
-        direction = np.array(light.direction, dtype=np.float64)
-        target.headlight = 0
-        target.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-        target.pos, target.dir = np.zeros(3), direction / np.linalg.norm(direction)
-        target.attenuation = (1.0, 0.0, 0.0)
-        target.ambient, target.diffuse = (light.ambient,) * 3, (light.diffuse,) * 3
-        target.specular = (0.0,) * 3
-        target.castshadow = 0

@@ -1,0 +1,90 @@
+"""What MuJoCo's renderer is told: which geoms, which lights, which effects, how large the buffers."""
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjsim.errors import RenderError
+from mjsim.render.profiles import RenderProfile
+
+MAX_SIDE = 8192
+
+_Flag = mujoco.mjtRndFlag
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """A light at infinity that replaces the model's lights.
+
+    Attributes:
+        direction: Where its rays travel, any length.
+        diffuse: Strength where it falls upright.
+        ambient: Strength everywhere.
+    """
+
+    direction: tuple[float, float, float]
+    diffuse: float
+    ambient: float = 0.0
+
+
+def checked_size(pixels: int) -> int:
+    """The number itself.
+
+    Raises:
+        RenderError: It is no integer from 1 to `MAX_SIDE`.
+    """
+    if not isinstance(pixels, int | np.integer) or not 1 <= pixels <= MAX_SIDE:
+        raise RenderError(f"frame sides must be integers from 1 to {MAX_SIDE} pixels, got {pixels!r}")
+    return int(pixels)
+
+
+def visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
+    """Which geoms are drawn, and how."""
+    option = mujoco.MjvOption()
+    option.flags[:] = 0
+    option.flags[mujoco.mjtVisFlag.mjVIS_STATIC] = 1
+    option.flags[mujoco.mjtVisFlag.mjVIS_SKIN] = 1
+    option.flags[mujoco.mjtVisFlag.mjVIS_TEXTURE] = profile.textures
+    option.geomgroup[:] = [group in groups for group in range(len(option.geomgroup))]
+    option.sitegroup[:] = 0
+    return option
+
+
+@contextmanager
+def buffer_settings(model: Any, size: tuple[int, int], samples: int, shadow_size: int) -> Iterator[None]:
+    """Lend the model other buffer sizes, px, which a MuJoCo context only reads from its model."""
+    general, quality = model.vis.global_, model.vis.quality
+    kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
+    general.offwidth, general.offheight = size
+    quality.offsamples, quality.shadowsize = samples, shadow_size
+    try:
+        yield
+    finally:
+        general.offwidth, general.offheight, quality.offsamples, quality.shadowsize = kept
+
+
+def set_flags(scene: Any, profile: RenderProfile) -> None:
+    """Set what of a profile is drawn, on a MuJoCo scene."""
+    scene.flags[:] = 0
+    scene.flags[_Flag.mjRND_CULL_FACE] = 1
+    scene.flags[_Flag.mjRND_SHADOW] = profile.shadow_size > 0
+    scene.flags[_Flag.mjRND_REFLECTION] = profile.reflections
+    scene.flags[_Flag.mjRND_SKYBOX] = profile.skybox
+
+
+def set_lights(scene: Any, lights: Sequence[DirectionalLight]) -> None:
+    """Replace the lights of a MuJoCo scene."""
+    scene.nlight = len(lights)
+    for target, light in zip(scene.lights, lights, strict=False):
+        direction = np.array(light.direction, dtype=np.float64)
+        target.headlight = 0
+        target.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        target.pos, target.dir = np.zeros(3), direction / np.linalg.norm(direction)
+        target.attenuation = (1.0, 0.0, 0.0)
+        target.ambient, target.diffuse = (light.ambient,) * 3, (light.diffuse,) * 3
+        target.specular = (0.0,) * 3
+        target.castshadow = 0
