@@ -133,7 +133,7 @@ class TaskBoard:
         opacity = fade(time - since)
         if opacity <= 0:
             return None
-        if name is None:
+        if name is None or name not in self.episode.targets:
             return message(key, opacity=opacity)
         receptacle = self.house.catalogue.receptacles[self.episode.targets[name]]
         return message(key, object=self._label(name), receptacle=receptacle.label, opacity=opacity)

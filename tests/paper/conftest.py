@@ -3,12 +3,22 @@
 import pytest
 
 from experiments.house import House
+from mjsim.render import render_pictures
 from paper.sessions import Played, play
 
 
 @pytest.fixture(scope="session")
 def house() -> House:
     return House.load()
+
+
+@pytest.fixture(scope="session")
+def pictures(house: House):
+    """The pictures of the lists, drawn once for all frames of these tests."""
+    found = render_pictures(house.catalogue)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.session.first_person.render_pictures", lambda _: dict(found))
+        yield found
 
 
 @pytest.fixture(scope="session")

@@ -22,10 +22,10 @@ class Recorder:
     def __init__(self) -> None:
         self.shown: list[tuple[Observation, HudState]] = []
 
-    def camera(self, world: World) -> None:
+    def camera(self, world: World) -> None:  # noqa: ARG002 - a viewer
         return None
 
-    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002
         self.shown.append((observation, hud_state))
 
 
@@ -46,7 +46,9 @@ class Played:
         return next((o, s) for o, s in self.shown if o.time >= time - 1e-6)
 
 
-def opened(house: House, assistance: str, viewer: Any = None, **options: Any) -> tuple[Session, World, EventLog]:
+def opened(
+    house: House, assistance: str, viewer: Any = None, **options: Any
+) -> tuple[Session, World, EventLog]:
     settings = {"objects": 6, "seed": 3, "fidelity": "event", "regret": False, **options}
     config = TrialConfig(assistance=assistance, **settings)
     scene, log = compose(trial_episode(config, house), house.catalogue), EventLog()

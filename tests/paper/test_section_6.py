@@ -1,0 +1,72 @@
+"""Section 6, the metrics: each test is a sentence of docs/paper.md, worked out anew from what was seen."""
+
+import numpy as np
+import pytest
+
+from experiments.runs.metrics import compute_metrics
+
+
+@pytest.fixture(params=["followed", "own_way"])
+def measured(request):
+    played = request.getfixturevalue(request.param)
+    positions = np.array([observation.position for observation, _ in played.shown])
+    return played, positions, compute_metrics(played.events, played.session.trajectory.arrays()["position"])
+
+
+def test_task_distance_is_what_was_walked(measured):
+    _, positions, metrics = measured
+    walked = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
+    assert metrics.task_distance_m == pytest.approx(walked, rel=0.01)
+
+
+def test_normalized_deviations_count_visits_that_differ_from_the_replanned_next_one(measured):
+    """The suggestion is read off the list that was shown before each visit."""
+    played, _, metrics = measured
+    labels = {o.name: o.model for o in played.world.scene.episode.objects}
+    different = 0
+    for event in played.of("visit"):
+        before = [state for o, state in played.shown if o.time < event["t"] - 1e-6][-1]
+        current = next(item for item in before.checklist if item.current)
+        kind = "pick" if current.detail.startswith("Pick up") else "place"
+        model = (current.picture or "").removeprefix("object:")
+        different += (kind, model) != (event["kind"], labels[event["object"]])
+    assert metrics.nd_strict_2n == pytest.approx(different / 12, abs=1e-9)
+
+
+def test_inverse_path_length_is_the_distance_between_locations_over_what_was_walked(measured, house):
+    """Locations: the start, where an object lay, where one stands at its bin; d is the geodesic."""
+    played, positions, metrics = measured
+    here = played.shown[0][0].position
+    total = 0.0
+    for event in played.of("visit"):
+        before = [
+            o for o, _ in played.shown if o.time < event["t"] - 1e-6 and event["object"] not in o.carried
+        ]
+        if event["kind"] == "pick":
+            place = before[-1].object_positions[before[-1].object_names.index(event["object"]), :2]
+        else:
+            place = house.receptacles[played.world.scene.episode.targets[event["object"]]].approach
+        total += house.geodesics.shortest_path(here, place).geodesic_distance
+        here = place
+    walked = np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()
+    assert metrics.ipl_locations == pytest.approx(total / walked, rel=0.05)
+
+
+def test_completion_time_is_over_the_own_fly_through(own_way):
+    events = [
+        own_way.events[0],
+        {"t": 0.0, "event": "phase_ended", "phase": "flythrough", "duration_s": 50.0},
+        *own_way.events[1:],
+    ]
+    metrics = compute_metrics(events, own_way.session.trajectory.arrays()["position"])
+    assert metrics.completion_over_familiarisation == own_way.events[-1]["t"] / 50.0
+    assert metrics.completion_time_s == own_way.events[-1]["t"]
+
+
+def test_deviations_rise_and_path_efficiency_falls_for_who_goes_an_own_way(followed, own_way):
+    one, other = (
+        compute_metrics(played.events, played.session.trajectory.arrays()["position"])
+        for played in (followed, own_way)
+    )
+    assert one.nd_strict_2n < other.nd_strict_2n
+    assert one.ipl_locations > other.ipl_locations or one.task_distance_m < other.task_distance_m
