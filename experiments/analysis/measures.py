@@ -4,7 +4,6 @@ import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from experiments.errors import RecordError
 from experiments.studies import FOLDER
 
 FILE = FOLDER / "metrics.toml"
@@ -64,17 +63,11 @@ def read_measures() -> Measures:
     return Measures(objective, file["likert"], bounds["pair"], bounds["eta_squared"])
 
 
-def resolve(measure: Measure, known: Collection[str]) -> str:
-    """The column of a measure in a table.
+def resolve(measure: Measure, known: Collection[str]) -> str | None:
+    """The column of a measure in a table; None where nobody has a value.
 
     Args:
         measure: The measure.
         known: Columns in which somebody has a value.
-
-    Raises:
-        RecordError: Nobody has a value; the message names the column.
     """
-    for column in (measure.column, measure.without):
-        if column is not None and column in known:
-            return column
-    raise RecordError(f"nobody has a value of {measure.column} ({measure.label.lower()})")
+    return next((c for c in (measure.column, measure.without) if c is not None and c in known), None)

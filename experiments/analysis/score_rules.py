@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f, f_oneway
+from scipy.stats import f
 
 from experiments.analysis.published import Direction, Published
-from experiments.analysis.statistics.anova import Values, check_groups, two_way_statistics
+from experiments.analysis.statistics.anova import Values, one_way_statistic, two_way_statistics
 from experiments.analysis.statistics.effects import ALPHA, partial_eta_squared
 from experiments.analysis.statistics.pairs import tukey_differs
 from experiments.analysis.study_table import StudyTable
@@ -68,10 +68,8 @@ def tests_of(table: StudyTable, measure: str, objects: int | None) -> dict[str, 
             for name, (statistic, df1, df2) in zip(EFFECTS, tests, strict=True)
         }
     groups = table.groups(measure, objects)
-    check_groups(groups)
-    people = sum(map(len, groups.values()))
-    statistic = float(f_oneway(*groups.values()).statistic)
-    return {"assistance": Found(statistic, (len(groups) - 1, people - len(groups)), people)}
+    statistic, df1, df2 = one_way_statistic(groups)
+    return {"assistance": Found(statistic, (df1, df2), sum(map(len, groups.values())))}
 
 
 def points(table: StudyTable, row: Direction) -> bool:

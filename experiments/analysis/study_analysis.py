@@ -127,8 +127,9 @@ def _one_way(table: StudyTable, measures: Measures, name: str, objects: int) -> 
         _attempt(name, "one-way", objects, partial(one_way, groups)),
         _attempt(name, "welch", objects, partial(welch, groups)),
         _attempt(name, "brown-forsythe", objects, partial(brown_forsythe, groups)),
-        _attempt(name, "pairs", objects, partial(compare_pairs, groups, measures.pair_bound)),
     ]
+    if name in measures.objective:
+        results.append(_attempt(name, "pairs", objects, partial(compare_pairs, groups, measures.pair_bound)))
     test = results[0].value
     if test is not None:
         size = detectable_eta_squared(test.df1, test.df2, test.people)

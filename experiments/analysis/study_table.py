@@ -108,23 +108,18 @@ def study_table(rows: Sequence[Mapping[str, Any]], measures: Measures, path: Pat
         RecordError: A value cannot be; the message names it.
     """
     _check_design(rows, path)
-    known = {name for name in rows[0] if any(_is_known(row.get(name)) for row in rows)}
+    numbers = {column: _numbers(rows, column, path) for column in _candidates(measures) if column in rows[0]}
+    known = {column for column, values in numbers.items() if not np.isnan(values).all()}
     sources = {}
     for name, measure in measures.objective.items():
-        try:
-            sources[name] = resolve(measure, known)
-        except RecordError:
-            continue
+        if (column := resolve(measure, known)) is not None:
+            sources[name] = column
         sources |= {other: other for other in measure.others if other in known}
-    sources |= {
-        LIKERT_PREFIX + name: LIKERT_PREFIX + name
-        for name in measures.likert
-        if LIKERT_PREFIX + name in known
-    }
+    sources |= {name: name for name in _likert_columns(measures) if name in known}
     if not sources:
         wanted = ", ".join(m.column for m in measures.objective.values())
         raise RecordError(f"{path} has none of the measures {wanted}")
-    columns = {name: _numbers(rows, column, path) for name, column in sources.items()}
+    columns = {name: numbers[column] for name, column in sources.items()}
     origin, answers = _origin(rows), [name for name in columns if name.startswith(LIKERT_PREFIX)]
     if origin != RECORDED and answers:
         raise RecordError(f"{path} has answers of simulated people ({answers[0]}); nothing simulates answers")
@@ -150,8 +145,16 @@ def _check_design(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
             raise RecordError(f"{path}: row {k} has {row['objects']!r} objects, not a whole number from 1 on")
 
 
-def _is_known(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _likert_columns(measures: Measures) -> list[str]:
+    return [LIKERT_PREFIX + name for name in measures.likert]
+
+
+def _candidates(measures: Measures) -> list[str]:
+    """All columns that may be analysed."""
+    objective = [
+        c for m in measures.objective.values() for c in (m.column, m.without, *m.others) if c is not None
+    ]
+    return [*objective, *_likert_columns(measures)]
 
 
 def _numbers(rows: Sequence[Mapping[str, Any]], column: str, path: Path) -> NDArray[np.float64]:

@@ -58,10 +58,14 @@ def one_way(groups: Mapping[str, Values]) -> FTest:
     Raises:
         StatisticsError: The groups cannot be compared.
     """
+    return FTest.of(*one_way_statistic(groups), sum(len(v) for v in groups.values()))
+
+
+def one_way_statistic(groups: Mapping[str, Values]) -> tuple[float, int, int]:
+    """As `one_way`, but F and its degrees of freedom alone."""
     check_groups(groups)
     people = sum(len(v) for v in groups.values())
-    statistic = float(stats.f_oneway(*groups.values()).statistic)
-    return FTest.of(statistic, len(groups) - 1, people - len(groups), people)
+    return float(stats.f_oneway(*groups.values()).statistic), len(groups) - 1, people - len(groups)
 
 
 def welch(groups: Mapping[str, Values]) -> FTest:
@@ -95,7 +99,8 @@ def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
     """
     check_groups(groups, least=2)
     people = sum(len(v) for v in groups.values())
-    statistic = float(stats.levene(*groups.values(), center="median").statistic)
+    with np.errstate(divide="ignore", invalid="ignore"):  # said below
+        statistic = float(stats.levene(*groups.values(), center="median").statistic)
     if not np.isfinite(statistic):
         raise StatisticsError("the distances from the median do not vary within any group")
     return FTest.of(statistic, len(groups) - 1, people - len(groups), people)

@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.commands.options import HelpFormatter
 
-SUBCOMMANDS = ("analyze", "score")  # a module each, with `add_parser(commands)`
+SUBCOMMANDS = ("analyze", "score", "power")  # a module each, with `add_parser(commands)`
 
 DESCRIPTION = """\
 Studies: who took part, what was found, how it compares with the published study, how many people the next one needs.
