@@ -88,3 +88,13 @@ def test_a_full_disk_leaves_whole_records(tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, before)
     assert list(read_journal(path)) == [b"x" * 100] * 4 + [b"after"]
+
+
+def test_a_journal_belongs_to_one_process_at_a_time(tmp_path, monkeypatch):
+    path = tmp_path / "journal"
+    with Journal(path):
+        monkeypatch.setattr("experiments.web.journal.LOCK_PATIENCE", 0.1)
+        with pytest.raises(RecordError, match="in use by another process"):
+            Journal(path)
+    with Journal(path) as journal:
+        assert journal.records == ()

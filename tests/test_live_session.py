@@ -60,6 +60,12 @@ def play(folder, house, batches, *, config=None):
     return session
 
 
+def crash(session):
+    """Leave a session as the death of its process does."""
+    session.close()
+    session._journal.close()
+
+
 def state(session):
     shown = session.session.assistant.hud_state(session.world.observation())
     return (
@@ -92,7 +98,7 @@ def test_the_run_directory_of_a_session_replays(house, tmp_path, crashes):
     batches = list(wandering(5, 260))
     session = play(tmp_path / "session", house, batches[: crashes[0] if crashes else 260], config=CONFIG)
     for first, end in itertools.pairwise((*crashes, 260)):
-        session.close()
+        crash(session)
         session = play(tmp_path / "session", house, batches[first:end])
     session.end("interrupted")
     config, scene, result = result_of(read_journal(tmp_path / "session" / "journal.bin"), house)

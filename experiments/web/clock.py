@@ -22,7 +22,12 @@ class Clock:
         self._sync = _Sync(sync, connection)
 
     def run(self) -> str | None:
-        """Why the session is over; None if the server is gone."""
+        """Why the session is over; None if the server is gone.
+
+        Raises:
+            PhysicsError: The physics failed.
+            OSError: The journal cannot be written.
+        """
         live, inbox = self._live, self._inbox
         deadline, paused = time.monotonic(), False
         try:
@@ -43,6 +48,7 @@ class Clock:
                 deadline = self._step_at(deadline)
         finally:
             self._sync.close()
+        self._sync.check()
         return reason
 
     def _step_at(self, deadline: float) -> float:
@@ -55,7 +61,10 @@ class Clock:
             deadline += late
         elif late > LATE:
             self._live.session.note("overrun", seconds=round(late, 3), skipped=False)
+        self._sync.check()
         self._live.step(self._inbox.take())
+        if self._live.end_reason is None:
+            self._live.session.show()  # what the inputs led to is on its way a control step earlier
         self._sync.request(self._live.input, self._live.session.recording.step)
         return deadline + self._live.world.control_timestep
 
@@ -77,6 +86,7 @@ class _Sync:
         self._sync, self._connection = sync, connection
         self._changed = threading.Condition()
         self._wanted: tuple[int, int] | None = None
+        self._error: OSError | None = None
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
@@ -86,6 +96,15 @@ class _Sync:
         with self._changed:
             self._wanted = number, step
             self._changed.notify()
+
+    def check(self) -> None:
+        """Nothing goes on that cannot be kept.
+
+        Raises:
+            OSError: The disk did not take what was written.
+        """
+        if self._error is not None:
+            raise self._error
 
     def close(self) -> None:
         """Write through what is left."""
@@ -101,5 +120,9 @@ class _Sync:
                 if self._wanted is None:
                     return
                 (number, step), self._wanted = self._wanted, None
-            self._sync()
+            try:
+                self._sync()
+            except OSError as error:
+                self._error = error
+                return
             self._connection.send(messages.Taken(number, step))

@@ -4,8 +4,11 @@ What is in it when `sync` returns survives the death of the process and of the m
 either is dropped when the journal is opened again.
 """
 
+import errno
+import fcntl
 import os
 import struct
+import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,10 +20,11 @@ JOURNAL = "journal.bin"  # in the folder of a session
 MAGIC = b"mjsim journal 1\n"
 _HEAD = struct.Struct("<II")  # length of the record, bytes, and its CRC-32
 MAX_RECORD = 64 * 1024 * 1024  # bytes
+LOCK_PATIENCE = 10.0  # s that a process which had the journal open has to end
 
 
 class Journal:
-    """A journal that is open for appending; the file is made if it is not there.
+    """A journal that is open for appending, by one process at a time; the file is made if it is not there.
 
     Args:
         path: The file.
@@ -29,13 +33,14 @@ class Journal:
         records: The records that were there when it was opened.
 
     Raises:
-        RecordError: The file is no journal.
+        RecordError: The file is no journal, or another process keeps it open.
         OSError: It cannot be read or written.
     """
 
     def __init__(self, path: Path) -> None:
         self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
         try:
+            _lock(self._file, path)
             content = path.read_bytes()
             self.records = tuple(_records(content, path))
             intact = len(MAGIC) + sum(_HEAD.size + len(record) for record in self.records)
@@ -111,6 +116,21 @@ def _records(content: bytes, path: Path) -> Iterator[bytes]:
             return
         yield record
         place += _HEAD.size + length
+
+
+def _lock(file: int, path: Path) -> None:
+    """Wait until no other process has the file open: one that lost its server takes a moment to notice."""
+    until = time.monotonic() + LOCK_PATIENCE
+    while True:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except OSError as error:
+            if error.errno not in (errno.EAGAIN, errno.EACCES):
+                raise
+            if time.monotonic() > until:
+                raise RecordError(f"{path} is in use by another process; end that process") from error
+        time.sleep(0.02)
 
 
 def _write(file: int, content: bytes) -> None:

@@ -154,9 +154,11 @@ class LiveSession:
             if new.scroll:
                 self.session.scroll(new.scroll)
         self._human.inputs = inputs
-        self.input = inputs[-1].number if inputs else self.input
         lines, number = self._new_lines(), self.session.recording.step
         self.session.advance()
+        self.input = (
+            inputs[-1].number if inputs else self.input
+        )  # only now: the step began by showing the state before it
         self._append_step(lines, number)
 
     def end(self, reason: str) -> None:
