@@ -1,0 +1,230 @@
+"""A browser as `mjsim play` sees it: its socket, its numbered inputs, and a link that may be slow and lossy."""
+
+import asyncio
+import json
+import secrets
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from benchmarks.support.play_server import PATIENCE
+from experiments.web.protocol import FRAME_HEAD
+
+RETRANSMISSION = 0.2  # s that a lost packet costs, as TCP sends it again
+BATCH = 64  # inputs of one message
+
+
+@dataclass(frozen=True)
+class Link:
+    """What a network does to messages, each way.
+
+    Attributes:
+        latency: s.
+        jitter: Standard deviation of what comes on top, s.
+        loss: Share of messages that are lost and sent again.
+    """
+
+    latency: float = 0.0
+    jitter: float = 0.0
+    loss: float = 0.0
+
+    def delay(self, rng: np.random.Generator) -> float:
+        """What a message takes, s."""
+        lost = RETRANSMISSION * (rng.geometric(1.0 - self.loss) - 1) if self.loss else 0.0
+        return self.latency + abs(float(rng.normal(0.0, self.jitter))) + float(lost)
+
+
+@dataclass(frozen=True)
+class SeenFrame:
+    """A frame that arrived.
+
+    Attributes:
+        at: When, as `time.perf_counter` has it.
+        input: Number of the last input that counts in it.
+        size: Bytes.
+    """
+
+    at: float
+    input: int
+    size: int
+
+
+class SimulatedBrowser:
+    """Plays through a socket as the page does, and keeps what was not acknowledged, to send it again.
+
+    Args:
+        address: Of the visit.
+        codec: `jpeg`, `h264` or `none`.
+        state: Whether to ask for states.
+        link: What the network does.
+        seed: Of the network's chance.
+
+    Attributes:
+        next: Number of the next input.
+        acknowledged: Number of the last input that is safe.
+        frames: Those that came.
+        last: Type -> the latest message of it.
+        sent_at: Number of an input -> when it was sent.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        codec: str = "none",
+        state: bool = False,
+        link: Link | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.address = address
+        self._tab = secrets.token_hex(8)
+        self._view = {"type": "view", "width": 640, "height": 480, "codec": codec, "state": state}
+        self._link, self._rng = link or Link(), np.random.default_rng(seed)
+        self._changed = asyncio.Condition()
+        self._tasks: list[asyncio.Task[None]] = []
+        self._out: asyncio.Queue[tuple[float, str]] = asyncio.Queue()
+        self._waiting: list[dict[str, Any]] = []
+        self._socket: ClientConnection | None = None
+        self.next, self.acknowledged, self.bytes = 1, 0, 0
+        self.frames: list[SeenFrame] = []
+        self.last: dict[str, dict[str, Any]] = {}
+        self.sent_at: dict[int, float] = {}
+
+    async def open(self, phase: str) -> None:
+        """Connect, and say hello."""
+        parts = urlsplit(self.address)
+        self.last.clear()
+        self._out = asyncio.Queue()
+        self._socket = await connect(
+            f"ws://{parts.netloc}{parts.path}",
+            origin=f"http://{parts.netloc}",  # type: ignore[arg-type]
+            max_size=None,
+            compression=None,
+            open_timeout=PATIENCE,
+        )
+        self._tasks = [asyncio.create_task(self._send_all()), asyncio.create_task(self._receive_all())]
+        self.say(type="hello", tab=self._tab, phase=phase, view=self._view)
+
+    async def cut(self) -> None:
+        """Lose the connection, without a word to the server."""
+        if self._socket is not None:
+            self._socket.transport.abort()
+        await self._end()
+
+    async def close(self) -> None:
+        """Close the connection."""
+        if self._socket is not None:
+            await self._socket.close()
+        await self._end()
+
+    def reload(self) -> None:
+        """Forget all that a page forgets when it is loaded again."""
+        self._waiting, self._tab = [], secrets.token_hex(8)
+
+    def say(self, **message: Any) -> None:
+        """Send a message."""
+        due = time.perf_counter() + self._link.delay(self._rng)
+        self._out.put_nowait((due, json.dumps(message)))
+
+    def press(self, **values: Any) -> int:
+        """Send an input; its number."""
+        number, self.next = self.next, self.next + 1
+        new = {"number": number, **values}
+        self._waiting.append(new)
+        self.sent_at[number] = time.perf_counter()
+        self.say(type="inputs", inputs=[new])
+        return number
+
+    async def until(self, holds: Callable[[], bool], seconds: float = PATIENCE) -> None:
+        """Wait until something holds.
+
+        Raises:
+            TimeoutError: It does not.
+        """
+
+        async def wait() -> None:
+            async with self._changed:
+                await self._changed.wait_for(holds)
+
+        await asyncio.wait_for(wait(), seconds)
+
+    async def ready(self) -> dict[str, Any]:
+        """Wait until the session is ready and runs; what was not acknowledged is sent again."""
+        await self.until(lambda: "ready" in self.last)
+        ready = self.last["ready"]
+        if not ready["begun"]:
+            self.say(type="begin")
+        self.say(type="resume")
+        self._waiting = [new for new in self._waiting if new["number"] > ready["input"]]
+        self.next = max([ready["input"], *(new["number"] for new in self._waiting)]) + 1
+        for first in range(0, len(self._waiting), BATCH):
+            self.say(type="inputs", inputs=self._waiting[first : first + BATCH])
+        return ready
+
+    async def taken(self) -> None:
+        """Wait until all inputs are acknowledged."""
+        await self.until(lambda: self.acknowledged >= self.next - 1)
+
+    async def leave(self) -> None:
+        """End the session, and disconnect."""
+        self.last.pop("over", None)
+        self.say(type="leave")
+        await self.until(lambda: "over" in self.last)
+        await self.close()
+
+    async def _send_all(self) -> None:
+        with suppress(ConnectionClosed):
+            while self._socket is not None:
+                due, text = await self._out.get()
+                await asyncio.sleep(max(0.0, due - time.perf_counter()))
+                await self._socket.send(text)
+
+    async def _receive_all(self) -> None:
+        with suppress(ConnectionClosed):
+            while self._socket is not None:
+                message = await self._socket.recv()
+                delay = self._link.delay(self._rng)
+                if delay:
+                    await asyncio.sleep(delay)
+                self._take(message)
+                async with self._changed:
+                    self._changed.notify_all()
+        self.last["closed"] = {}
+        async with self._changed:
+            self._changed.notify_all()
+
+    def _take(self, message: str | bytes) -> None:
+        self.bytes += len(message)
+        if isinstance(message, bytes):
+            _, _, _, _, _, _, number, _, shown, _ = FRAME_HEAD.unpack_from(message)
+            self.frames.append(SeenFrame(time.perf_counter(), shown, len(message)))
+            self.say(type="seen", frame=number)
+            return
+        content = json.loads(message)
+        self.last[content["type"]] = content
+        if content["type"] == "taken":
+            self.acknowledged = max(self.acknowledged, content["input"])
+            self._waiting = [new for new in self._waiting if new["number"] > content["input"]]
+
+    async def _end(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
+        self._socket = None
+
+
+async def begin_task(browser: SimulatedBrowser) -> None:
+    """Skip the training, and start the task."""
+    await browser.open("training")
+    await browser.until(lambda: "ready" in browser.last)
+    await browser.leave()
+    await browser.open("task")
+    await browser.ready()

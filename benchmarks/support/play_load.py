@@ -1,0 +1,127 @@
+"""How fast `mjsim play` answers, what a session costs, and whether hours of play leave anything behind."""
+
+import asyncio
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.support.play_browser import Link, SimulatedBrowser, begin_task
+from benchmarks.support.play_server import PATIENCE, PlayProcess, memory, processor_time
+
+PERIOD = 0.25  # s between two inputs
+MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
+SAMPLES = 12  # of the memory
+WARMING_UP = 0.25  # share of the masher's time whose memory does not count
+
+
+def measure_latency(folder: Path, seconds: float, *words: str) -> dict[str, Any]:
+    """From an input to the frame that shows it, frames a second and bandwidth, for codecs and links."""
+    cases = {
+        "jpeg": ("jpeg", False, Link()),
+        "h264": ("h264", False, Link()),
+        "state": ("none", True, Link()),
+        "h264, slow link": ("h264", False, MOBILE),
+    }
+    found = {}
+    with PlayProcess(folder, "--sessions", "2", *words) as server:
+        for name, (codec, state, link) in cases.items():
+            found[name] = asyncio.run(_latency(server, seconds, codec, state, link))
+    return found
+
+
+async def _latency(
+    server: PlayProcess, seconds: float, codec: str, state: bool, link: Link
+) -> dict[str, float]:
+    address = server.begin()
+    browser = SimulatedBrowser(address, codec=codec, state=state, link=link)
+    await begin_task(browser)
+    await browser.until(lambda: bool(browser.frames) or codec == "none")
+    await asyncio.sleep(1.0)
+    worker = server.worker_of(server.journal(address, "task"))
+    if worker is None:
+        raise ChildProcessError("no worker has the journal open")
+    browser.frames.clear()
+    browser.bytes, began, first = 0, time.perf_counter(), browser.next
+    processors = [processor_time(pid) for pid in (worker, server.process.pid)]
+    rows = 0
+    while (passed := time.perf_counter() - began) < seconds:
+        rows += 1
+        browser.press(turn=1.0 if rows % 2 else -1.0)
+        await asyncio.sleep(PERIOD)
+    busy = [processor_time(pid) for pid in (worker, server.process.pid)]
+    await browser.taken()
+    trips = [
+        1000.0 * (min(seen.at for seen in browser.frames if seen.input >= number) - browser.sent_at[number])
+        for number in range(first, browser.next)
+        if any(seen.input >= number for seen in browser.frames)
+    ]
+    result = {
+        "fps": len(browser.frames) / passed,
+        "p95_ms": float(np.percentile(trips, 95)) if trips else 0.0,
+        "median_ms": float(np.median(trips)) if trips else 0.0,
+        "kbit_s": 0.008 * browser.bytes / passed,
+        "memory_mb": memory(worker),
+        "cores": (busy[0] - processors[0]) / passed,
+        "server_cores": (busy[1] - processors[1]) / passed,
+    }
+    await browser.leave()
+    return result
+
+
+def measure_masher(folder: Path, minutes: float, seed: int, *words: str) -> dict[str, Any]:
+    """Press keys at random for so long: memory over time, and whether anything is stuck."""
+    with PlayProcess(folder, *words) as server:
+        return asyncio.run(_mash(server, 60.0 * minutes, np.random.default_rng(seed)))
+
+
+async def _mash(server: PlayProcess, seconds: float, rng: np.random.Generator) -> dict[str, Any]:
+    address = server.begin()
+    browser = SimulatedBrowser(address, codec="jpeg", state=True)
+    await browser.open("training")  # it has no limit of time
+    await browser.ready()
+    worker = server.worker_of(server.journal(address, "training"))
+    if worker is None:
+        raise ChildProcessError("no worker has the journal open")
+    memories, began, longest = list[tuple[float, float]](), time.perf_counter(), 0.0
+    while (passed := time.perf_counter() - began) < seconds:
+        if passed >= len(memories) * seconds / SAMPLES:
+            memories.append((memory(worker), memory(server.process.pid)))
+        for _ in range(20):
+            _mash_once(browser, rng)
+            await asyncio.sleep(float(rng.exponential(0.04)))
+        sent = time.perf_counter()
+        await browser.taken()
+        longest = max(longest, time.perf_counter() - sent)
+        if "over" in browser.last:
+            break
+    steady = np.array(memories[max(1, int(WARMING_UP * len(memories))) :])
+    return {
+        "minutes": (time.perf_counter() - began) / 60.0,
+        "inputs": browser.acknowledged,
+        "longest_wait_s": longest,
+        "worker_mb": [round(first, 1) for first, _ in memories],
+        "server_mb": [round(second, 1) for _, second in memories],
+        "growth": [float(g) for g in (steady[-1] - steady[0]) / steady[0]] if len(steady) else [0.0, 0.0],
+        "frames": len(browser.frames),
+        "patience_s": PATIENCE,
+    }
+
+
+def _mash_once(browser: SimulatedBrowser, rng: np.random.Generator) -> None:
+    axes = {name: float(rng.choice([-1.0, 0.0, 1.0])) for name in ("forward", "left", "turn", "look")}
+    more: dict[str, Any] = {}
+    if rng.random() < 0.3:
+        more["yaw"] = float(rng.normal(0.0, 1.0))
+    if rng.random() < 0.2:
+        more["press"] = str(rng.choice(["left hand", "right hand", "act"]))
+    if rng.random() < 0.1:
+        more["scroll"] = int(rng.integers(-3, 4))
+    browser.press(**axes, **more)
+
+
+def load() -> float:
+    """How many processes want to run, for each core."""
+    return os.getloadavg()[0] / (os.cpu_count() or 1)
