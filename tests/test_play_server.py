@@ -448,6 +448,21 @@ def test_an_idle_session_gives_its_place_back(tmp_path, pool, monkeypatch):
     assert pool.discarded
 
 
+def test_a_closed_page_keeps_no_place_from_those_who_wait(tmp_path, monkeypatch, pool):
+    monkeypatch.setattr("experiments.web.sessions.AWAY", 0.1)
+    monkeypatch.setattr("experiments.web.sessions.WATCH_PERIOD", 0.05)
+    with serving(tmp_path, pool) as client:
+        link = begin(client)
+        with connected(client, link) as first:
+            begun(first)
+        with connected(client, begin(client)) as second:
+            second.send_json(hello())
+            until(second, "ready")
+            with connected(client, link) as back:
+                back.send_json(hello())
+                assert until(back, "queue")[-1]["position"] == 1
+
+
 def test_a_damaged_visit_is_named_in_the_log_only(client, tmp_path, caplog):
     token = Visits(tmp_path).create(["training", "task"], TRIALS)
     path = tmp_path / token_hash(token) / VISIT

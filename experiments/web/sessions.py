@@ -17,6 +17,7 @@ LOG = logging.getLogger("mjsim.play")
 DEATHS = 3  # of workers in a row, without an input taken in between, after which a session fails
 QUEUE_PATIENCE = 10.0  # s that a place in the queue is kept without a connection
 WATCH_PERIOD = 5.0  # s between two looks for sessions whose person is gone
+AWAY = 20.0  # s that a place is kept without a page while others wait
 MAX_AHEAD = 1000  # inputs that may be on their way
 FAILED = (
     "The session cannot go on at the moment. Nothing of it is lost: load this page again to try once more."
@@ -90,6 +91,7 @@ class PlayedSession:
         if self.browser is not browser:
             return
         self.browser = None
+        self.heard = time.monotonic()
         self._pause("disconnected")
         if self._position is not None:
             asyncio.get_running_loop().call_later(QUEUE_PATIENCE, self._leave_queue)
@@ -285,7 +287,7 @@ class Sessions:
         """Release sessions whose person is gone, for ever."""
         while True:
             await asyncio.sleep(WATCH_PERIOD)
-            await self.release(lambda session: time.monotonic() - session.heard > self._idle)
+            await self.release(self._idles)
 
     async def release(self, which: Callable[[PlayedSession], bool] = lambda _: True) -> None:
         """Release those sessions, and forget those without a browser."""
@@ -295,6 +297,11 @@ class Sessions:
                 session.browser.close(protocol.IDLE, "idle")
             await session.release()
             self._sessions.pop(session.visit.name, None)
+
+    def _idles(self, session: PlayedSession) -> bool:
+        """Whether nothing was heard of a person for long; not so long where others wait and the page is closed."""
+        closed = session.browser is None and self._places.waiting > 0
+        return time.monotonic() - session.heard > (min(AWAY, self._idle) if closed else self._idle)
 
     def _select(self, which: Callable[[PlayedSession], bool]) -> Sequence[PlayedSession]:
         return [session for session in self._sessions.values() if which(session)]
