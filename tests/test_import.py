@@ -1,6 +1,8 @@
 """`mjsim import`: mesh files of many kinds become objects that follow the conventions, or are refused in one line."""
 
 import json
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from benchmarks.support.placement_sessions import arrange, run_episode
 from experiments import cli
 from experiments.house import House
 from mjsim.errors import AssetError, RenderError
+from mjsim.importing import house_extension
 from mjsim.importing.atlas import SIDE, Atlas
 from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.mesh_import import add_mesh
@@ -390,6 +393,26 @@ def test_a_failure_while_installing_leaves_all_as_it_was(
     with pytest.raises(OSError, match="disk full"):
         add_mesh(brick(tmp_path), extension, entry, ImportOptions(mass=0.4), force=force)
     assert {p: p.read_bytes() for p in own.rglob("*") if p.is_file()} == before
+
+
+def test_an_import_that_was_killed_before_the_catalogue_named_it_is_done_again(tmp_path: Path) -> None:
+    own, entry = tmp_path / "own", Entry.named("brick", "toys")
+    file, extension = brick(tmp_path), HouseExtension(own)
+    child = os.fork()
+    if child == 0:
+        house_extension.write_text_atomically = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+        try:
+            add_mesh(file, extension, entry, ImportOptions())
+        finally:
+            os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+    assert (own / "brick").is_dir() and not (own / "catalogue.toml").exists()
+    add_mesh(file, extension, entry, ImportOptions())
+    assert "brick" in Catalogue.load(str(own / "catalogue.toml")).objects
+    assert sorted(path.name for path in own.iterdir()) == ["brick", "catalogue.toml"]
+    assert not [path for path in (own / "brick").iterdir() if path.name.startswith(".")]
+    with pytest.raises(AssetError, match="already there"):
+        add_mesh(file, extension, entry, ImportOptions())
 
 
 def test_a_folder_that_was_not_imported_is_not_replaced(tmp_path: Path) -> None:

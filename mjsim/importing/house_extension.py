@@ -24,6 +24,7 @@ from mjsim.model.validation.object_rules import check_object
 CATALOGUE = "catalogue.toml"
 HELD = 4  # objects of a kind that a bin has room for, by their boxes
 LONGEST_LABEL = 40
+_UNNAMED = ".unnamed"  # file in the folder of an object that the catalogue does not name yet
 _WALL_GAP = 0.02  # m, between an object and the walls of its bin
 _HEADER = "# Objects that a house has in addition. Run in it with --house and the path of this file.\nextends = {}\n"
 _ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {model}\n"
@@ -114,7 +115,8 @@ class HouseExtension:
             raise AssetError(
                 f"the house already has an object {entry.key!r} ({known.label}); choose another --name"
             )
-        if (known is not None or mine.exists()) and not force:
+        abandoned = known is None and (mine / _UNNAMED).exists()  # an import was killed
+        if (known is not None or mine.exists()) and not (force or abandoned):
             raise AssetError(f"{mine} is already there; choose another --name, or say --force to replace it")
         if mine.exists() and not (mine / MODEL).is_file():
             raise AssetError(f"{mine} is not an imported object and is not replaced; choose another --name")
@@ -174,10 +176,11 @@ class HouseExtension:
         place = self.folder / entry.key
         before = self._text if self._file.exists() else None
         swap = exchange if place.exists() else Path.rename
+        (new / _UNNAMED).touch()
         swap(new, place)
         try:
             write_text_atomically(self._file, self._with(entry))
-            return Catalogue.load(str(self._file))
+            catalogue = Catalogue.load(str(self._file))
         except BaseException:
             swap(place, new)
             if before is None:
@@ -185,6 +188,8 @@ class HouseExtension:
             else:
                 write_text_atomically(self._file, before)
             raise
+        (place / _UNNAMED).unlink()
+        return catalogue
 
     def _with(self, entry: Entry) -> str:
         """The catalogue's text with an entry; one of the same key is replaced, all else stays as it is."""
