@@ -79,9 +79,10 @@ def data_dictionary() -> str:
 
 
 def _metrics_rows() -> Iterator[str]:
-    yield from _rows(_described(TrialConfig, leave_out={"seed", "person"}))
+    yield from _rows(_described(TrialConfig, leave_out={"seed", "person", "behaviour"}))
     yield "| `fingerprint` | str | Hash of the settings and of all else that the trial depends on. |"
     yield from _rows(_described(PersonParameters, leave_out={"motion"}), prefix="person_")
+    yield "| `behaviour_...` | float | Values of the participant model, where it has any (docs/participants.md). |"
     yield from _rows(_described(Metrics))
     for name in HEALTH:
         for statistic, words in _STATISTICS.items():

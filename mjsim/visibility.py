@@ -107,19 +107,84 @@ def visible_objects(
         field: Field of view; None for that of the scene's person.
         among: Instance names to look for; None for all. The fewer, the quicker.
     """
+    seen: set[int] = set()
+    names = scene.index.names
+    rays = _rays(scene, data, eye, heading, pitch, field=field, among=among)
+    for owner, ray in zip(rays.owners.tolist(), rays.vectors, strict=True):
+        if owner not in seen and rays.reaches(owner, ray):
+            seen.add(owner)
+    return tuple(names[i] for i in sorted(seen))
+
+
+def visible_shares(
+    scene: Scene,
+    data: mujoco.MjData,
+    eye: ArrayLike,
+    heading: float,
+    pitch: float = 0.0,
+    *,
+    field: FieldOfView | None = None,
+    among: Collection[str] | None = None,
+) -> dict[str, float]:
+    """How much is seen of each object in view, as the share of its seven rays that reach it: 0 < share <= 1.
+
+    Args:
+        scene: As in `visible_objects`, and so are the other arguments.
+        data: Its state.
+        eye: Eye position, m, shape (3,).
+        heading: Yaw of the gaze, rad.
+        pitch: Elevation of the gaze, rad.
+        field: Field of view; None for that of the scene's person.
+        among: Instance names to look for; None for all.
+    """
+    rays = _rays(scene, data, eye, heading, pitch, field=field, among=among)
+    hits = [o for o, ray in zip(rays.owners.tolist(), rays.vectors, strict=True) if rays.reaches(o, ray)]
+    return {scene.index.names[i]: hits.count(i) / len(OFFSETS) for i in sorted(set(hits))}
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Rays from the eye to objects, none of them certainly behind a wall.
+
+    Attributes:
+        scene: The composed episode.
+        data: Its state.
+        eye: m, (3,).
+        owners: Object of each ray, by its place in the episode's order, (k,).
+        vectors: From the eye, m, (k, 3).
+        person: Which geoms belong to the person, (ngeom,).
+    """
+
+    scene: Scene
+    data: mujoco.MjData
+    eye: NDArray[np.float64]
+    owners: NDArray[np.int64]
+    vectors: NDArray[np.float64]
+    person: NDArray[np.bool_]
+
+    def reaches(self, owner: int, ray: NDArray[np.float64]) -> bool:
+        """Whether a ray (3,) meets its object before anything else."""
+        geom, _ = first_hit(self.scene.model, self.data, self.eye, ray, self.person)
+        return geom >= 0 and bool(self.scene.index.geom_owner[geom] == owner)
+
+
+def _rays(
+    scene: Scene,
+    data: mujoco.MjData,
+    eye: ArrayLike,
+    heading: float,
+    pitch: float,
+    *,
+    field: FieldOfView | None,
+    among: Collection[str] | None,
+) -> _Rays:
     sight = scene.once("sight", lambda: _sight_geometry(scene))
     names = scene.index.names
     looked_for = frozenset(names if among is None else among)
     wanted = np.array([name in looked_for for name in names], np.bool_)
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
-    owners, rays = open_rays(sight, data.geom_xpos, data.geom_xmat, wanted, gaze)
-    seen: set[int] = set()
-    for owner, ray in zip(owners.tolist(), rays, strict=True):
-        if owner not in seen:
-            geom, _ = first_hit(scene.model, data, gaze.eye, ray, sight.person)
-            if geom >= 0 and scene.index.geom_owner[geom] == owner:
-                seen.add(owner)
-    return tuple(names[i] for i in sorted(seen))
+    owners, vectors = open_rays(sight, data.geom_xpos, data.geom_xmat, wanted, gaze)
+    return _Rays(scene, data, gaze.eye, owners, vectors, sight.person)
 
 
 def in_field_of_view(

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.cli import main
+from experiments.distribution import Distribution
 from experiments.errors import ConfigError, ReplayError
 from experiments.house import House
 from experiments.participants.follower import Follower
@@ -20,7 +21,7 @@ from experiments.replaying.run_record import load_run
 from experiments.runs import records
 from experiments.runs.records import EventLog, read_events
 from experiments.trials.design import read_design
-from experiments.trials.person_distribution import Distribution, PersonDistribution
+from experiments.trials.person_distribution import PersonDistribution
 from experiments.trials.trial import draw_person, prepare_session, run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose

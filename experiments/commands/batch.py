@@ -1,18 +1,10 @@
 """`mjsim batch`: the trials of a design on all cores."""
 
 import argparse
-import os
 from pathlib import Path
 from typing import Any
 
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-
+from experiments.commands.batch_progress import add_workers, run_with_progress
 from experiments.commands.options import (
     TRIAL_OPTIONS,
     add_command,
@@ -24,10 +16,9 @@ from experiments.commands.options import (
     trial_options,
 )
 from experiments.commands.person_options import PERSON_OPTIONS
-from experiments.commands.terminal import error_console, progress_bars
+from experiments.commands.terminal import error_console
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
-from experiments.trials.batch import BatchProgress, run_batch
 from experiments.trials.design import Design, counted, factorial, read_design
 
 OBJECTS = 6
@@ -75,13 +66,7 @@ def add_parser(commands: Any) -> None:
         help="seeds, such as 1,2,5 or 0:10, which ends with 9 (default: 0:10)",
     )
     add_trial_options(parser, several_users=True)
-    parser.add_argument(
-        "--workers",
-        type=int,
-        default=os.cpu_count(),
-        metavar="N",
-        help="processes (default: one per core, %(default)s here)",
-    )
+    add_workers(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the batch")
 
 
@@ -106,31 +91,8 @@ def _design(arguments: argparse.Namespace) -> Design:
 def run(arguments: argparse.Namespace) -> int:
     """Run the batch with a progress bar; 1 if a trial failed."""
     design = _design(arguments)
-    console = error_console()
-    columns = (
-        TextColumn("trials"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    failed = 0
-    with progress_bars(console, *columns) as bars:
-        bar = bars.add_task("trials", total=None)
-
-        def show(progress: BatchProgress) -> None:
-            nonlocal failed
-            failed = progress.failed
-            bars.update(bar, total=progress.total, completed=progress.resumed + progress.done + failed)
-            if progress.failure:
-                bars.console.print(f"failed: {progress.failure}", style="red", soft_wrap=True)
-
-        def note(line: str) -> None:
-            bars.console.print(line, style="yellow", soft_wrap=True)
-
-        rows = run_batch(design, arguments.out, workers=arguments.workers, on_progress=show, on_note=note)
-    console.print(
+    rows, failed = run_with_progress(design, arguments.out, arguments.workers)
+    error_console().print(
         f"{counted(len(rows), 'trial')} in {arguments.out}/trials.parquet and .csv; {failed} failed"
     )
     return 1 if failed else 0

@@ -127,6 +127,11 @@ class Percept:
         """Keys of those of the receptacles that are in view at this moment."""
         return frozenset()
 
+    @property
+    def visible_shares(self) -> Mapping[str, float]:
+        """How much is seen of each object in view: the share of the rays to it that nothing blocks, 0 < share <= 1."""
+        return {}
+
     def hud(self) -> HudState | None:
         """What the HUD shows; None without one."""
         return None

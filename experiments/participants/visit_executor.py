@@ -59,8 +59,8 @@ class VisitExecutor:
         path = self._path_to(percept, stand)
         return WalkAlong(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
 
-    def follow(self, percept: Percept, guidance: Guidance) -> Decision:
-        """Walk along the path that is shown, and do what is shown at its end."""
+    def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Decision:
+        """Walk along the path that is shown, and do what is shown at its end; ask again at `until`, s."""
         if percept.busy:
             return WAIT
         self._take_up(percept, guidance.visit)
@@ -71,6 +71,7 @@ class VisitExecutor:
             guidance.goal,
             self._stop_distance,
             _action(guidance.visit),
+            until,
             shown=True,
             tolerance=guidance.tolerance,
         )

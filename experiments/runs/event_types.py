@@ -64,10 +64,12 @@ class Participant(Logged, frozen=True):
     Attributes:
         user: The simulated participant.
         person: Every value of the person that was drawn, by name; those of the hands under `motion` (docs/people.md).
+        behaviour: Every value of the participant model that was drawn, by name; absent for models without any.
     """
 
     user: str
     person: dict[str, float | dict[str, float]]
+    behaviour: dict[str, float] | None = None
 
 
 class Plan(Logged, frozen=True):

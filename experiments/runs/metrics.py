@@ -15,7 +15,19 @@ REGRETFUL = 0.01  # m; smaller regrets are ties
 COSTLY = 0.1  # m; what a deviation must cost to count in `nd_regret_10cm`
 # Fields of the start event that say what was recorded, not how the trial was set up.
 PROVENANCE = frozenset(
-    {"t", "event", "format", "versions", "model", "world", "inputs", "episode_sha256", "order", "person"}
+    {
+        "t",
+        "event",
+        "format",
+        "versions",
+        "model",
+        "world",
+        "inputs",
+        "episode_sha256",
+        "order",
+        "person",
+        "behaviour",
+    }
 )
 
 # In short, for the command line.
@@ -151,8 +163,10 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
 
 def _person(events: Sequence[Event]) -> dict[str, Any]:
     """The participant's values, but for those of the hands, as columns: `person_walking_speed` and so on."""
-    values: Mapping[str, Any] = next((e["person"] for e in events if e["event"] == PARTICIPANT), {})
-    return {f"person_{name}": value for name, value in values.items() if name != "motion"}
+    told: Mapping[str, Any] = next((e for e in events if e["event"] == PARTICIPANT), {"person": {}})
+    body = {f"person_{name}": value for name, value in told["person"].items() if name != "motion"}
+    model = told.get("behaviour") or {}
+    return body | {f"behaviour_{name.replace('.', '_')}": value for name, value in model.items()}
 
 
 def _count(events: Sequence[Event], *kinds: str) -> int:

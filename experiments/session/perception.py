@@ -13,7 +13,7 @@ from mjsim.actions import ActionResult
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.receptacle_visibility import visible_receptacles
-from mjsim.visibility import FieldOfView, in_field_of_view, persons_geoms, visible_objects
+from mjsim.visibility import FieldOfView, in_field_of_view, persons_geoms, visible_objects, visible_shares
 from mjsim.world import World
 
 
@@ -48,6 +48,14 @@ class SessionPercept(Percept):
     def look(self) -> Mapping[str, Point]:
         """Misplaced objects in view -> floor position, m, shape (2,); what lies in its bin is not misplaced."""
         return self._in_view
+
+    @cached_property
+    def visible_shares(self) -> Mapping[str, float]:
+        """Of the misplaced objects in view."""
+        seen, world = self._seen, self._world
+        return visible_shares(
+            world.scene, world.data, seen.eye, seen.heading, seen.pitch, among=list(self._in_view)
+        )
 
     @cached_property
     def _in_view(self) -> Mapping[str, Point]:

@@ -1,6 +1,6 @@
 """Calling code that is not ours: participants, conditions and planners that users plug in."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 import numpy as np
@@ -65,8 +65,10 @@ def _place(error: BaseException) -> str:
     return found
 
 
-def make_participant(name: str, house: House, rng: np.random.Generator) -> Participant:
-    """The participant called `name`, made for a house.
+def make_participant(
+    name: str, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
+) -> Participant:
+    """The participant called `name`, made for a house, with the values of its model if that has any.
 
     Raises:
         ConfigError: There is no such participant.
@@ -74,7 +76,7 @@ def make_participant(name: str, house: House, rng: np.random.Generator) -> Parti
     """
     make = participant(name)
     with user_code(make, f"participant {name!r}"):
-        made = make(house, rng)
+        made = make(house, rng, behaviour) if behaviour else make(house, rng)  # type: ignore[call-arg]
     if not callable(getattr(made, "act", None)):
         raise UserCodeError(f"participant {name!r} is {made!r}, which has no method act(percept)")
     return made

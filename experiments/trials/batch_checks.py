@@ -12,7 +12,7 @@ from experiments.participants import DEFAULT_PARTICIPANT, participant
 from experiments.runs import records
 from experiments.runs.records import EventLog
 from experiments.trials.fingerprint import Inputs, trial_inputs
-from experiments.trials.trial import draw_person, prepare_session, trial_episode
+from experiments.trials.trial import draw_behaviour, draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
 from mjsim.episode import Episode
@@ -43,6 +43,8 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
     ):
         for name in sorted(names):
             check(name)
+    for trial in {(t.user, t.behaviour): t for t in trials}.values():
+        draw_behaviour(trial)
     catalogue = functools.cache(Catalogue.load)
     house = functools.cache(House.load)
     for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():

@@ -13,6 +13,7 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from experiments.errors import ConfigError
+from experiments.participants.behaviour import BehaviourDistribution
 from experiments.trials.person_distribution import PersonDistribution
 from experiments.trials.trial_config import SEEDS, TrialConfig, episode_settings
 
@@ -33,6 +34,7 @@ CONFOUNDERS = (
     "phases",
     "story",
     "person",
+    "behaviour",
 )
 
 
@@ -119,6 +121,7 @@ class _Cell(msgspec.Struct, forbid_unknown_fields=True):
     phases: list[_Text] | UnsetType = UNSET
     story: _Text | UnsetType = UNSET
     person: dict[str, Any] | UnsetType = UNSET
+    behaviour: dict[str, Any] | UnsetType = UNSET
 
     def given(self) -> dict[str, Any]:
         """The values that are there, by name."""
@@ -175,6 +178,8 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
         settings["phases"] = ",".join(settings["phases"])
     if "person" in settings:
         settings["person"] = PersonDistribution.of(settings["person"])
+    if "behaviour" in settings:
+        settings["behaviour"] = BehaviourDistribution.of(settings["behaviour"])
     missing = [name for name in ("objects", "assistance") if name not in settings]
     if missing:
         raise ConfigError(f"{' and '.join(missing)} must be given")

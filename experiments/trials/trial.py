@@ -46,7 +46,7 @@ from planner.route import RoutePlanner
 from planner.solver import solver
 
 _SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
-_LIST_ORDER, _CHANCE, _PERSON = range(3)  # purposes of random numbers in a session
+_LIST_ORDER, _CHANCE, _PERSON, _BEHAVIOUR = range(4)  # purposes of random numbers in a session
 FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock of a live trial starts
 
 
@@ -128,6 +128,17 @@ def draw_person(config: TrialConfig) -> PersonParameters:
     except ConfigError as error:
         raise ConfigError(f"participant {config.user!r}: {error}") from error
     return of_participant.updated(config.person).draw(_session_rng(config.person_seed, _PERSON))
+
+
+def draw_behaviour(config: TrialConfig) -> dict[str, float]:
+    """The values of the participant model in a trial, drawn by the person's seed; empty if it has none.
+
+    Raises:
+        ConfigError: There is no such participant, or it has no such value.
+    """
+    parameters = getattr(participant(config.user), "behaviour", {})
+    rng = _session_rng(config.person_seed, _BEHAVIOUR)
+    return config.behaviour.draw(config.user, parameters, rng)
 
 
 def trial_episode(config: TrialConfig, house: House) -> Episode:
@@ -238,7 +249,8 @@ def _before_the_task(
 
 def simulated_user(config: TrialConfig, house: House) -> Participant:
     """The participant that a trial names; `house` is what it knows."""
-    return make_participant(config.user, house, _session_rng(config.person_seed, _CHANCE))
+    rng = _session_rng(config.person_seed, _CHANCE)
+    return make_participant(config.user, house, rng, draw_behaviour(config))
 
 
 def prepare_session(
@@ -269,7 +281,10 @@ def prepare_session(
     order_rng = _session_rng(config.order_seed, _LIST_ORDER)
     order = [scene.index.names[i] for i in order_rng.permutation(len(scene.index.names))]
     world = world or World(scene, WorldOptions(fidelity=config.fidelity, capacity=config.capacity))
+    behaviour = draw_behaviour(config)
     _log_start(config, house, world, order, log)
+    drawn = {"behaviour": behaviour} if behaviour else {}
+    log.append(0.0, records.PARTICIPANT, user=config.user, person=scene.person.as_dict(), **drawn)
     session = Session(
         world,
         _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
@@ -285,7 +300,7 @@ def prepare_session(
 
 def _session_rng(seed: int, purpose: int) -> np.random.Generator:
     """The generator of one purpose in a session, apart from those of the house with the same seed."""
-    return np.random.default_rng(np.random.SeedSequence([seed, _SESSION]).spawn(3)[purpose])
+    return np.random.default_rng(np.random.SeedSequence([seed, _SESSION]).spawn(4)[purpose])
 
 
 def _log_start(config: TrialConfig, house: House, world: World, order: list[str], log: EventLog) -> None:
@@ -302,7 +317,6 @@ def _log_start(config: TrialConfig, house: House, world: World, order: list[str]
         episode_sha256=hashlib.sha256(episode).hexdigest(),
         order=order,
     )
-    log.append(0.0, records.PARTICIPANT, user=config.user, person=world.scene.person.as_dict())
 
 
 def _make_assistant(

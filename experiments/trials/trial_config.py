@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
+from experiments.participants.behaviour import BehaviourDistribution
 from experiments.runs.phases import STORY, TASK, phases_of
 from experiments.trials.person_distribution import PersonDistribution
 from mjsim.episode import CAPACITY, Episode
@@ -52,6 +53,7 @@ class TrialConfig:
             the bins that it did not see; else it knows them all.
         story: Path of a text to read instead of the usual story; it is made absolute.
         person: How speeds, reach, size and senses of the participant are distributed (docs/people.md).
+        behaviour: How the parameters of the participant model are distributed (docs/participants.md).
 
     Raises:
         ConfigError: A value is unusable.
@@ -76,6 +78,7 @@ class TrialConfig:
     phases: str = TASK
     story: str | None = None
     person: PersonDistribution = field(default_factory=PersonDistribution)
+    behaviour: BehaviourDistribution = field(default_factory=BehaviourDistribution)
 
     def __post_init__(self, seed: int | None) -> None:
         for name in SEEDS:
@@ -120,7 +123,8 @@ class TrialConfig:
 
     def settings(self) -> dict[str, Any]:
         """All of it by name, with the time limit filled in; JSON-ready."""
-        return {**dataclasses.asdict(self), "time_limit": self.limit, "person": self.person.as_dict()}
+        described = {"person": self.person.as_dict(), "behaviour": self.behaviour.as_dict()}
+        return {**dataclasses.asdict(self), "time_limit": self.limit, **described}
 
 
 def episode_settings(path: Path) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Any
 from experiments.errors import RecordError
 from experiments.house import House
 from experiments.participants.base import Decision, Percept
+from experiments.participants.behaviour import BehaviourDistribution
 from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.replayer import catch_up
 from experiments.runs.recording import Recording
@@ -231,7 +232,11 @@ class LiveSession:
 
 def config_of(settings: Mapping[str, Any]) -> TrialConfig:
     """The trial that `TrialConfig.settings` describes."""
-    return TrialConfig(**{**settings, "person": PersonDistribution.of(settings["person"])})
+    person, behaviour = (
+        PersonDistribution.of(settings["person"]),
+        BehaviourDistribution.of(settings["behaviour"]),
+    )
+    return TrialConfig(**{**settings, "person": person, "behaviour": behaviour})
 
 
 def is_over(journal: Sequence[bytes]) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.commands.options import HelpFormatter
 
-SUBCOMMANDS = ("analyze", "score", "power")  # a module each, with `add_parser(commands)`
+SUBCOMMANDS = ("simulate", "controls", "analyze", "score", "power")  # a module each, with `add_parser(commands)`
 
 DESCRIPTION = """\
 Studies: who took part, what was found, how it compares with the published study, how many people the next one needs.
@@ -17,7 +17,7 @@ def add_parser(commands: Any) -> None:
     """Add the subcommand with its own subcommands."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "study",
-        help="analyse studies, score them against the published one, plan them",
+        help="simulate and analyse studies, score them against the published one, plan them",
         description=DESCRIPTION,
         formatter_class=HelpFormatter,
     )

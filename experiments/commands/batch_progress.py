@@ -1,0 +1,70 @@
+"""Running the trials of a design with a progress bar."""
+
+import argparse
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from experiments.commands.terminal import error_console, progress_bars
+from experiments.trials.batch import BatchProgress, run_batch
+from experiments.trials.design import Design
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add `--workers`."""
+    parser.add_argument(
+        "--workers",
+        type=int,
+        default=os.cpu_count(),
+        metavar="N",
+        help="processes (default: one per core, %(default)s here)",
+    )
+
+
+def run_with_progress(
+    design: Design, out: Path, workers: int, what: str = "trials"
+) -> tuple[list[Mapping[str, Any]], int]:
+    """Run what is missing of a design; all rows of the folder, and how many trials failed.
+
+    Args:
+        design: Which trials.
+        out: Folder of the batch.
+        workers: Processes.
+        what: Stands before the bar.
+
+    Raises:
+        ConfigError, OSError: As `run_batch`.
+    """
+    failed = 0
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with progress_bars(error_console(), *columns) as bars:
+        bar = bars.add_task(what, total=None)
+
+        def show(progress: BatchProgress) -> None:
+            nonlocal failed
+            failed = progress.failed
+            bars.update(bar, total=progress.total, completed=progress.resumed + progress.done + failed)
+            if progress.failure:
+                bars.console.print(f"failed: {progress.failure}", style="red", soft_wrap=True)
+
+        def note(line: str) -> None:
+            bars.console.print(line, style="yellow", soft_wrap=True)
+
+        rows = run_batch(design, out, workers=workers, on_progress=show, on_note=note)
+    return rows, failed

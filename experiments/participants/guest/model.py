@@ -1,0 +1,303 @@
+"""The simulated guest: notices, remembers, chooses, follows or does not, and takes its time."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from experiments.house import House
+from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Guidance, Moves, Percept, Point
+from experiments.participants.guest.compliance import Adherence, Compliance
+from experiments.participants.guest.decision import Decision as DecisionParameters
+from experiments.participants.guest.memory import Memory, Recollection
+from experiments.participants.guest.options import Chooser, Known
+from experiments.participants.guest.perception import Noticing, Perception
+from experiments.participants.guest.searching import Frontier, Place
+from experiments.participants.guest.timing import Timing
+from experiments.participants.guest.walking import Walking, Wandering
+from experiments.participants.looking import FullTurn
+from experiments.participants.visit_executor import VisitExecutor
+from hud.markers import BREADCRUMB, FLAGPOLE
+from mjsim.actions import IDLE
+from mjsim.options import WorldOptions
+from planner.plan import Visit, VisitKind
+from planner.polyline import path_length, project
+
+ARRIVED = 0.5  # m from a place on the way, or one to look around from
+GONE = 1.2  # m: a remembered object nearer than this and not in view is no longer there
+SEEN_BIN = 2.0  # m; who comes as near to a bin knows where it is
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """One person: the values of all parts."""
+
+    perception: Perception
+    memory: Memory
+    decision: DecisionParameters
+    compliance: Compliance
+    walking: Walking
+    timing: Timing
+
+
+@dataclass(frozen=True)
+class Intention:
+    """What a person is about to do.
+
+    Attributes:
+        aim: A visit, or a place to look around from.
+        suggested: Whether it is the suggested step.
+        strays: Whether it goes its own way there: it is not on the path that is shown, or came to a halt there.
+        gives_up_at: Simulated time at which the suggested step is given up, s.
+    """
+
+    aim: Visit | Place
+    suggested: bool = False
+    strays: bool = False
+    gives_up_at: float = math.inf
+
+
+class Guest:
+    """Tidies as somebody might who was shown the house once: in any condition, with what it shows.
+
+    Args:
+        house: What it knows of the house.
+        rng: Its chance.
+        behaviour: Its values.
+    """
+
+    needs: frozenset[str] = frozenset()
+
+    def __init__(self, house: House, rng: np.random.Generator, behaviour: Behaviour) -> None:
+        self._house, self._behaviour, self._rng = house, behaviour, rng
+        self._executor = VisitExecutor(house)
+        self._noticing = Noticing(behaviour.perception, rng)
+        self._known = Recollection(behaviour.memory, house.receptacles, rng)
+        self._frontier = Frontier(house, rng)
+        self._chooser = Chooser(behaviour.decision, house, self._frontier, rng)
+        self._adherence = Adherence(behaviour.compliance, rng)
+        self._wandering = Wandering(behaviour.walking, house, rng)
+        self._intention: Intention | None = None
+        self._stops: list[Point] = []
+        self._turn: FullTurn | None = None
+        self._turned_for_poles = self._has_begun = False
+        self._carried: set[str] = set()
+        self._brought: set[str] = set()  # carried no more: in their bins, as far as is known
+        self._passed: set[str] = set()  # objects that were not picked up in passing
+        self._room: str | None = None
+        self._read: Visit | None = None
+        self._given_up: Visit | None = None
+        self._is_open = False  # whether it would take up the suggestion that it has read
+        self._next_look = self._thinks_until = 0.0
+
+    def act(self, percept: Percept) -> Decision:
+        """Look; read and think; then go on with what it has in mind."""
+        if percept.busy:
+            return WAIT
+        self._begin(percept)
+        if self._thinks(percept):  # and looks at the HUD
+            return _stand(self._thinks_until - percept.time)
+        self._look(percept)
+        decision = self._turn_around(percept)
+        if decision is None and not self._is_sensible(percept):
+            self._decide(percept)
+            decision = self._turn_around(percept)
+        if decision is not None:
+            return decision
+        return _stand(self._thinks_until - percept.time) if self._thinks(percept) else self._go_on(percept)
+
+    def _begin(self, percept: Percept) -> None:
+        """Read the list, where it is more than the next step."""
+        if not self._has_begun:
+            self._has_begun, self._next_look = True, percept.time
+            rows = 0 if BREADCRUMB in percept.shown_roles else len(percept.targets)
+            self._thinks_until = percept.time + self._behaviour.timing.list_time(rows)
+
+    def _thinks(self, percept: Percept) -> bool:
+        return percept.time < self._thinks_until - TIME_TOLERANCE
+
+    def _look(self, percept: Percept) -> None:
+        """Learn where things are, from time to time; notice what might be picked up in passing."""
+        for name in percept.carried:
+            self._known.drop(name)
+        self._brought |= self._carried - set(percept.carried)
+        self._carried = set(percept.carried)
+        if percept.time < self._next_look - TIME_TOLERANCE:
+            return
+        self._next_look = percept.time + percept.person.looking_interval
+        room = self._house.rooms.room_at(percept.position)
+        if room != self._room:
+            self._room = room
+            self._noticing.look_afresh()
+        self._known.forget(percept.time, but=self._aim_object())
+        found = self._noticing.notice(percept) | (dict(percept.flagpoles) if self._misses(percept) else {})
+        self._known.learn(found, percept.time)
+        self._brought -= set(found)
+        for key in sorted(set(self._house.receptacles) - self._known.bins):
+            if math.dist(self._house.approaches[key], percept.position) < SEEN_BIN:
+                self._known.bins.add(key)
+        self._pick_up_in_passing(percept)
+
+    def _misses(self, percept: Percept) -> bool:
+        """Whether objects are left of which it does not know where they are."""
+        return len(self._known.objects) + len(self._carried) + len(self._brought) < len(percept.targets)
+
+    def _pick_up_in_passing(self, percept: Percept) -> None:
+        intention = self._intention
+        if intention is None or not intention.suggested or percept.hands_full:
+            return
+        for name, place in self._known.objects.items():
+            distance = math.dist(place, percept.position)
+            near = distance <= self._adherence.compliance.beside
+            if near and name not in self._passed and name != self._aim_object():
+                self._passed.add(name)
+                if self._adherence.picks_up(distance):
+                    self._intention, self._stops = Intention(Visit(VisitKind.PICK, name)), []
+                    return
+
+    def _aim_object(self) -> str | None:
+        aim = self._intention.aim if self._intention is not None else None
+        return aim.object if isinstance(aim, Visit) else None
+
+    def _is_sensible(self, percept: Percept) -> bool:
+        """Whether what it has in mind can still be done and is still wanted."""
+        intention = self._intention
+        if intention is None:
+            return False
+        if isinstance(intention.aim, Place):
+            return percept.hands_full or not self._known.objects
+        if intention.suggested:
+            is_shown = percept.guidance is not None and percept.guidance.visit == intention.aim
+            if is_shown and percept.time >= intention.gives_up_at - TIME_TOLERANCE:
+                self._given_up, self._is_open = intention.aim, False
+                return False
+            return is_shown
+        if intention.aim.kind is VisitKind.PLACE:
+            return intention.aim.object in percept.carried
+        if self._has_gone(percept, intention.aim.object):
+            self._known.drop(intention.aim.object)
+        return intention.aim.object in self._known.objects and not percept.hands_full
+
+    def _has_gone(self, percept: Percept, name: str) -> bool:
+        refused = percept.answer is not None and not percept.answer.applied
+        place = self._known.objects.get(name)
+        near = place is not None and math.dist(place, percept.position) < GONE
+        return refused and near and name not in percept.look() and name not in percept.flagpoles
+
+    def _decide(self, percept: Percept) -> None:
+        """Read a new suggestion; else take up an intention, which takes time to think of."""
+        shown = percept.guidance
+        self._intention, self._stops = None, []
+        if shown is not None and shown.visit != self._read:
+            self._read, self._given_up, self._is_open = shown.visit, None, True
+            self._thinks_until = percept.time + self._behaviour.timing.suggestion_time()
+            return
+        if shown is not None and self._is_open:
+            self._is_open = self._adherence.takes_up()
+            if self._is_open:
+                self._follow(percept, shown)
+                return
+        poles = FLAGPOLE in percept.shown_roles
+        if poles and not self._known.objects and not percept.carried and not self._turned_for_poles:
+            self._turn, self._turned_for_poles = FullTurn(percept.heading), True
+            return
+        aim = self._chooser.choose(percept, self._options(percept, shown))
+        if aim is None and shown is not None:
+            aim = shown.visit
+        if aim is None:
+            return
+        self._turned_for_poles = False
+        self._intention = Intention(aim)
+        is_pole = poles and isinstance(aim, Visit) and aim.kind is VisitKind.PICK
+        goal = self._goal(percept, aim, shown)
+        self._stops = self._wandering.stops(percept.position, goal, pole=is_pole)
+        self._thinks_until = percept.time + self._behaviour.timing.choice_time(poles=poles)
+
+    def _follow(self, percept: Percept, shown: Guidance) -> None:
+        self._stops = self._wandering.stops(percept.position, shown.goal, pole=False)
+        after = self._adherence.gives_up_after(path_length(shown.path) / percept.person.walking_speed)
+        until = math.inf if after is None else percept.time + after
+        off = project(shown.path, percept.position[0], percept.position[1])[1] > shown.tolerance
+        self._intention = Intention(shown.visit, True, off or bool(self._stops), until)
+        self._passed = set()
+
+    def _options(self, percept: Percept, shown: Guidance | None) -> Known:
+        objects = dict(self._known.objects)
+        if shown is not None and shown.visit.kind is VisitKind.PICK:
+            if self._given_up is None:
+                objects[shown.visit.object] = shown.goal
+            else:
+                objects.pop(shown.visit.object, None)
+        pull = self._behaviour.walking.pull if FLAGPOLE in percept.shown_roles else 0.0
+        return Known(objects, pull, search=True)
+
+    def _goal(self, percept: Percept, aim: Visit | Place, shown: Guidance | None) -> Point:
+        """Where an aim is, m, shape (2,)."""
+        if isinstance(aim, Place):
+            return aim.point
+        if shown is not None and aim == shown.visit:
+            self._known.learn({aim.object: shown.goal} if aim.kind is VisitKind.PICK else {}, percept.time)
+            return shown.goal
+        if aim.kind is VisitKind.PICK:
+            return self._known.objects[aim.object]
+        return self._house.approaches[percept.targets[aim.object]]
+
+    def _turn_around(self, percept: Percept) -> Decision | None:
+        """Turn on, if it is turning; then the bins of this room are known."""
+        turning = self._turn.act(percept) if self._turn is not None else None
+        if turning is None and self._turn is not None:
+            self._turn = None
+            bins = self._house.catalogue.receptacles
+            self._known.bins |= {key for key in self._house.receptacles if bins[key].room == self._room}
+        return turning
+
+    def _go_on(self, percept: Percept) -> Decision:
+        """Walk by the stops to the aim, and do there what is to be done."""
+        intention = self._intention
+        if intention is None:
+            return IDLE
+        if self._stops and (percept.blocked or self._is_at(percept, self._stops[0])):
+            self._stops.pop(0)
+        if self._stops:
+            until = min(self._next_look, intention.gives_up_at)
+            return self._executor.walk_to(percept, self._stops[0], ARRIVED, until=until)
+        if isinstance(intention.aim, Place):
+            return self._search(percept, intention.aim)
+        return self._visit(percept, intention, intention.aim)
+
+    def _is_at(self, percept: Percept, point: Point) -> bool:
+        return math.dist(point, percept.position) <= ARRIVED
+
+    def _visit(self, percept: Percept, intention: Intention, visit: Visit) -> Decision:
+        shown, until = percept.guidance, min(self._next_look, intention.gives_up_at)
+        if intention.suggested and shown is not None:
+            if percept.blocked and not intention.strays:
+                self._intention = intention = replace(intention, strays=True)
+            if not intention.strays:
+                return self._executor.follow(percept, shown, until=until)
+            return self._executor.act(percept, visit, {visit.object: shown.goal}, until=until)
+        is_place = visit.kind is VisitKind.PLACE
+        if is_place and (key := percept.targets[visit.object]) not in self._known.bins:
+            place = self._frontier.of_room(self._house.catalogue.receptacles[key].room, percept.position)
+            if not self._is_at(percept, place.point):
+                return self._executor.walk_to(percept, place.point, ARRIVED, until=self._next_look)
+            self._known.bins.add(key)
+            self._turn = FullTurn(percept.heading)
+            return self._turn_around(percept) or IDLE
+        return self._executor.act(percept, visit, self._known.objects, until=self._next_look)
+
+    def _search(self, percept: Percept, place: Place) -> Decision:
+        if not self._is_at(percept, place.point):
+            return self._executor.walk_to(percept, place.point, ARRIVED, until=self._next_look)
+        self._frontier.mark_searched(place)
+        self._intention = None
+        if float(self._rng.random()) < self._behaviour.perception.looks_around:
+            self._noticing.look_afresh()
+            self._turn = FullTurn(percept.heading)
+        return self._turn_around(percept) or IDLE
+
+
+def _stand(seconds: float) -> Decision:
+    """Stand still for so long, s, and one control step at least."""
+    steps = max(1, math.ceil((seconds - TIME_TOLERANCE) / WorldOptions.control_timestep))
+    return Moves(np.zeros((steps, 4)))
