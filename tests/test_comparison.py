@@ -15,7 +15,7 @@ from experiments.trials.trial_config import TrialConfig
 
 def row(assistance, seed, value, **options):
     config = TrialConfig(**{"objects": 6, "assistance": assistance, "seed": seed, **options})
-    settings = {name: v for name, v in config.settings().items() if name != "person"}
+    settings = {name: v for name, v in config.settings().items() if name not in ("person", "behaviour")}
     return settings | dict.fromkeys(METRICS, value) | {"ended": "all delivered"}
 
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.participants.base import Percept, Point
+from experiments.participants.distances import estimated_distances
 from experiments.participants.guest.decision import Decision, Task, choose, first_step_costs, judged
 from experiments.participants.guest.searching import Frontier, Place
-from experiments.participants.visit_executor import estimated_distances
 from mjsim.episode import CAPACITY
 from planner.errors import PlannerError
 from planner.plan import Visit, VisitKind

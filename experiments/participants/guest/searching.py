@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.house import House
 from experiments.participants.base import Point
-from experiments.participants.visit_executor import estimated_distances
+from experiments.participants.distances import estimated_distances
 
 SHIFT = 0.15  # m; at each round, places are a little elsewhere, so that what was hidden once is seen later
 
