@@ -6,7 +6,8 @@ from typing import Any
 
 from experiments.commands.options import HelpFormatter
 
-SUBCOMMANDS = ("simulate", "controls", "analyze", "score", "power")  # a module each, with `add_parser(commands)`
+# A module each, with `add_parser(commands)`.
+SUBCOMMANDS = ("simulate", "controls", "analyze", "score", "power")
 
 DESCRIPTION = """\
 Studies: who took part, what was found, how it compares with the published study, how many people the next one needs.
