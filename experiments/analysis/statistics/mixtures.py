@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import betaln, expit, logsumexp
+from scipy.special import betaln, digamma, expit
 
 from experiments.errors import StatisticsError
 
@@ -70,7 +70,9 @@ def _fit(cases: Counts, people: Counts, kinds: int) -> Mixture:
     for start in range(STARTS):
         means = spread if start == 0 else np.sort(rng.uniform(0.05, 0.95, kinds))
         first = np.concatenate([np.zeros(kinds - 1), np.log(means / (1 - means)), np.full(kinds, 2.0)])
-        climbs.append(minimize(_loss, first, (cases, people, kinds), method="L-BFGS-B", bounds=bounds))
+        climbs.append(
+            minimize(_loss, first, (cases, people, kinds), jac=True, method="L-BFGS-B", bounds=bounds)
+        )
     best = min(climbs, key=lambda climb: float(climb.fun))
     weights, means, precisions = _parts(best.x, kinds)
     order = np.argsort(-means)
@@ -90,14 +92,25 @@ def _parts(
     """Logarithms of shares, means, precisions, (k,) each."""
     weights = np.append(parameters[: kinds - 1], 0.0)
     means = expit(parameters[kinds - 1 : 2 * kinds - 1])
-    return weights - logsumexp(weights), means, np.exp(parameters[2 * kinds - 1 :])
+    return weights - np.logaddexp.reduce(weights), means, np.exp(parameters[2 * kinds - 1 :])
 
 
-def _loss(parameters: NDArray[np.float64], cases: Counts, people: Counts, kinds: int) -> float:
-    """Minus the log likelihood."""
+def _loss(
+    parameters: NDArray[np.float64], cases: Counts, people: Counts, kinds: int
+) -> tuple[float, NDArray[np.float64]]:
+    """Minus the log likelihood and its gradient."""
     weights, means, precisions = _parts(parameters, kinds)
     accepted, others = cases[:, :1], cases[:, 1:] - cases[:, :1]
     a, b = means * precisions, (1 - means) * precisions
     # Of the beta-binomial, but for the number of orders, which is the same in all mixtures.
-    each = betaln(accepted + a, others + b) - betaln(a, b)
-    return -float((people * logsumexp(each + weights, axis=1)).sum())
+    each = betaln(accepted + a, others + b) - betaln(a, b) + weights
+    everyone = np.logaddexp.reduce(each, axis=1)
+    belonging = np.exp(each - everyone[:, None]) * people[:, None]
+    total = digamma(a + b) - digamma(cases[:, 1:] + a + b)
+    by_a = digamma(accepted + a) - digamma(a) + total
+    by_b = digamma(others + b) - digamma(b) + total
+    by_mean = (belonging * (by_a - by_b)).sum(axis=0) * precisions * means * (1 - means)
+    by_precision = (belonging * (means * by_a + (1 - means) * by_b)).sum(axis=0) * precisions
+    by_weight = belonging.sum(axis=0) - people.sum() * np.exp(weights)
+    gradient = np.concatenate([by_weight[:-1], by_mean, by_precision])
+    return -float((people * everyone).sum()), -gradient
