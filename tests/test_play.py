@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 from experiments.replaying.replay import replay
 
 CHROMIUM = Path("/usr/bin/chromium")
-PATIENCE = 120.0  # s; a loaded machine may be slow
+PATIENCE = 400.0  # s; a busy machine may have to compile all kernels first
 
 
 @contextmanager
