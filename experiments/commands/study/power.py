@@ -65,6 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.files import write_json
     from experiments.runs.run_directory import check_file
     from experiments.trials.design import read_design
+    from experiments.trials.study import study_path
 
     if arguments.seed < 0:
         raise ConfigError(f"--seed {arguments.seed} must not be negative")
@@ -79,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.alpha,
     )
     expenses = Expenses(arguments.pay, arguments.fee, arguments.minutes, arguments.dropout)
-    cells = [(trial.assistance, trial.objects) for trial in read_design(arguments.study).trials]
+    cells = [(trial.assistance, trial.objects) for trial in read_design(study_path(arguments.study)).trials]
     pool = read_study(arguments.pool, read_measures())
     found = plan_power(cells, pool, wanted, expenses, seed=arguments.seed)
     _show(found, wanted, pool.sources[wanted.measure])
