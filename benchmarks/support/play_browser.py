@@ -153,7 +153,10 @@ class SimulatedBrowser:
             async with self._changed:
                 await self._changed.wait_for(holds)
 
-        await asyncio.wait_for(wait(), seconds)
+        try:
+            await asyncio.wait_for(wait(), seconds)
+        except TimeoutError as error:
+            raise TimeoutError(f"the server did not answer within {seconds:.0f} s: {self.last}") from error
 
     async def ready(self) -> dict[str, Any]:
         """Wait until the session is ready and runs; what was not acknowledged is sent again."""

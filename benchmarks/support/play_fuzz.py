@@ -18,6 +18,7 @@ from benchmarks.support.play_server import PATIENCE, PlayProcess
 from experiments.web.protocol import MAX_TEXT
 
 MESSAGES_OF_A_CONNECTION = 45  # less than the refusals after which the server closes it
+OVERSIZED = 0.01  # share of messages after which the server closes the connection
 HELLO = {
     "type": "hello",
     "tab": "fuzzer-0000",
@@ -70,6 +71,8 @@ HEADERS = (
 
 def odd_message(rng: np.random.Generator) -> str | bytes:
     """A message that is malformed, oversized, out of order or too early."""
+    if rng.random() < OVERSIZED:
+        return b"x" * (MAX_TEXT + int(rng.integers(1, 100)))
     return ODD[rng.integers(len(ODD))](rng)
 
 
@@ -108,7 +111,6 @@ ODD: tuple[Callable[[np.random.Generator], str | bytes], ...] = (
         rng.choice(['{"type":"begin"}', '{"type":"takeover"}', '{"type":"resume"}', "{}", "", "null"])
     ),
     lambda _: json.dumps({"type": "open", "folder": "/etc", "run": "/tmp/x"}),
-    lambda rng: b"x" * (MAX_TEXT + int(rng.integers(1, 100))),
 )
 
 
@@ -153,10 +155,8 @@ async def _fuzz(
     playing = asyncio.create_task(_rounds(bystander, None))
     while sent < messages:
         count = min(MESSAGES_OF_A_CONNECTION, messages - sent)
-        replies += await _send_odd(
-            address, [odd_message(rng) for _ in range(count)], hello=rng.random() < 0.5
-        )
-        sent += count
+        odd = [odd_message(rng) for _ in range(count)]
+        sent += await _send_odd(address, odd, replies, hello=rng.random() < 0.5)
     for _ in range(requests):
         replies.append(await _request(server.url, odd_request(rng, urlsplit(server.url).netloc)))
     playing.cancel()
@@ -165,7 +165,7 @@ async def _fuzz(
     kinds = [json.loads(reply)["code"] for reply in replies if reply.startswith(b'{"type":"error"')]
     statuses = [reply[9:12].decode("latin-1") for reply in replies if reply.startswith(b"HTTP/")]
     return {
-        "messages": messages,
+        "messages": sent,
         "requests": requests,
         "refusals": {kind: kinds.count(kind) for kind in sorted(set(kinds))},
         "statuses": {status: statuses.count(status) for status in sorted(set(statuses))},
@@ -189,9 +189,9 @@ async def _rounds(browser: SimulatedBrowser, count: int | None) -> list[float]:
     return times
 
 
-async def _send_odd(address: str, odd: list[str | bytes], *, hello: bool) -> list[bytes]:
-    """Send messages on a connection; what was answered until then."""
-    parts, replies = urlsplit(address), list[bytes]()
+async def _send_odd(address: str, odd: list[str | bytes], replies: list[bytes], *, hello: bool) -> int:
+    """Send messages on a connection until it is closed, and keep what is answered; how many were sent."""
+    parts, sent = urlsplit(address), 0
     with suppress(ConnectionClosed, InvalidStatus, OSError):
         async with connect(
             f"ws://{parts.netloc}{parts.path}",
@@ -205,10 +205,11 @@ async def _send_odd(address: str, odd: list[str | bytes], *, hello: bool) -> lis
             for message in odd:
                 with suppress(UnicodeEncodeError):
                     await socket.send(message)
-            await socket.ping()
+                    sent += 1
+            await (await socket.ping())
             await asyncio.wait([reading], timeout=0.05)
             reading.cancel()
-    return replies
+    return sent
 
 
 async def _read(socket: ClientConnection, replies: list[bytes]) -> None:

@@ -16,7 +16,7 @@ import httpx
 from experiments.web.journal import JOURNAL
 from experiments.web.visits import JOURNALS, token_hash
 
-PATIENCE = 120.0  # s; a loaded machine may be slow
+PATIENCE = 300.0  # s; a loaded machine may be slow
 IDLE = 0.5  # s without work after which a worker is taken for warm
 _TICKS = os.sysconf("SC_CLK_TCK")
 
