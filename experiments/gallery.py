@@ -16,7 +16,7 @@ from experiments.house import House
 from experiments.runs.records import EventLog
 from experiments.session.endings import LeaveSession
 from experiments.session.first_person import FilmConfig, FirstPersonRenderer
-from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.projection import CameraView
 from hud.state import HudState

@@ -8,8 +8,8 @@ from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.runs.records import EventLog
 from experiments.trials.design import numbers, read_design
+from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.study import study_path
-from experiments.trials.trial import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 

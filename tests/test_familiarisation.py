@@ -23,8 +23,9 @@ from experiments.runs.phases import PHASES, phases_of
 from experiments.runs.records import EventLog, read_events
 from experiments.session.first_person import FilmConfig
 from experiments.trials.design import read_design
+from experiments.trials.setup import prepare_session, simulated_user, trial_episode
 from experiments.trials.training import training_config
-from experiments.trials.trial import prepare_session, run_trial, simulated_user, trial_episode
+from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.house import compiled_house
 from mjsim.model.scene import compose
@@ -268,9 +269,8 @@ def _run(config: TrialConfig, known: House, *, rollouts: bool = True) -> tuple[s
     house = dataclasses.replace(known, seen=None)
     scene = compose(trial_episode(config, house), house.catalogue)
     log = EventLog()
-    session, _ = prepare_session(
-        config, house, scene, log, rollouts=rollouts, user=simulated_user(config, known)
-    )
+    session, _ = prepare_session(config, house, scene, log, user=simulated_user(config, known))
+    session.rollouts = rollouts
     reason = session.run()
     hashes = session.recording.state_hashes()
     return reason, float(json.loads(log.lines()[-1])["t"]), int(np.bitwise_xor.reduce(hashes))

@@ -12,7 +12,8 @@ from experiments.participants.visit_executor import VisitExecutor
 from experiments.replaying.replay import replay
 from experiments.runs import records
 from experiments.runs.records import EventLog, read_events
-from experiments.trials.trial import prepare_session, run_trial, trial_episode
+from experiments.trials.setup import prepare_session, trial_episode
+from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.actions import Move
 from mjsim.errors import PhysicsError
@@ -49,7 +50,8 @@ def played(house, config, *, rollouts, ends="all delivered"):
     """Arrays, log and state hashes of a trial, and how many single control steps its session asked for."""
     scene = compose(trial_episode(config, house), house.catalogue)
     log = EventLog()
-    session, world = prepare_session(config, house, scene, log, rollouts=rollouts)
+    session, world = prepare_session(config, house, scene, log)
+    session.rollouts = rollouts
     singles, step = 0, world.step
 
     def counted(action):

@@ -6,7 +6,7 @@ import pytest
 from experiments.house import House
 from experiments.participants import DEFAULT_PARTICIPANT, participant
 from experiments.runs.records import EventLog
-from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 

@@ -20,7 +20,7 @@ from experiments.participants.guest.perception import Noticing, Perception
 from experiments.participants.guest.timing import Timing
 from experiments.participants.guest.walking import Walking, Wandering, free_length
 from experiments.runs.records import EventLog
-from experiments.trials.trial import draw_behaviour, prepare_session, trial_episode
+from experiments.trials.setup import draw_behaviour, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 
@@ -292,7 +292,8 @@ def test_step_by_step_it_does_the_same_to_the_bit(house, assistance):
     scene = compose(trial_episode(config, house), house.catalogue)
     hashes = []
     for rollouts in (True, False):
-        session, _ = prepare_session(config, house, scene, EventLog(), rollouts=rollouts)
+        session, _ = prepare_session(config, house, scene, EventLog())
+        session.rollouts = rollouts
         session.run()
         hashes.append(session.recording.state_hashes().tolist())
     assert hashes[0] == hashes[1]

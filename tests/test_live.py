@@ -11,7 +11,7 @@ from experiments.house import House
 from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.runs import records
 from experiments.runs.records import EventLog
-from experiments.trials.trial import prepare_session
+from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from planner.checker import check

@@ -22,7 +22,8 @@ from experiments.runs import records
 from experiments.runs.records import EventLog, read_events
 from experiments.trials.design import read_design
 from experiments.trials.person_distribution import PersonDistribution
-from experiments.trials.trial import draw_person, prepare_session, run_trial
+from experiments.trials.setup import draw_person, prepare_session
+from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from mjsim.options import FIDELITIES

@@ -9,7 +9,7 @@ from experiments.house import House
 from experiments.participants.base import WAIT
 from experiments.runs.records import EventLog
 from experiments.session.session import INTERRUPTED
-from experiments.trials.trial import prepare_session
+from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
 from hud.messages import TEXTS
 from mjsim.model.scene import compose

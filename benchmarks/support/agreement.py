@@ -11,7 +11,7 @@ from typing import Any
 from experiments.house import House
 from experiments.runs.metrics import compute_metrics
 from experiments.runs.records import EventLog
-from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus

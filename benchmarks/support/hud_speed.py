@@ -13,7 +13,7 @@ from rich.console import Console
 
 from experiments.house import House
 from experiments.runs.records import EventLog
-from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from experiments.house import House
 from experiments.runs.records import EventLog
-from experiments.trials.trial import prepare_session
+from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
 from mjsim.actions import Action
 from mjsim.model.sampling import POINTS, sample_episode

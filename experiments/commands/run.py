@@ -21,7 +21,7 @@ from experiments.commands.options import (
 )
 from experiments.commands.terminal import error_console, progress_bars
 from experiments.session.endings import INTERRUPTED
-from experiments.session.session import Progress as SessionProgress
+from experiments.session.viewer import Progress as SessionProgress
 from experiments.signals import exit_code
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig

@@ -14,8 +14,8 @@ from experiments.replaying.run_record import RunRecord, load_run
 from experiments.replaying.verdicts import Verdict, all_mismatches, verdicts
 from experiments.runs import records
 from experiments.session.first_person import FilmConfig, Filming, FirstPersonRenderer
-from experiments.session.session import Viewer
 from experiments.session.video import VideoWriter
+from experiments.session.viewer import Viewer
 from mjsim.errors import AssetError
 from mjsim.files import replacing
 from mjsim.person_parameters import PersonParameters

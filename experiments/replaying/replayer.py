@@ -16,8 +16,9 @@ from experiments.runs.recording import Recording, provenance
 from experiments.runs.records import RECORDING, Event, EventLog
 from experiments.session.assistant import Assistant
 from experiments.session.endings import INTERRUPTED
-from experiments.session.session import Progress, Session, Viewer
+from experiments.session.session import Session
 from experiments.session.task_board import TaskBoard
+from experiments.session.viewer import Progress, Viewer
 from mjsim.actions import WorldEvent
 from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.model.scene import compose

@@ -1,8 +1,6 @@
 """The one loop: observe, show, let the user act, step the world. A script, a person and a replay all run in it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +14,8 @@ from experiments.session.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSI
 from experiments.session.locomotion import LocomotionController
 from experiments.session.perception import SessionPercept
 from experiments.session.user_code import decide, describe
+from experiments.session.viewer import OnProgress, Progress, Viewer
 from experiments.signals import signal_of
-from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.actions import IDLE, Action, ActionResult, Move, WorldEvent
 from mjsim.errors import PhysicsError
@@ -27,30 +25,6 @@ from mjsim.world import World
 
 FINAL_HOLD = 1.6  # s the session goes on after the last delivery, so that the person sees that all is done
 MAX_MOTION = 30.0  # s; no pick or place takes as long
-
-
-class Viewer(Protocol):
-    """Takes what is shown at every control step, e.g. to film it."""
-
-    def camera(self, world: World) -> CameraView | None:
-        """The eye camera through which the HUD is seen; None for a view from outside."""
-        ...
-
-    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Show the present state, and what the HUD shows in it."""
-        ...
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a session has got, for progress bars."""
-
-    time: float
-    delivered: int
-    total: int
-
-
-OnProgress = Callable[[Progress], None]
 
 
 class Session:
@@ -71,6 +45,7 @@ class Session:
         assistant: As above.
         trajectory: Poses and actions so far.
         recording: Hashes and checkpoints so far.
+        rollouts: Whether many control steps are taken at once; may be switched off.
     """
 
     def __init__(
@@ -91,7 +66,7 @@ class Session:
         self._log = recording.log
         self._time_limit = time_limit
         self._viewer = viewer
-        self._rollouts = rollouts and viewer is None
+        self.rollouts = rollouts and viewer is None
         self._controller = LocomotionController(walls, world.scene.person)
         self._answer: ActionResult | None = None
         self._hud: tuple[Observation, HudState] | None = None
@@ -191,15 +166,15 @@ class Session:
             blocked=self._controller.blocked,
         )
         decision = decide(self._participant, percept)
-        if not (self._rollouts and self._roll_out(decision)):
+        if not (self.rollouts and self._roll_out(decision)):
             self._step(self._action(decision))
 
     def note(self, event: str, **fields: Any) -> None:
-        """Log something that came from outside of the simulation, in the present state."""
+        """Log something from outside of the simulation, in the present state."""
         self._log.append(self._now.time, event, **fields)
 
     def scroll(self, rows: int) -> None:
-        """Scroll the task list by so many rows, positive towards its end; logged, so that a replay shows the same."""
+        """Scroll the task list by so many rows, positive towards its end; logged for replays."""
         self.note("scroll", rows=rows)
         self.assistant.scroll(rows)
         self._hud = None

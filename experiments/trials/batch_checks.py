@@ -12,7 +12,7 @@ from experiments.participants import DEFAULT_PARTICIPANT, participant
 from experiments.runs import records
 from experiments.runs.records import EventLog
 from experiments.trials.fingerprint import Inputs, trial_inputs
-from experiments.trials.trial import draw_behaviour, draw_person, prepare_session, trial_episode
+from experiments.trials.setup import draw_behaviour, draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
 from mjsim.episode import Episode

@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.house import House
 from experiments.runs.records import EventLog
-from experiments.trials.trial import prepare_session
+from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition_names
 from mjsim.actions import Move, Pick, Place

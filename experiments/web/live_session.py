@@ -12,9 +12,9 @@ from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.replayer import catch_up
 from experiments.runs.recording import Recording
 from experiments.runs.records import EventLog
-from experiments.session.session import Viewer
+from experiments.session.viewer import Viewer
 from experiments.trials.person_distribution import PersonDistribution
-from experiments.trials.trial import draw_person, prepare_session, trial_episode
+from experiments.trials.setup import draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_record import SessionResult
 from experiments.web.controls import Controls, Input, control_step

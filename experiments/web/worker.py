@@ -16,8 +16,8 @@ import msgspec
 from experiments.house import House
 from experiments.runs import records
 from experiments.runs.run_directory import is_run, run_directory
-from experiments.session.session import Viewer
 from experiments.session.user_code import describe
+from experiments.session.viewer import Viewer
 from experiments.trials import warmup
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_record import draw_floor_plan, save_record

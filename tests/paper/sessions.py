@@ -6,7 +6,7 @@ from typing import Any
 from experiments.house import House
 from experiments.runs.records import EventLog
 from experiments.session.session import Session
-from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.state import HudState
 from mjsim.model.scene import compose

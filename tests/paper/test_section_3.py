@@ -8,7 +8,7 @@ import pytest
 from experiments.participants.follower import Follower
 from experiments.runs.records import EventLog
 from experiments.session.first_person import FilmConfig, FirstPersonRenderer
-from experiments.trials.trial import prepare_session, trial_episode
+from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.messages import message

@@ -1,0 +1,34 @@
+"""Who watches a session, and how far it has got."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from hud.projection import CameraView
+from hud.state import HudState
+from mjsim.observation import Observation
+from mjsim.world import World
+
+
+class Viewer(Protocol):
+    """Takes what is shown at every control step, e.g. to film it."""
+
+    def camera(self, world: World) -> CameraView | None:
+        """The eye camera through which the HUD is seen; None for a view from outside."""
+        ...
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
+        """Show the present state, and what the HUD shows in it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a session has got, for progress bars."""
+
+    time: float
+    delivered: int
+    total: int
+
+
+OnProgress = Callable[[Progress], None]
