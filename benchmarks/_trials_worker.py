@@ -105,7 +105,7 @@ def main() -> None:
         with (
             tempfile.TemporaryDirectory() as folder,
             timers,
-            patch("experiments.trials.trial.World", recording_world),
+            patch("experiments.trials.setup.World", recording_world),
         ):
             started = time.perf_counter()
             run_trial(config, Path(folder) / "run", topdown=False, house=house)

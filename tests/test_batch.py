@@ -57,14 +57,36 @@ def test_a_killed_batch_goes_on_where_it_stopped(tmp_path):
     assert len((tmp_path / "trials.csv").read_text().splitlines()) == 5
 
 
-def test_one_failing_trial_does_not_stop_the_others(tmp_path):
-    reports = []
-    design = factorial(objects=[6], assistance=["none"], users=["nearest"], seeds=[0])
-    shown = factorial(objects=[6], assistance=["highlight"], users=["nearest"], seeds=[0])
-    rows = run_batch(Design(design.trials + shown.trials), tmp_path, workers=1, on_progress=reports.append)
+FAILS_WITHOUT_GUIDANCE = """
+from experiments.participants.nearest import Nearest
+
+
+class Fails(Nearest):
+    needs = frozenset()
+
+    def act(self, percept):
+        if not percept.shown_roles:
+            raise ValueError("nothing to go for")
+        return super().act(percept)
+
+
+def build(house, rng):
+    return Fails(house)
+"""
+
+
+def test_one_failing_trial_does_not_stop_the_others(tmp_path, monkeypatch):
+    (tmp_path / "fails_without_guidance.py").write_text(FAILS_WITHOUT_GUIDANCE)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
+    reports, users = [], ["fails_without_guidance:build"]
+    design = factorial(objects=[6], assistance=["none"], users=users, seeds=[0])
+    shown = factorial(objects=[6], assistance=["highlight"], users=users, seeds=[0])
+    out = tmp_path / "out"
+    rows = run_batch(Design(design.trials + shown.trials), out, workers=1, on_progress=reports.append)
     assert [row["assistance"] for row in rows] == ["highlight"]
     assert (reports[-1].done, reports[-1].failed) == (1, 1)
-    assert any("needs ['flagpole']" in (r.failure or "") for r in reports)
+    assert any("nothing to go for" in (r.failure or "") for r in reports)
 
 
 @pytest.mark.parametrize(

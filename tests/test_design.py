@@ -149,7 +149,7 @@ def test_each_seed_decides_one_thing(house):
 def test_the_person_seed_reaches_the_participant(house, monkeypatch):
     drawn = []
     monkeypatch.setattr(
-        "experiments.trials.trial.make_participant",
+        "experiments.trials.setup.make_participant",
         lambda _name, _house, rng, _behaviour: drawn.append(rng.random()),
     )
     for seeds in ({}, {"house_seed": 9, "order_seed": 9}, {"person_seed": 9}):

@@ -83,6 +83,7 @@ def test_a_blocked_person_who_only_walks_is_told_so_and_does_not_back_off():
 
 
 class House:
+    seen, receptacles = None, {}
     """A floor without walls, where every path has a detour of its own."""
 
     def __init__(self):

@@ -18,7 +18,7 @@ from mjsim.actions import IDLE, Move
 from mjsim.episode import Episode
 from mjsim.errors import PhysicsError
 from mjsim.model.footprint import footprint
-from mjsim.model.scene import compose
+from mjsim.model.scene import assemble
 from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 from planner.errors import UnreachableError
@@ -90,7 +90,7 @@ class _Session:
         person = PersonParameters(
             walking_speed=self._found.speed * 13 / 14, walking_acceleration=ACCELERATION
         )
-        scene = compose(_episode(house, number, self._heap, self._rng), house.catalogue, person=person)
+        scene = assemble(_episode(house, number, self._heap, self._rng), house.catalogue, person=person)
         self._solid = shapely.union_all([shapely.Polygon(p) for p in footprint(scene.model).obstacles])
         shapely.prepare(self._solid)
         self._world = World(scene)

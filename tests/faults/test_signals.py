@@ -110,7 +110,10 @@ def test_a_batch_that_is_stopped_writes_its_tables(number, tmp_path):
 
 
 def test_a_worker_that_is_killed_is_one_line(tmp_path, mjsim, own_module):
-    own_module("import os, signal\ndef build(house, rng):\n    os.kill(os.getpid(), signal.SIGKILL)\n")
+    own_module(
+        "import os, signal\nclass Killer:\n    needs = frozenset()\n    def act(self, percept):\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\ndef build(house, rng):\n    return Killer()\n"
+    )
     words = ("--assistance", "none", "--user", "own_code:build", "--workers", "1", "--seeds", "0:4")
     done = mjsim("batch", *FAST, *words, "--out", "out")
     assert done.returncode == 1
