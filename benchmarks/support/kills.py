@@ -21,7 +21,7 @@ SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 POLL = 0.005  # s
 TIMEOUT = 600.0  # s
 _TICKS = os.sysconf("SC_CLK_TCK")
-_FASTEST = ("--objects", "2", "--fidelity", "event", "--no-regret")
+_FAST = ("--objects", "6", "--fidelity", "event", "--no-regret")
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,9 @@ class Command:
     is_batch: bool
 
 
-RUN = Command(("run", *_FASTEST, "--no-video", "--no-floor-plan"), is_batch=False)
+RUN = Command(("run", *_FAST, "--no-video"), is_batch=False)
 BATCH = Command(
-    ("batch", *_FASTEST, "--assistance", "none,optimal", "--seeds", "0:3", "--workers", "2"), is_batch=True
+    ("batch", *_FAST, "--assistance", "none,optimal", "--seeds", "0:2", "--workers", "2"), is_batch=True
 )
 
 

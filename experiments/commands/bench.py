@@ -18,9 +18,9 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 DESCRIPTION = """\
 Run a benchmark of the source checkout and print what it measured, as ratios where possible, so that the figures hold on
 other machines as well. A benchmark is a module in benchmarks/ that defines measure() -> dict of JSON values, and
-lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, kills, faults, messages,
-minutes, hours, workers, only, seeds and objects; the options of the same name set them. picture(result, path) may
-draw the result."""
+lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, kills, first, faults,
+messages, minutes, hours, workers, only, seeds and objects; the options of the same name set them.
+picture(result, path) may draw the result."""
 
 
 def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
@@ -119,6 +119,7 @@ OPTIONS = (
     ("houses", positive, "N", "number of houses"),
     ("count", positive, "N", "number of cases"),
     ("kills", positive, "N", "number of processes to kill"),
+    ("first", natural, "N", "number of the first case"),
     ("faults", positive, "N", "number of faults"),
     ("messages", positive, "N", "number of odd messages"),
     ("minutes", positive_number, "M", "minutes of play"),

@@ -1,6 +1,7 @@
 """Where commands write. What exists is kept, and a run directory is complete or not there at all."""
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -8,7 +9,7 @@ from pathlib import Path
 
 from experiments.errors import RecordError
 from experiments.runs import records
-from experiments.runs.checksums import CHECKSUMS
+from experiments.runs.checksums import CHECKSUMS, write_checksums
 from mjsim.files import exchange, work_folder
 
 SHOWN_NAMES = 3  # of what is in the way
@@ -126,6 +127,22 @@ def run_directory(path: Path, *, replace: bool = False) -> Iterator[Path]:
                 _move(folder, place, replace=replace)
 
 
+def add_files(folder: Path, path: Path) -> None:
+    """Add the files of a work folder, and the checksums of all, to a run directory: at once, or not at all.
+
+    Args:
+        folder: Work folder beside the run; afterwards it holds the run as it was.
+        path: The run directory.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    place = Path(os.path.realpath(path))
+    shutil.copytree(place, folder, copy_function=_link, dirs_exist_ok=True)
+    write_checksums(folder, records.FILES)
+    exchange(folder, place)
+
+
 def free_name(path: Path) -> Path:
     """`path`, or with the first number that makes it a name of nothing that exists."""
     number, free = 1, path
@@ -146,6 +163,14 @@ def _move(folder: Path, place: Path, *, replace: bool) -> None:
         kept = free_name(place)
         folder.replace(kept)
         raise RecordError(f"{error}; the run is kept in {kept}") from error
+
+
+def _link(source: str, target: str) -> None:
+    """The same file under a second name, or a copy where the file system knows no links."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
 
 
 @contextmanager

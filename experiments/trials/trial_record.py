@@ -1,6 +1,7 @@
 """What a session left behind, written to a run directory: the record first, pictures last."""
 
 import dataclasses
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -18,9 +19,10 @@ from experiments.runs.checksums import write_checksums
 from experiments.runs.metrics import measure
 from experiments.runs.recording import Recorded
 from experiments.runs.records import Event, EventLog
-from experiments.runs.run_directory import free_name
+from experiments.runs.run_directory import add_files, free_name
 from experiments.session.session import Session
 from experiments.session.user_code import describe
+from mjsim.files import work_folder
 from mjsim.model.scene import Scene
 
 NOTHING_FILMED = "none: nothing was filmed"  # in place of the renderer's name
@@ -94,15 +96,16 @@ def save_record(folder: Path, out: Path, scene: Scene, result: SessionResult, wa
         raise RecordError(f"cannot write {out} ({error.strerror}); the run is kept in {kept}") from error
 
 
-def draw_floor_plan(folder: Path, house: House, scene: Scene, result: SessionResult) -> str | None:
-    """Draw the floor plan of a run into its directory; why that was not possible, or None."""
+def draw_floor_plan(run: Path, house: House, scene: Scene, result: SessionResult) -> str | None:
+    """Add the floor plan to a run directory; why that was not possible, or None."""
     if not result.plans:
         return None
     try:
         from experiments.runs.topdown import draw_topdown  # matplotlib: batches do without
 
-        draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], result.arrays)
-        write_checksums(folder, records.FILES)
+        with work_folder(Path(os.path.realpath(run)).parent) as folder:
+            draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], result.arrays)
+            add_files(folder, run)
     except Exception as error:  # no picture is worth a record
         return f"no floor plan: {describe(error)}"
     return None
