@@ -81,6 +81,7 @@ def data_dictionary() -> str:
 def _metrics_rows() -> Iterator[str]:
     yield from _rows(_described(TrialConfig, leave_out={"seed", "person", "behaviour"}))
     yield "| `fingerprint` | str | Hash of the settings and of all else that the trial depends on. |"
+    yield "| `simulated` | bool | Whether the participant is simulated: whoever is not `human`. |"
     yield from _rows(_described(PersonParameters, leave_out={"motion"}), prefix="person_")
     yield "| `behaviour_...` | float | Values of the participant model, where it has any (docs/participants.md). |"
     yield from _rows(_described(Metrics))

@@ -2,6 +2,7 @@
 
 import csv
 
+import matplotlib
 import numpy as np
 import pytest
 from scipy.stats import ttest_rel
@@ -9,6 +10,7 @@ from scipy.stats import ttest_rel
 from experiments.analysis.comparison import METRICS, compare, mean_interval, missing_pairs, read_blocks
 from experiments.cli import main
 from experiments.errors import ConfigError, RecordError
+from experiments.origin import SIMULATED
 from experiments.trials.table import write_tables
 from experiments.trials.trial_config import TrialConfig
 
@@ -105,12 +107,16 @@ def test_the_command_shows_and_writes_both_and_replaces_nothing(tmp_path, capsys
     )
     for figure in ("plot.svg", "plot.png"):
         files = ["--plot", str(tmp_path / figure), "--csv", str(tmp_path / f"{figure}.csv")]
-        assert main(["compare", str(folder), *files]) == 0
+        with matplotlib.rc_context({"svg.fonttype": "none"}):
+            assert main(["compare", str(folder), *files]) == 0
         assert (tmp_path / figure).stat().st_size > 5000
-    assert "none → optimal" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "none → optimal" in printed and SIMULATED in printed
+    assert f">{SIMULATED}</text>" in (tmp_path / "plot.svg").read_text()
     with (tmp_path / "plot.svg.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 3 * len(METRICS)
+    assert {found["origin"] for found in rows} == {SIMULATED}
     assert float(rows[0]["second_mean"]) - float(rows[0]["first_mean"]) == pytest.approx(
         float(rows[0]["difference"])
     )

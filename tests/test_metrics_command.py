@@ -34,6 +34,7 @@ def test_a_run_without_its_metrics_is_measured_anew(run, tmp_path, capsys):
     assert main(["metrics", str(folder), "--out", str(tmp_path / "m.json")]) == 0
     (row,) = read_json(tmp_path / "m.json")
     expected = read_json(run / records.METRICS)
+    assert expected["simulated"] is True  # the default participant is no person
     for name in ("frames_sha256", "renderer", "wall_s"):
         del expected[name], row[name]
     assert row == expected

@@ -14,9 +14,9 @@ from experiments.analysis.measures import read_measures
 from experiments.analysis.statistics.power import people_per_cell
 from experiments.analysis.study_analysis import analyse
 from experiments.analysis.study_power import Expenses, Wanted, plan_power
-from experiments.analysis.study_table import RECORDED, SIMULATED
 from experiments.cli import main
 from experiments.errors import ConfigError, RecordError, StatisticsError
+from experiments.origin import RECORDED, SIMULATED
 from experiments.trials.table import write_tables
 
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}

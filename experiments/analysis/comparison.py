@@ -20,6 +20,7 @@ from scipy.stats import t
 
 from experiments.analysis.statistics.noncentral import t_noncentrality
 from experiments.errors import ConfigError, RecordError
+from experiments.origin import origin_of
 from experiments.trials.design import counted
 from experiments.trials.table import NAME
 from experiments.trials.trial_config import SEEDS
@@ -111,6 +112,12 @@ def read_blocks(folder: Path) -> list[Block]:
         label = ", ".join(f"{n} {row[n]}" for n in varying if n != "time_limit" or "objects" not in varying)
         blocks[label][row["assistance"]][tuple(row[name] for name in identity)] = row
     return [Block(label, conditions) for label, conditions in blocks.items()]
+
+
+def batch_origin(blocks: Sequence[Block]) -> str:
+    """Whether the people of a batch were simulated, as in `experiments.origin`."""
+    rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
+    return origin_of(row["user"] for row in rows)
 
 
 def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:

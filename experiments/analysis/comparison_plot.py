@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from experiments.analysis.comparison import Block, mean_interval
+from experiments.analysis.comparison import Block, batch_origin, mean_interval
+from experiments.runs.topdown import mark_origin
 from mjsim.files import replacing
 
 FORMATS = (".png", ".svg", ".pdf")
@@ -28,6 +29,7 @@ def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str])
         row[0].set_ylabel(block.label.replace(", ", "\n"), fontsize=8)
     for metric, axes in zip(metrics, panels[0], strict=True):
         axes.set_title(metric, fontsize=9)
+    mark_origin(figure, batch_origin(blocks))
     with replacing(path) as temporary:
         # No date in the file: equal batches give equal figures.
         metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix, {})

@@ -18,8 +18,9 @@ from experiments.analysis.published import Direction, Published, PublishedTest
 from experiments.analysis.score_population import population_eta_squared
 from experiments.analysis.score_rules import Found, points, published_cells, tests_of, varies_most
 from experiments.analysis.statistics.effects import Interval
-from experiments.analysis.study_table import RECORDED, StudyTable
+from experiments.analysis.study_table import StudyTable
 from experiments.errors import StatisticsError
+from experiments.origin import RECORDED
 
 POOL = 200  # people in each cell that make a pool
 REPLICATES = 200  # studies drawn from it

@@ -14,6 +14,7 @@ from experiments.analysis.comparison import mean_interval
 from experiments.analysis.measures import LIKERT_PREFIX
 from experiments.analysis.study_analysis import Analysis
 from experiments.analysis.study_table import ANSWERS, StudyTable
+from experiments.runs.topdown import mark_origin
 
 # Okabe-Ito colours, distinct for all common kinds of colour vision.
 COLOURS = ("#666666", "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")
@@ -113,7 +114,7 @@ def svg(figure: Figure, title: str) -> str:
 
 
 def _svg(figure: Figure, title: str, table: StudyTable) -> str:
-    figure.suptitle(table.origin, fontsize=8, x=0.99, ha="right", color="#B00020")
+    mark_origin(figure, table.origin)
     return svg(figure, f"{title}. {table.origin}.")
 
 

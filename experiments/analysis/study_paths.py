@@ -17,7 +17,7 @@ from experiments.files import read_arrays
 from experiments.house import House
 from experiments.runs import records
 from experiments.runs.run_directory import TRIALS
-from experiments.runs.topdown import PLANNED, WALKED, planned_path
+from experiments.runs.topdown import PLANNED, WALKED, mark_origin, planned_path
 from mjsim.episode import Episode
 
 WIDTH = 4.0  # inches of a panel
@@ -42,7 +42,7 @@ def paths_figure(table: StudyTable, folder: Path) -> str:
     for axes, (row, run) in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         _draw_run(axes, row, run)
     figure.axes[0].legend(fontsize=7, loc="lower left")
-    figure.suptitle(table.origin, fontsize=8, x=0.99, ha="right", color="#B00020")
+    mark_origin(figure, table.origin)
     return svg(figure, f"Planned and walked paths. {table.origin}.")
 
 

@@ -11,8 +11,8 @@ from experiments.analysis.study_analysis import STRICT, Analysis, Result
 from experiments.analysis.study_figures import answers, by_condition, interactions, variances
 from experiments.analysis.study_files import f_tests
 from experiments.analysis.study_paths import paths_figure
-from experiments.analysis.study_table import RECORDED
 from experiments.errors import ExperimentError
+from experiments.origin import RECORDED
 from mjsim.errors import MjsimError
 
 TITLE = "Study of assistance and difficulty"

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from experiments.analysis.measures import LIKERT_PREFIX, Measures, resolve
 from experiments.errors import RecordError
-from experiments.participants.human import NAME as HUMAN
+from experiments.origin import RECORDED, origin_of
 from experiments.session.endings import ALL_DELIVERED
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.table import NAME
 from experiments.trials.trial_config import SEEDS
 
-SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 REQUIRED = ("assistance", "objects", "user")
 CONDITIONS = ("none", "highlight", "optimal")  # of the paper, in its order
 ANSWERS = (1, 5)  # of Likert items, from and to
@@ -120,7 +119,8 @@ def study_table(rows: Sequence[Mapping[str, Any]], measures: Measures, path: Pat
         wanted = ", ".join(m.column for m in measures.objective.values())
         raise RecordError(f"{path} has none of the measures {wanted}")
     columns = {name: numbers[column] for name, column in sources.items()}
-    origin, answers = _origin(rows), [name for name in columns if name.startswith(LIKERT_PREFIX)]
+    origin = origin_of(row["user"] for row in rows)
+    answers = [name for name in columns if name.startswith(LIKERT_PREFIX)]
     if origin != RECORDED and answers:
         raise RecordError(f"{path} has answers of simulated people ({answers[0]}); nothing simulates answers")
     for name in answers:
@@ -173,11 +173,6 @@ def _check_answers(values: NDArray[np.float64], name: str, path: Path) -> None:
     bad = given[(given != np.round(given)) | (given < ANSWERS[0]) | (given > ANSWERS[1])]
     if len(bad):
         raise RecordError(f"{path}: {name} has the answer {bad[0]:g}; answers are whole numbers from 1 to 5")
-
-
-def _origin(rows: Sequence[Mapping[str, Any]]) -> str:
-    people = sum(row["user"] == HUMAN for row in rows)
-    return RECORDED if people == len(rows) else PARTLY_SIMULATED if people else SIMULATED
 
 
 def _notes(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, NDArray[np.float64]]) -> list[str]:

@@ -15,6 +15,7 @@ from experiments.analysis.comparison import (
     METRICS,
     Difference,
     Interval,
+    batch_origin,
     compare,
     missing_pairs,
     read_blocks,
@@ -66,19 +67,20 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--plot {arguments.plot} must end in one of {', '.join(FORMATS)}")
     blocks = read_blocks(arguments.folder)
     differences = compare(blocks, arguments.metrics)
-    _show(differences)
+    origin = batch_origin(blocks)
+    _show(differences, origin)
     console = Console(stderr=True, highlight=False, markup=False)
     for line in missing_pairs(blocks):
         console.print(line, style="yellow", soft_wrap=True)
     if arguments.csv is not None:
-        _write_csv(arguments.csv, differences)
+        _write_csv(arguments.csv, differences, origin)
     if arguments.plot is not None:
         draw_comparison(arguments.plot, blocks, arguments.metrics)
     return 0
 
 
-def _show(differences: Sequence[Difference]) -> None:
-    table = Table(box=None, header_style="bold")
+def _show(differences: Sequence[Difference], origin: str) -> None:
+    table = Table(box=None, header_style="bold", title=origin, title_justify="left")
     for name in ("", "metric", "conditions", "pairs", "means", "difference [95 %]", "d_z [95 %]", "p"):
         table.add_column(name.replace("[", r"\["), overflow="fold")
     for d in differences:
@@ -101,14 +103,18 @@ def _with_interval(value: float | None, interval: Interval) -> str:
     return f"{value:+.3g}" + (rf" \[{interval[0]:+.3g}, {interval[1]:+.3g}]" if interval else "")
 
 
-def _write_csv(path: Path, differences: Sequence[Difference]) -> None:
+def _write_csv(path: Path, differences: Sequence[Difference], origin: str) -> None:
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         names = ("first", "second", "first_mean", "second_mean", "low", "high", "effect_low", "effect_high")
-        writer.writerow(("block", "metric", "pairs", "difference", "effect", "p", *names))
+        writer.writerow(("origin", "block", "metric", "pairs", "difference", "effect", "p", *names))
         for d in differences:
             values = dataclasses.asdict(d)
             pairs = (*d.conditions, *d.means, *(d.interval or ("", "")), *(d.effect_interval or ("", "")))
             writer.writerow(
-                (*(values[n] for n in ("block", "metric", "pairs", "difference", "effect", "p")), *pairs)
+                (
+                    origin,
+                    *(values[n] for n in ("block", "metric", "pairs", "difference", "effect", "p")),
+                    *pairs,
+                )
             )

@@ -24,7 +24,7 @@ from experiments.commands.options import (
 )
 from experiments.errors import ConfigError, RecordError
 from experiments.familiarisation.story import story_text
-from experiments.participants.human import NAME as HUMAN
+from experiments.origin import HUMAN
 from experiments.runs.phases import PHASES, STORY, TASK, TRAINING, phases_of
 from experiments.trials.training import training_config
 from experiments.trials.trial_config import TrialConfig

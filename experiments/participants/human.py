@@ -7,8 +7,6 @@ import numpy as np
 from experiments.errors import ConfigError
 from experiments.house import House
 
-NAME = "human"
-
 
 def build(house: House, rng: np.random.Generator) -> Never:  # noqa: ARG001 - the interface of participants
     """Refuse to simulate a person.

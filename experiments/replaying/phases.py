@@ -5,7 +5,7 @@ from typing import Any
 
 from experiments.errors import RecordError
 from experiments.familiarisation.familiarise import watch_flythrough
-from experiments.participants.human import NAME as HUMAN
+from experiments.origin import is_simulated
 from experiments.replaying.record_checks import Mismatch
 from experiments.replaying.replayer import Replayer
 from experiments.runs.phases import FLYTHROUGH, TASK, TRAINING, phases_of
@@ -19,7 +19,7 @@ def phase_mismatches(replayer: Replayer) -> Iterator[Mismatch]:
     The record of the training is a run directory of its own, which is replayed by itself.
     """
     record = replayer.record
-    if record.start.get("user") == HUMAN:
+    if not is_simulated(record.start.get("user")):
         return
     ended = {e["phase"]: e for _, e in record.events if e["event"] == PHASE_ENDED}
     expected = tuple(name for name in phases_of(record.start.get("phases", TASK)) if name != TASK)

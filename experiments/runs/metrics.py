@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.origin import is_simulated
 from experiments.runs.health import summarise_health
 from experiments.runs.phases import FLYTHROUGH
 from experiments.runs.records import PARTICIPANT, PHASE_ENDED, Event
@@ -114,6 +115,7 @@ def measure(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict
     ending = {name: events[-1][name] for name in ("signal", "error") if name in events[-1]}
     return {
         **settings,
+        "simulated": is_simulated(settings.get("user")),
         **_person(events),
         **asdict(compute_metrics(events, arrays["position"])),
         **summarise_health(events, arrays),

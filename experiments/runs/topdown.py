@@ -28,7 +28,7 @@ LEGEND = 7.0  # inches that the legend needs
 
 
 def draw_topdown(
-    path: Path, house: House, scene: Scene, plan: Event, arrays: Mapping[str, NDArray[Any]]
+    path: Path, house: House, scene: Scene, plan: Event, arrays: Mapping[str, NDArray[Any]], origin: str
 ) -> None:
     """Write a PNG of the house with the plan at the start and the path walked.
 
@@ -38,6 +38,7 @@ def draw_topdown(
         scene: The composed episode.
         plan: The first `plan` event of the log.
         arrays: The trajectory, as `Trajectory.arrays` gives it; only `position` is drawn, m, shape (T, 2).
+        origin: Whether the participant is simulated (`experiments.origin`).
     """
     scale = _scale(house.bounds)
     floor = render_floorplan(scene.model, World(scene).data, house.bounds, pixels_per_metre=scale)
@@ -59,9 +60,15 @@ def draw_topdown(
     _draw_objects(axes, house, scene)
     axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal", xticks=[], yticks=[])
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=5, frameon=False, fontsize=10)
+    mark_origin(figure, origin)
     with replacing(path) as temporary:
         # Fixed metadata, so that equal trials give equal bytes.
         figure.savefig(temporary, metadata={"Software": "mjsim"})
+
+
+def mark_origin(figure: Figure, origin: str) -> None:
+    """Say above a figure whether people were simulated."""
+    figure.suptitle(origin, fontsize=8, x=0.99, ha="right", color="#B00020")
 
 
 def _scale(bounds: tuple[float, float, float, float]) -> float:

@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 
 from experiments.errors import ConfigError
+from experiments.origin import HUMAN, is_simulated
 from experiments.participants.behaviour import BehaviourDistribution
-from experiments.participants.human import NAME as HUMAN
 from experiments.studies import FOLDER
 from experiments.trials.design import Design, read_design
 from experiments.trials.person_distribution import PersonDistribution
@@ -40,7 +40,7 @@ def read_study(path: Path, people: int | None = None) -> Design:
     """
     cells: dict[Any, list[TrialConfig]] = {}
     for trial in read_design(path).trials:
-        if trial.user == HUMAN:
+        if not is_simulated(trial.user):
             raise ConfigError(
                 f"{path}: user {HUMAN} is nobody who can be simulated; name a participant model"
             )

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from experiments.files import save_arrays, write_json
 from experiments.house import House
+from experiments.origin import origin_of
 from experiments.runs import records
 from experiments.runs.checksums import write_checksums
 from experiments.runs.metrics import measure
@@ -67,6 +68,11 @@ class SessionResult:
         return self.log.events[-1]
 
     @property
+    def user(self) -> str:
+        """Name of the participant."""
+        return str(self.log.events[0]["user"])
+
+    @property
     def plans(self) -> list[Event]:
         """Every plan that was logged."""
         return [event for event in self.log.events if event["event"] == "plan"]
@@ -103,8 +109,9 @@ def draw_floor_plan(run: Path, house: House, scene: Scene, result: SessionResult
     try:
         from experiments.runs.topdown import draw_topdown  # matplotlib: batches do without
 
+        origin = origin_of([result.user])
         with work_folder(Path(os.path.realpath(run)).parent) as folder:
-            draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], result.arrays)
+            draw_topdown(folder / records.TOPDOWN, house, scene, result.plans[0], result.arrays, origin)
             add_files(folder, run)
     except Exception as error:  # no picture is worth a record
         return f"no floor plan: {describe(error)}"
