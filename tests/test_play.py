@@ -13,6 +13,7 @@ import httpx
 import pytest
 from websockets.sync.client import connect
 
+from benchmarks.support.play_server import worker_of
 from experiments.replaying.replay import replay
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -77,11 +78,6 @@ class Player:
         self.hear("taken", input=number)
 
 
-def workers_of(process):
-    listed = subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True, check=True)
-    return sorted(map(int, listed.stdout.split()))
-
-
 def test_a_session_survives_its_worker_and_its_server(tmp_path):
     with server(tmp_path) as (process, url):
         address, port = begin(url), urlsplit(url).port
@@ -90,16 +86,19 @@ def test_a_session_survives_its_worker_and_its_server(tmp_path):
         player.say(type="begin")
         player.press(1, forward=1.0, yaw=0.5)
         player.press(2, forward=0.0)
-        os.kill(workers_of(process)[0], signal.SIGKILL)
+        (journal,) = tmp_path.glob("*/journals/training/journal.bin")
+        os.kill(worker_of(journal), signal.SIGKILL)
         ready = player.hear("ready")
         assert ready["resumed"] and ready["input"] == 2
         player.press(3, turn=1.0)
+        worker = worker_of(journal)
         process.kill()
         process.wait()
     with server(tmp_path, port) as (process, _):
         player = Player(address)
         ready = player.hear("ready")
         assert ready["resumed"] and ready["input"] == 3
+        assert worker_of(journal) == worker, "a worker outlives its server"
         assert player.hear("paused")["reason"] == "disconnected"
         player.say(type="resume")
         player.press(4, turn=0.0)
@@ -107,6 +106,7 @@ def test_a_session_survives_its_worker_and_its_server(tmp_path):
         player.hear("over", reason="interrupted")
         process.send_signal(signal.SIGTERM)
         assert process.wait(timeout=PATIENCE) == 128 + signal.SIGTERM
+        assert not Path(f"/proc/{worker}").exists(), "a server that ends by itself leaves none behind"
     (run,) = tmp_path.glob("*/training")
     report = replay(run)
     assert report.steps > 0

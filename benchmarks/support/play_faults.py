@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support.play_browser import SimulatedBrowser, begin_task
-from benchmarks.support.play_server import PlayProcess, fill_disk
+from benchmarks.support.play_server import PlayProcess, fill_disk, worker_of
 from experiments.errors import ExperimentError
 from experiments.replaying.replay import replay
 from experiments.web.journal import read_journal
@@ -21,6 +21,7 @@ from experiments.web.session_journal import decode, lines_of
 FAULTS_OF_A_VISIT = 12
 LARGEST_SCROLL = 100
 TASK = "task"
+COLD = "server and worker killed"  # all has to be loaded again
 
 
 class FaultyVisit:
@@ -96,8 +97,22 @@ class FaultyVisit:
         self._server.kill()
         await self._browser.until(lambda: "closed" in self._browser.last)
         await self._browser.cut()
+        return await self._restart()
+
+    async def kill_all(self) -> float:
+        """Server and worker die, as with the machine, and the server is started again."""
+        worker = worker_of(self._journal)
+        self._server.kill()
+        os.kill(worker, signal.SIGKILL)
+        await self._browser.until(lambda: "closed" in self._browser.last)
+        await self._browser.cut()
+        return await self._restart()
+
+    async def _restart(self) -> float:
+        began = time.perf_counter()
         await asyncio.to_thread(self._server.start)
-        return await self._open()
+        await self._open()
+        return began
 
     async def full_disk(self) -> float:
         """The disk is full for a while."""
@@ -108,10 +123,8 @@ class FaultyVisit:
         return await self.reload()
 
     async def _hit_worker(self, hit: Callable[[int], None]) -> float:
-        worker = self._server.worker_of(self._journal)
-        if worker is None:
-            raise ChildProcessError("no worker has the journal open")
-        await asyncio.to_thread(self._server.wait_for_spare)
+        worker = worker_of(self._journal)
+        await asyncio.to_thread(self._server.wait_until_warm)
         began = time.perf_counter()
         hit(worker)
         return began
@@ -154,6 +167,7 @@ FAULTS: dict[str, Callable[[FaultyVisit], Awaitable[float]]] = {
     "second tab": FaultyVisit.second_tab,
     "worker killed": FaultyVisit.kill_worker,
     "server killed": FaultyVisit.kill_server,
+    COLD: FaultyVisit.kill_all,
     "full disk": FaultyVisit.full_disk,
 }
 
@@ -178,7 +192,7 @@ def measure_faults(folder: Path, count: int, seed: int, *words: str) -> dict[str
             problems += visit.problems
             for name, taken in visit.times.items():
                 times[name] += taken
-    warm = [seconds for name, taken in times.items() if name != "server killed" for seconds in taken]
+    warm = [seconds for name, taken in times.items() if name != COLD for seconds in taken]
     return {
         "faults": count,
         "wrong": len(problems),

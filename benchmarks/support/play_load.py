@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support.play_browser import Link, SimulatedBrowser, begin_task
-from benchmarks.support.play_server import PATIENCE, PlayProcess, memory, processor_time
+from benchmarks.support.play_server import PATIENCE, PlayProcess, memory, processor_time, worker_of
 
 PERIOD = 0.25  # s between two inputs
 MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
@@ -40,9 +40,7 @@ async def _latency(
     await begin_task(browser)
     await browser.until(lambda: bool(browser.frames) or codec == "none")
     await asyncio.sleep(1.0)
-    worker = server.worker_of(server.journal(address, "task"))
-    if worker is None:
-        raise ChildProcessError("no worker has the journal open")
+    worker = worker_of(server.journal(address, "task"))
     browser.frames.clear()
     browser.bytes, began, first = 0, time.perf_counter(), browser.next
     processors = [processor_time(pid) for pid in (worker, server.process.pid)]
@@ -82,9 +80,7 @@ async def _mash(server: PlayProcess, seconds: float, rng: np.random.Generator) -
     browser = SimulatedBrowser(address, codec="jpeg", state=True)
     await browser.open("training")  # it has no limit of time
     await browser.ready()
-    worker = server.worker_of(server.journal(address, "training"))
-    if worker is None:
-        raise ChildProcessError("no worker has the journal open")
+    worker = worker_of(server.journal(address, "training"))
     memories, began, longest = list[tuple[float, float]](), time.perf_counter(), 0.0
     while (passed := time.perf_counter() - began) < seconds:
         if passed >= len(memories) * seconds / SAMPLES:

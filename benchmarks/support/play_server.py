@@ -17,7 +17,7 @@ from experiments.web.journal import JOURNAL
 from experiments.web.visits import JOURNALS, token_hash
 
 PATIENCE = 300.0  # s; a loaded machine may be slow
-IDLE = 0.5  # s without work after which a worker is taken for warm
+IDLE = 0.5  # s without work after which the process that forks workers is taken for warm
 _TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -51,7 +51,7 @@ class PlayProcess:
             raise ChildProcessError(self.output.read_text())
 
     def kill(self) -> None:
-        """`kill -9`; its workers notice by themselves."""
+        """`kill -9`; its workers wait for the next one."""
         self.process.kill()
         self.process.communicate()
 
@@ -69,33 +69,20 @@ class PlayProcess:
         """Journal of a phase of a visit."""
         return self.visit(address) / JOURNALS / phase / JOURNAL
 
-    def workers(self) -> list[int]:
-        """Process numbers of its workers."""
-        path = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
-        return [int(number) for number in path.read_text().split()]
-
-    def worker_of(self, journal: Path) -> int | None:
-        """The worker that has a journal open."""
-        return next((pid for pid in self.workers() if journal in _open_files(pid)), None)
-
-    def wait_for_spare(self) -> None:
-        """Wait until a worker is warm that could take a session over.
+    def wait_until_warm(self) -> None:
+        """Wait until workers can be forked: house and kernels are loaded.
 
         Raises:
-            TimeoutError: There is none.
+            TimeoutError: They are not.
         """
+        path = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
-            before = self._idle_times()
+            before = {pid: processor_time(pid) for pid in path.read_text().split()}
             time.sleep(IDLE)
-            if any(before.get(pid) == spent for pid, spent in self._idle_times().items()):
+            if any(processor_time(pid) == spent for pid, spent in before.items()):
                 return
-        raise TimeoutError("no spare worker became ready")
-
-    def _idle_times(self) -> dict[int, float]:
-        """Processor time of the workers without a session, s."""
-        busy = [pid for pid in self.workers() if any(path.name == JOURNAL for path in _open_files(pid))]
-        return {pid: processor_time(pid) for pid in self.workers() if pid not in busy}
+        raise TimeoutError("workers cannot be forked yet")
 
     def __enter__(self) -> "PlayProcess":
         self.start()
@@ -123,16 +110,20 @@ def memory(pid: int) -> float:
     return next(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1024.0
 
 
-def processor_time(pid: int) -> float:
+def processor_time(pid: int | str) -> float:
     """Processor time of a process, s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS
 
 
-def _open_files(pid: int) -> set[Path]:
-    files = set()
-    with suppress(OSError):
-        for entry in Path(f"/proc/{pid}/fd").iterdir():
-            with suppress(OSError):
-                files.add(entry.readlink())
-    return files
+def worker_of(journal: Path) -> int:
+    """The process that has a journal open.
+
+    Raises:
+        ChildProcessError: There is none.
+    """
+    for folder in Path("/proc").glob("[0-9]*/fd"):
+        with suppress(OSError):
+            if any(entry.readlink() == journal for entry in folder.iterdir()):
+                return int(folder.parent.name)
+    raise ChildProcessError(f"no worker has {journal} open")

@@ -22,6 +22,12 @@ class Connection:
         with self._lock, suppress(OSError):
             self._link.sendall(packed(message))
 
+    def replace(self, link: socket.socket) -> None:
+        """Go on with another socket: the server was started again."""
+        with self._lock:
+            self._link.close()
+            self._link = link
+
     def receive(self) -> Iterator[Any]:
         """Messages until the server closes the connection."""
         while (head := self._read(messages.LENGTH.size)) is not None:

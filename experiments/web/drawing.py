@@ -43,12 +43,16 @@ class Drawer:
     Args:
         scene: The scene.
         house: The house, for pictures.
-        pictures: What `render_pictures` made of the house's catalogue.
+        pictures: Gives what `render_pictures` made of the house's catalogue; called from the drawing thread.
         send: Takes the frames; called from the drawing thread.
     """
 
     def __init__(
-        self, scene: Scene, house: House, pictures: dict[str, Image], send: Callable[[Frame], None]
+        self,
+        scene: Scene,
+        house: House,
+        pictures: Callable[[], dict[str, Image]],
+        send: Callable[[Frame], None],
     ) -> None:
         self._scene, self._house, self._pictures, self._send = scene, house, pictures, send
         self._changed = threading.Condition()
@@ -154,7 +158,7 @@ class Drawer:
         if size not in self._renderers:
             width, height = SIZES[size]
             film = FilmConfig(width, height)
-            self._renderers[size] = FirstPersonRenderer(self._scene, self._house, film, self._pictures)
+            self._renderers[size] = FirstPersonRenderer(self._scene, self._house, film, self._pictures())
         return self._renderers[size]
 
 

@@ -20,7 +20,7 @@ class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 
 
 class Open(Message, frozen=True):
-    """Begin a session, or go on with it.
+    """Begin a session, or go on with it; a worker that has it open already only says where it stands.
 
     Attributes:
         folder: Folder of its journal.
@@ -81,7 +81,21 @@ class Leave(Message, frozen=True):
     """End the session now."""
 
 
-ToWorker = Open | Begin | Inputs | View | Seen | Pause | Resume | Leave
+class Exit(Message, frozen=True):
+    """End the process now; the journal keeps the session."""
+
+
+ToWorker = Open | Begin | Inputs | View | Seen | Pause | Resume | Leave | Exit
+
+
+class Started(Message, frozen=True):
+    """First message of a worker, to every server that it meets.
+
+    Attributes:
+        process: Its process number.
+    """
+
+    process: int
 
 
 class Ready(Message, frozen=True):
@@ -192,7 +206,7 @@ class Failed(Message, frozen=True):
     message: str
 
 
-FromWorker = Ready | Taken | Frame | State | Text | Busy | Paused | Over | Failed
+FromWorker = Started | Ready | Taken | Frame | State | Text | Busy | Paused | Over | Failed
 
 encode = msgspec.msgpack.Encoder().encode
 decode_to_worker = msgspec.msgpack.Decoder(ToWorker).decode

@@ -1,54 +1,45 @@
-"""Worker processes, one of them always warm, and the places that sessions share."""
+"""Worker processes, forked when a session needs one, and the places that sessions share."""
 
 import asyncio
 import os
+import signal
 import socket
+import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
-from experiments.web.messages import LENGTH, MAX_MESSAGE, Message, decode_from_worker, packed
+from experiments.web.messages import LENGTH, MAX_MESSAGE, Exit, Message, Started, decode_from_worker, packed
+from experiments.web.rejoining import ask_worker
 
-PATIENCE = 5.0  # s that a worker has to end by itself
+PATIENCE = 5.0  # s that a process has to end by itself
+STARTS = 3  # of the process that forks workers, after which none can be had
 
 
 class WorkerProcess:
-    """A worker process and the socket to it. It ends when the socket is closed, also by the death of this process."""
+    """A worker process and the socket to it."""
 
-    def __init__(
-        self,
-        process: asyncio.subprocess.Process,
-        reader: asyncio.StreamReader,
-        writer: asyncio.StreamWriter,
-    ) -> None:
-        self._process, self._reader, self._writer = process, reader, writer
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader, self._writer = reader, writer
+        self.process = 0
 
     @classmethod
-    async def start(cls) -> "WorkerProcess":
-        """Start a worker; it loads the usual house while nobody needs it yet."""
-        ours, theirs = socket.socketpair()
-        with theirs:
-            process = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-P", "-m", "experiments.web.worker", str(theirs.fileno())),
-                pass_fds=[theirs.fileno()],
-                stdin=asyncio.subprocess.DEVNULL,
-                start_new_session=True,  # Ctrl-C in a terminal is for the server alone
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
-            )
-        reader, writer = await asyncio.open_connection(sock=ours)
-        return cls(process, reader, writer)
-
-    @property
-    def pid(self) -> int:
-        """Process number."""
-        return self._process.pid
-
-    @property
-    def alive(self) -> bool:
-        """Whether the process has not ended."""
-        return self._process.returncode is None
+    async def at(cls, link: socket.socket) -> "WorkerProcess | None":
+        """The worker at the other end of a socket, once it has said that it is there; None if it is not."""
+        worker = cls(*await asyncio.open_connection(sock=link))
+        try:
+            started = await worker.receive()
+        except asyncio.CancelledError:
+            worker._writer.close()
+            raise
+        if not isinstance(started, Started):
+            worker._writer.close()
+            return None
+        worker.process = started.process
+        return worker
 
     def send(self, message: Message) -> None:
         """Send a message; nothing happens if the worker is dead, which `receive` notices."""
@@ -67,67 +58,99 @@ class WorkerProcess:
 
     async def close(self) -> None:
         """End the process."""
-        self._writer.close()
+        self.send(Exit())
         try:
-            await asyncio.wait_for(self._process.wait(), PATIENCE)
+            await asyncio.wait_for(self._ended(), PATIENCE)
         except TimeoutError:
             with suppress(ProcessLookupError):
-                self._process.kill()
-            await self._process.wait()
+                os.kill(self.process, signal.SIGKILL)
+        self._writer.close()
+
+    async def _ended(self) -> None:
+        with suppress(OSError):
+            while await self._reader.read(MAX_MESSAGE):
+                pass
 
 
 class Pool:
-    """Keeps a spare worker warm for the next session, or for one whose worker dies."""
+    """Gives workers.
 
-    def __init__(self) -> None:
-        self._spare: asyncio.Task[WorkerProcess] | None = None
-        self._workers: set[WorkerProcess] = set()
+    Args:
+        house: Name of the house that is played in; others are loaded when they are needed.
+    """
+
+    def __init__(self, house: str) -> None:
+        self._house = house
+        self._control: socket.socket | None = None
+        self._forkserver: subprocess.Popen[bytes] | None = None
         self._closing: set[asyncio.Task[None]] = set()
-        self._closed = False
 
     def warm_up(self) -> None:
-        """See that there is a spare worker."""
-        if self._spare is None and not self._closed:
-            self._spare = asyncio.create_task(self._start())
+        """Start the process that forks workers, where it does not run."""
+        if self._forkserver is not None and self._forkserver.poll() is None:
+            return
+        self._hang_up()
+        self._control, theirs = socket.socketpair()
+        with theirs:
+            self._forkserver = subprocess.Popen(
+                (sys.executable, "-P", "-m", "experiments.web.forkserver", str(theirs.fileno()), self._house),
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,  # Ctrl-C in a terminal is for the server alone
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+            )
 
-    async def take(self) -> WorkerProcess:
-        """The spare worker; the next one is started."""
-        while True:
-            self.warm_up()
-            spare, self._spare = self._spare, None
-            if spare is None:
-                raise asyncio.CancelledError
-            try:
-                worker = await asyncio.shield(spare)
-            except asyncio.CancelledError:
-                spare.add_done_callback(lambda started: self.discard(started.result()))
-                raise
-            self.warm_up()
-            if worker.alive:
+    async def take(self, journal: Path) -> WorkerProcess:
+        """The worker that has a session open since before this server was started; if there is none, a new one.
+
+        Args:
+            journal: Folder of the session's journal.
+
+        Raises:
+            OSError: No worker can be started.
+        """
+        if (link := ask_worker(journal)) is not None and (worker := await WorkerProcess.at(link)) is not None:
+            return worker
+        for _ in range(STARTS):
+            if (worker := await self._fork()) is not None:
                 return worker
-            self.discard(worker)
+        raise OSError("no worker can be started")
 
     def discard(self, worker: WorkerProcess) -> None:
         """End a worker, without waiting for it."""
-        self._workers.discard(worker)
         task = asyncio.create_task(worker.close())
         self._closing.add(task)
         task.add_done_callback(self._closing.discard)
 
     async def close(self) -> None:
         """End all workers, and wait for that."""
-        self._closed = True
-        if self._spare is not None:
-            await asyncio.wait([self._spare])
-        for worker in list(self._workers):
-            self.discard(worker)
+        self._hang_up()
         if self._closing:
             await asyncio.wait(list(self._closing))
+        if self._forkserver is not None:
+            await asyncio.to_thread(_end, self._forkserver)
 
-    async def _start(self) -> WorkerProcess:
-        worker = await WorkerProcess.start()
-        self._workers.add(worker)
-        return worker
+    async def _fork(self) -> WorkerProcess | None:
+        """A new worker; None if the process that forks them died meanwhile."""
+        self.warm_up()
+        ours, theirs = socket.socketpair()
+        with theirs, suppress(OSError):
+            if self._control is not None:
+                socket.send_fds(self._control, [b"f"], [theirs.fileno()])
+        return await WorkerProcess.at(ours)
+
+    def _hang_up(self) -> None:
+        if self._control is not None:
+            self._control.close()
+            self._control = None
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    try:
+        process.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 class Places:

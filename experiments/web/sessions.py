@@ -209,7 +209,7 @@ class PlayedSession:
             self._paused = "disconnected"
         while True:
             if self._worker is None:
-                self._worker = await self._pool.take()
+                self._worker = await self._pool.take(visit.journal(phase))
             self._worker.send(
                 messages.Open(
                     str(visit.journal(phase)), str(visit.run(phase)), visit.settings(phase), self._paused

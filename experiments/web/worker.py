@@ -1,13 +1,14 @@
-"""A worker process: one world, one session at a time, its clock, and its journal. The server starts it.
+"""A worker process: one world, one session at a time, its clock, and its journal.
 
-It is ready for a session as soon as it has loaded the usual house. When its socket is closed it exits; the journal
-holds everything that was acknowledged.
+It is forked with house and kernels loaded (`forkserver.py`). A server that dies leaves its worker behind: the clock
+stands, and the worker waits in the session's folder for the next server (`rejoining.py`). Without a session it exits;
+the journal holds everything that was acknowledged.
 """
 
-import argparse
 import os
 import socket
 import threading
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ from experiments.runs import records
 from experiments.runs.run_directory import is_run, run_directory
 from experiments.session.user_code import describe
 from experiments.session.viewer import Viewer
-from experiments.trials import warmup
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_record import draw_floor_plan, save_record
 from experiments.web import messages
@@ -29,6 +29,7 @@ from experiments.web.encoders import Image
 from experiments.web.inbox import Inbox
 from experiments.web.journal import JOURNAL, read_journal
 from experiments.web.live_session import LiveSession, config_of, is_over, open_journal, result_of
+from experiments.web.rejoining import wait_for_server
 from hud import schema
 from hud.projection import CameraView
 from hud.state import HudState
@@ -37,6 +38,7 @@ from mjsim.render import render_pictures
 from mjsim.world import World
 
 STATE_PERIOD = 2  # control steps between two states
+DISCONNECTED = "disconnected"  # why the clock stands without a server
 
 
 class Window(Viewer):
@@ -80,52 +82,93 @@ class Worker:
 
     Args:
         link: Socket to the server.
+        name: Of the house that is played in.
+        house: That house.
+        pictures: What `render_pictures` made of it; none where that is still to be done.
     """
 
-    def __init__(self, link: socket.socket) -> None:
+    def __init__(self, link: socket.socket, name: str, house: House, pictures: dict[str, Image]) -> None:
         self._connection = Connection(link)
         self._inbox = Inbox()
         self._opened: list[messages.Open] = []
+        self._serving: messages.Open | None = None
         self._arrived = threading.Condition()
         self._window = Window(self._connection)
         self._view: messages.View | None = None
-        self._houses: dict[str, House] = {}
-        self._pictures: dict[int, dict[str, Image]] = {}
+        self._houses = {name: house}
+        self._pictures = {id(house): pictures} if pictures else {}
 
     def run(self) -> None:
-        """Serve until the server is gone."""
-        house = self._house()
-        warmup.plan()
-        warmup.act(house)
-        self._pictures_of(house)
+        """Serve until the server is gone, and no other one asks for the session."""
+        self._connection.send(messages.Started(os.getpid()))
         threading.Thread(target=self._receive, name="receiving", daemon=True).start()
         while (opened := self._next_session()) is not None:
             try:
                 self._serve(opened)
             except Exception as error:  # the server tells the person, and keeps the journal
                 self._connection.send(messages.Failed(describe(error)))
+            with self._arrived:
+                self._serving = None
 
     def _next_session(self) -> messages.Open | None:
         with self._arrived:
             self._arrived.wait_for(lambda: self._opened or self._inbox.closed)
             if not self._opened:
                 return None
-            opened = self._opened.pop(0)
+            self._serving = opened = self._opened.pop(0)
             self._inbox = Inbox(closed=self._inbox.closed, paused=opened.paused)
             return opened
 
     def _receive(self) -> None:
-        for message in self._connection.receive():
-            self._take(message)
+        while self._receive_from_server() and self._rejoined():
+            pass
         with self._arrived:
             self._inbox.set(closed=True)
             self._arrived.notify()
 
-    def _take(self, message: Any) -> None:
-        if isinstance(message, messages.Open):
-            with self._arrived:
+    def _receive_from_server(self) -> bool:
+        """Take what the server says until it is gone; False if it said to exit."""
+        for message in self._connection.receive():
+            if isinstance(message, messages.Exit):
+                return False
+            self._take(message)
+        return True
+
+    def _rejoined(self) -> bool:
+        """Let the clock stand, and wait for another server; False if there is no session, or no server came."""
+        with self._arrived:
+            opened = self._serving
+            if opened is None:
+                return False
+            self._inbox.set(paused=self._inbox.paused or DISCONNECTED)
+        link = wait_for_server(Path(opened.folder), lambda: self._serving is not None)
+        if link is None:
+            return False
+        self._connection.replace(link)
+        self._connection.send(messages.Started(os.getpid()))
+        return True
+
+    def _open(self, message: messages.Open) -> None:
+        """Begin with a session in its turn, or go on with the one that is open already."""
+        with self._arrived:
+            serving = self._serving is not None and self._serving.folder == message.folder
+            if serving:
+                self._inbox.set(paused=message.paused)
+            else:
                 self._opened.append(message)
                 self._arrived.notify()
+            if serving and self._window.live is not None:
+                self._say_ready(self._window.live)
+
+    def _say_ready(self, live: LiveSession) -> None:
+        inbox = self._inbox
+        self._connection.send(
+            messages.Ready(live.session.recording.step, inbox.last, live.resumed, inbox.begun)
+        )
+
+    def _take(self, message: Any) -> None:
+        if isinstance(message, messages.Open):
+            self._open(message)
         elif isinstance(message, messages.Inputs):
             self._inbox.add(message.inputs)
         elif isinstance(message, messages.Begin):
@@ -158,12 +201,11 @@ class Worker:
                 return
             live = LiveSession(journal, house, config, self._window)
             inbox = self._inbox
-            with Drawer(live.scene, live.house, self._pictures_of(house), self._connection.send) as drawer:
+            pictures = partial(self._pictures_of, house)
+            with Drawer(live.scene, live.house, pictures, self._connection.send) as drawer:
                 self._window.live, self._window.drawer = live, drawer
                 inbox.set(last=live.input, begun=inbox.begun or live.resumed)
-                self._connection.send(
-                    messages.Ready(live.session.recording.step, live.input, live.resumed, inbox.begun)
-                )
+                self._say_ready(live)
                 self._apply_view()
                 reason = Clock(live, inbox, journal.sync, self._connection).run()
                 self._window.live = self._window.drawer = None
@@ -226,17 +268,3 @@ def _text(state: HudState) -> messages.Text:
         rows=rows,
         hands=[slot.label or "empty" for slot in state.inventory if slot is not None],
     )
-
-
-def main() -> None:
-    """Serve on the socket whose file descriptor is given."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("descriptor", type=int)
-    descriptor = parser.parse_args().descriptor
-    os.environ.setdefault("LP_NUM_THREADS", "1")  # of software rendering; many workers share the machine
-    with socket.socket(fileno=descriptor) as link:
-        Worker(link).run()
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,63 @@
+"""How a worker outlives its server: it waits in the session's folder for one that is started again."""
+
+import os
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+SOCKET = "worker.sock"  # in the folder of a journal
+PATIENCE = 60.0  # s that a worker waits for a server
+PERIOD = 0.2  # s between two looks whether there is still something to wait for
+
+
+def wait_for_server(folder: Path, waiting: Callable[[], bool]) -> socket.socket | None:
+    """Wait for a server to ask for the session in a folder; the socket to it, or None if none came.
+
+    Args:
+        folder: Of the session's journal.
+        waiting: Whether there is still something to wait for.
+    """
+    with suppress(OSError), _short(folder) as path, socket.socket(socket.AF_UNIX) as listener:
+        Path(path).unlink(missing_ok=True)  # of a worker that was killed
+        listener.bind(path)
+        try:
+            listener.listen(1)
+            listener.settimeout(PERIOD)
+            return _accept(listener, waiting)
+        finally:
+            Path(path).unlink()
+    return None
+
+
+def ask_worker(folder: Path) -> socket.socket | None:
+    """The socket to the worker that waits in a folder, or None if there is none."""
+    link = socket.socket(socket.AF_UNIX)
+    try:
+        with _short(folder) as path:
+            link.connect(path)
+    except OSError:
+        link.close()
+        return None
+    return link
+
+
+def _accept(listener: socket.socket, waiting: Callable[[], bool]) -> socket.socket | None:
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until and waiting():
+        with suppress(TimeoutError):
+            link, _ = listener.accept()
+            link.setblocking(True)
+            return link
+    return None
+
+
+@contextmanager
+def _short(folder: Path) -> Iterator[str]:
+    """The path of the socket; a name of some hundred bytes is too long for one, so it goes through a descriptor."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        yield f"/proc/self/fd/{handle}/{SOCKET}"
+    finally:
+        os.close(handle)
