@@ -124,6 +124,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(words: list[str]) -> int:
     command = words[0] if words and words[0] in COMMANDS else None
     arguments = parser(command).parse_args(words)
+    if "numba" in sys.modules:
+        from experiments.compile_notice import announce_compiling
+
+        announce_compiling()
     code = int(arguments.run(arguments))
     if sys.stdout is not None:
         try:

@@ -27,6 +27,7 @@ class EnvironmentReport:
         platform: Operating system and processor.
         versions: Distribution -> version, or None where it is not installed.
         hidden: What to do about packages of ours that other software hides.
+        cache: Where compiled code is kept, and how much there is.
         egl_vendors: Names of the EGL vendor files found.
         gl: What draws, or None where no context can be made.
         problem: Why there is no context, or None.
@@ -37,6 +38,7 @@ class EnvironmentReport:
     platform: str
     versions: Mapping[str, str | None]
     hidden: tuple[str, ...]
+    cache: str
     egl_vendors: tuple[str, ...]
     gl: "GlInfo | None"
     problem: str | None
@@ -51,6 +53,7 @@ class EnvironmentReport:
         """The report as lines of text, advice last."""
         rows = [f"python {self.python} on {self.platform}"]
         rows += [f"{name} {version or 'not installed'}" for name, version in self.versions.items()]
+        rows.append(f"compiled code: {self.cache}")
         rows.append(f"EGL vendor files: {', '.join(self.egl_vendors) or 'none'}")
         if self.gl is None:
             rows.append(f"OpenGL: unusable ({self.problem})")
@@ -84,11 +87,23 @@ def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport
         platform=f"{platform.system()} {platform.machine()}",
         versions=versions,
         hidden=tuple(message for name in PACKAGES if (message := hidden_package(name))),
+        cache=_cache(),
         egl_vendors=vendors,
         gl=gl,
         problem=problem,
         advice=(*shared_names(), *advise(versions, vendors, gl)),
     )
+
+
+def _cache() -> str:
+    try:
+        from mjsim.kernels import cache_base  # imports numba, which may be broken
+
+        folder = cache_base()
+        size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    except Exception as error:
+        return f"unknown ({type(error).__name__}: {' '.join(str(error).split())})"
+    return f"{size / 1e6:.0f} MB in {folder}; may be deleted, and what is unused for 30 days is"
 
 
 def egl_vendors(folder: Path = VENDOR_FOLDER) -> tuple[str, ...]:

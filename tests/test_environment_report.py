@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import mujoco
+import numba
 import numpy as np
 import pytest
 
@@ -25,6 +26,13 @@ def test_report_of_this_machine_is_usable_and_truthful():
     assert report.versions["numpy"] == np.__version__
     assert report.gl is not None
     assert report.gl.renderer in "\n".join(report.lines())
+
+
+def test_the_report_says_how_much_compiled_code_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "code").write_bytes(bytes(3_000_000))
+    assert f"compiled code: 3 MB in {tmp_path};" in "\n".join(environment_report().lines())
 
 
 def test_vendor_files_come_in_the_order_they_are_tried(tmp_path: Path):

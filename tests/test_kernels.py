@@ -6,6 +6,7 @@ import sys
 import time
 from pathlib import Path
 
+from experiments.compile_notice import NOTICE
 from mjsim import kernels
 
 CALLEE = "from mjsim.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
@@ -77,3 +78,14 @@ def test_kernels_work_where_nothing_can_be_cached(tmp_path: Path) -> None:
     assert _run(tmp_path, Path("/proc/self/nowhere")) == "2 0"
     function = eval("lambda x: x + 1")  # it has no file
     assert kernels.kernel(function)(2) == 3
+
+
+def test_compiling_is_announced_once() -> None:
+    """Nobody may take a first command for one that hangs."""
+    script = (
+        "import numba; from experiments.compile_notice import announce_compiling; announce_compiling()\n"
+        "f = numba.njit(lambda x: x + 1); print(f(1), f(1.5))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert run.stdout.strip() == "2 2.5"
+    assert run.stderr == f"mjsim: {NOTICE}\n"

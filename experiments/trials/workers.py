@@ -9,8 +9,10 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
+from multiprocessing.synchronize import Semaphore
 from typing import Any
 
+from experiments.compile_notice import announce_compiling
 from experiments.signals import SIGNALS
 
 
@@ -35,7 +37,7 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
     # Spawned, not forked: a forked GL context or thread pool does not work.
     context = multiprocessing.get_context("spawn")
     end_of_work, work = context.Pipe(duplex=False)
-    pool = _Pool(count, mp_context=context, initializer=_end_with, initargs=(end_of_work,))
+    pool = _Pool(count, mp_context=context, initializer=_begin, initargs=(end_of_work, context.Semaphore(1)))
     try:
         yield pool
         pool.shutdown()
@@ -47,6 +49,12 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
         work.close()  # all workers see it
         pool.shutdown(cancel_futures=True)
         end_of_work.close()
+
+
+def _begin(end_of_work: Connection, voice: Semaphore) -> None:
+    """Begin to work: one of the workers says it if kernels are compiled, all end with their parent."""
+    announce_compiling(lambda: voice.acquire(block=False))
+    _end_with(end_of_work)
 
 
 def _end_with(end_of_work: Connection) -> None:
