@@ -15,7 +15,8 @@ from experiments.errors import RecordError
 from experiments.house import House
 from experiments.runs.records import EventLog
 from experiments.session.endings import LeaveSession
-from experiments.session.first_person import FilmConfig, FirstPersonRenderer
+from experiments.session.film_config import FilmConfig
+from experiments.session.first_person import FirstPersonRenderer
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.projection import CameraView

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
-from mjsim.episode import Episode
+from mjsim.episode import POINTS, Episode
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import Footprint
 from mjsim.model.house import compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
-from mjsim.model.sampling import POINTS, house_points, sample_episode
+from mjsim.model.sampling import house_points, sample_episode
 from mjsim.person_parameters import PersonParameters
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh

@@ -14,6 +14,7 @@ from mjsim.files import write_text_atomically
 
 FORMAT_VERSION = 1
 CAPACITY = 2  # PAPER section 2: the knapsack of the study
+POINTS = 40  # of a house where objects may lie
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.replaying.external_view import ExternalViewer, camera_path
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from mjsim.model.footprint import Footprint
 from mjsim.world import World
 

@@ -21,7 +21,7 @@ from experiments.replaying.replay import replay
 from experiments.runs.metrics import measure
 from experiments.runs.phases import PHASES, phases_of
 from experiments.runs.records import EventLog, read_events
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.trials.design import read_design
 from experiments.trials.setup import prepare_session, simulated_user, trial_episode
 from experiments.trials.training import training_config

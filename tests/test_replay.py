@@ -21,7 +21,7 @@ from experiments.replaying.run_record import load_run
 from experiments.runs import records
 from experiments.runs.checksums import write_checksums
 from experiments.runs.records import read_events
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.session.session import Session
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig

@@ -13,7 +13,7 @@ from experiments.files import read_json
 from experiments.house import House
 from experiments.runs import records
 from experiments.runs.records import read_events
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.episode import Episode

@@ -12,7 +12,8 @@ from experiments.runs.records import EventLog
 from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
 from mjsim.actions import Action
-from mjsim.model.sampling import POINTS, sample_episode
+from mjsim.episode import POINTS
+from mjsim.model.sampling import sample_episode
 from mjsim.model.scene import Scene, compose
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions

@@ -11,7 +11,7 @@ from experiments.commands.terminal import error_console
 from experiments.gallery import SITUATIONS, Shot, after, carrying_two, contact_sheet, save_png, take_pictures
 from experiments.runs.records import TOPDOWN
 from experiments.runs.run_directory import check_file
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.files import replacing

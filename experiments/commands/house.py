@@ -8,8 +8,8 @@ from experiments.commands.options import add_command, add_force, add_house, add_
 from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.runs.run_directory import check_file
+from mjsim.episode import POINTS
 from mjsim.model.export import export_house
-from mjsim.model.sampling import POINTS
 from mjsim.model.scene import compose
 
 DESCRIPTION = """\

@@ -11,16 +11,15 @@ from experiments.commands.person_options import add_person_options, person_optio
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT, participant_names
 from experiments.runs.phases import PHASES
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.trials.design import numbers
 from experiments.trials.trial_config import SEEDS, TrialConfig, episode_settings
 from hud.conditions import condition_names
 from hud.options import option_names
-from mjsim.episode import CAPACITY
-from mjsim.model.sampling import POINTS
+from mjsim.episode import CAPACITY, POINTS
 from mjsim.options import CAPACITIES, FIDELITIES
 from mjsim.render import FAST, PROFILES
-from mjsim.render.scene_settings import MAX_SIDE
+from mjsim.render.profiles import MAX_SIDE
 from planner.solver import DEFAULT_SOLVER, SOLVERS
 
 HOUSE_HELP = "name of a house, or path of its catalogue.toml"
@@ -134,6 +133,11 @@ def add_trial_options(parser: argparse.ArgumentParser, *, several_users: bool = 
         "boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T) "
         f"(default: {DEFAULT_PARTICIPANT})",
     )
+    add_trial_settings(parser)
+
+
+def add_trial_settings(parser: argparse.ArgumentParser) -> None:
+    """Add what a run, a batch and play have in common; options that are not given are None."""
     parser.add_argument("--house", metavar="NAME", help=f"{HOUSE_HELP} (default: {TrialConfig.house})")
     parser.add_argument(
         "--planner",

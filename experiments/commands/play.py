@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from experiments.commands.options import (
     add_command,
-    add_trial_options,
+    add_trial_settings,
     assistance_help,
     given_options,
     seconds,
@@ -29,7 +29,7 @@ from experiments.runs.phases import PHASES, STORY, TASK, TRAINING, phases_of
 from experiments.trials.training import training_config
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition
-from planner.solver import solver
+from planner.solver import SOLVERS, solver
 
 OBJECTS = 6
 PORT = 8000
@@ -58,7 +58,8 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--assistance", default="optimal", metavar="NAME", help=assistance_help())
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the house and the list")
-    add_trial_options(parser)
+    parser.add_argument("--user", default=HUMAN, metavar="NAME", help="name of the participant")
+    add_trial_settings(parser)
     group = parser.add_argument_group("server")
     group.add_argument("--port", type=_port, default=PORT, help="TCP port; 0 for any that is free")
     group.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at")
@@ -99,7 +100,7 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
     Raises:
         ExperimentError, HudError, PlannerError: An option is unusable.
     """
-    if arguments.user not in (None, HUMAN):
+    if arguments.user != HUMAN:
         raise ConfigError(f"`mjsim play` is for a person; user {arguments.user} belongs to `mjsim run`")
     task = TrialConfig(
         assistance=arguments.assistance,
@@ -115,7 +116,8 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
         },
     )
     condition(task.assistance)
-    solver(task.planner)
+    if task.planner not in SOLVERS:  # those are loaded by the workers
+        solver(task.planner)
     training = dataclasses.replace(training_config(task), time_limit=TRAINING_LIMIT)
     return {TRAINING: training.settings(), TASK: task.settings()}
 

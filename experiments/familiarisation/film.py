@@ -10,7 +10,7 @@ import numpy as np
 from experiments.errors import ConfigError
 from experiments.familiarisation.camera_path import CameraPath, camera_path
 from experiments.house import House
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.session.video import VideoWriter
 from hud.caption import Captions
 from mjsim.files import replacing

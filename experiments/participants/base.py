@@ -4,20 +4,22 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.house import House
 from hud.state import HudState
 from mjsim.actions import Action, ActionResult, Move, Pick, Place
 from mjsim.episode import CAPACITY
 from mjsim.errors import ActionError
-from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.person_parameters import PersonParameters
 from planner.plan import Visit
+
+if TYPE_CHECKING:  # options of commands name participants, and must not load the simulator
+    from experiments.house import House
+    from mjsim.model.receptacles import ReceptacleGeometry
 
 Point = NDArray[np.float64]
 
@@ -123,7 +125,7 @@ class Percept:
         """Misplaced objects in view at this moment -> floor position, m, shape (2,)."""
         return {}
 
-    def look_for(self, receptacles: Mapping[str, ReceptacleGeometry]) -> frozenset[str]:  # noqa: ARG002 - for a session
+    def look_for(self, receptacles: Mapping[str, "ReceptacleGeometry"]) -> frozenset[str]:  # noqa: ARG002 - for a session
         """Keys of those of the receptacles that are in view at this moment."""
         return frozenset()
 
@@ -247,6 +249,6 @@ class Participant(Protocol):
 class ParticipantFactory(Protocol):
     """Makes a participant for one session; the generator is its only source of chance."""
 
-    def __call__(self, house: House, rng: np.random.Generator) -> Participant:
+    def __call__(self, house: "House", rng: np.random.Generator) -> Participant:
         """Make a fresh participant that knows `house` from the familiarisation."""
         ...

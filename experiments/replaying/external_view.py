@@ -6,7 +6,7 @@ from types import TracebackType
 
 import numpy as np
 
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.session.video import VideoWriter
 from hud.projection import CameraView
 from hud.state import HudState, Marker, Rgba, Vec3

@@ -13,7 +13,8 @@ from experiments.replaying.replayer import Replayer, mismatch_error
 from experiments.replaying.run_record import RunRecord, load_run
 from experiments.replaying.verdicts import Verdict, all_mismatches, verdicts
 from experiments.runs import records
-from experiments.session.first_person import FilmConfig, Filming, FirstPersonRenderer
+from experiments.session.film_config import FilmConfig
+from experiments.session.first_person import Filming, FirstPersonRenderer
 from experiments.session.video import VideoWriter
 from experiments.session.viewer import Viewer
 from mjsim.errors import AssetError

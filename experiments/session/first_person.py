@@ -1,14 +1,14 @@
 """First-person frames with the HUD over them, and films of them."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.errors import ConfigError, RecordError
+from experiments.errors import RecordError
 from experiments.house import House
+from experiments.session.film_config import FilmConfig
 from experiments.session.video import VideoWriter
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
@@ -17,25 +17,8 @@ from hud.state import HudState
 from mjsim.errors import RenderError
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
-from mjsim.render import PROFILES, Renderer, gl_info, render_house_map, render_pictures
+from mjsim.render import Renderer, gl_info, render_house_map, render_pictures
 from mjsim.world import World
-
-
-@dataclass(frozen=True)
-class FilmConfig:
-    """How frames are made: size in px, and the render profile.
-
-    Raises:
-        ConfigError: There is no such profile.
-    """
-
-    width: int = 640
-    height: int = 480
-    profile: str = "fast"
-
-    def __post_init__(self) -> None:
-        if self.profile not in PROFILES:
-            raise ConfigError(f"no render profile {self.profile!r}; there are {', '.join(PROFILES)}")
 
 
 class FirstPersonRenderer:

@@ -15,10 +15,9 @@ from experiments.trials.fingerprint import Inputs, trial_inputs
 from experiments.trials.setup import draw_behaviour, draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
-from mjsim.episode import Episode
+from mjsim.episode import POINTS, Episode
 from mjsim.errors import EpisodeError, PersonError
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.sampling import POINTS
 from mjsim.model.scene import compose
 from mjsim.person_parameters import PersonParameters
 from planner.solver import solver

@@ -17,7 +17,8 @@ from experiments.runs.phases import TRAINING
 from experiments.runs.records import EventLog
 from experiments.runs.run_directory import run_directory
 from experiments.session.endings import INTERRUPTED
-from experiments.session.first_person import FilmConfig, TrialFilm
+from experiments.session.film_config import FilmConfig
+from experiments.session.first_person import TrialFilm
 from experiments.session.viewer import OnProgress, Progress
 from experiments.signals import Stopped, signals_postponed
 from experiments.trials.setup import (

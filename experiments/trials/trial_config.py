@@ -11,8 +11,7 @@ from experiments.participants import DEFAULT_PARTICIPANT
 from experiments.participants.behaviour import BehaviourDistribution
 from experiments.runs.phases import STORY, TASK, phases_of
 from experiments.trials.person_distribution import PersonDistribution
-from mjsim.episode import CAPACITY, Episode
-from mjsim.model.sampling import POINTS
+from mjsim.episode import CAPACITY, POINTS, Episode
 from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solver import DEFAULT_SOLVER
 

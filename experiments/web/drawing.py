@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from experiments.house import House
-from experiments.session.first_person import FilmConfig, FirstPersonRenderer
+from experiments.session.film_config import FilmConfig
+from experiments.session.first_person import FirstPersonRenderer
 from experiments.web.encoders import Encoder, H264Encoder, Image, JpegEncoder
 from experiments.web.messages import Frame, View
 from hud.projection import CameraView

@@ -12,14 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.episode import POINTS, Episode, PlacedObject, StartPose
 from mjsim.errors import SamplingError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigablePoints
 from mjsim.model.settling import settle
 
-POINTS = 40
 MIN_DISTANCE = 1.0  # m, between points, and from points to receptacles
 START_CLEARANCE = 0.5  # m, from the start to every object
 DROP = (0.01, 0.02)  # m above the floor

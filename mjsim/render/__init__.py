@@ -1,14 +1,9 @@
-"""Off-screen rendering, the only part of the project that touches OpenGL."""
+"""Off-screen rendering, the only part of the project that touches OpenGL.
 
-from mjsim.render.cameras import CameraPose
-from mjsim.render.context import GlInfo, gl_info
-from mjsim.render.floorplan import FloorPlan, largest_scale, render_floorplan, render_house_map
-from mjsim.render.labels import Labels
-from mjsim.render.layered import LayeredRenderer
-from mjsim.render.markers import MarkerLike
-from mjsim.render.pictures import render_picture, render_pictures
-from mjsim.render.profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
-from mjsim.render.renderer import Frame, Renderer
+Each name is loaded at its first use: what only names a profile needs no OpenGL.
+"""
+
+from typing import TYPE_CHECKING
 
 __all__ = [
     "DRAFT",
@@ -31,3 +26,54 @@ __all__ = [
     "render_picture",
     "render_pictures",
 ]
+
+if TYPE_CHECKING:
+    from mjsim.render.cameras import CameraPose
+    from mjsim.render.context import GlInfo, gl_info
+    from mjsim.render.floorplan import FloorPlan, largest_scale, render_floorplan, render_house_map
+    from mjsim.render.labels import Labels
+    from mjsim.render.layered import LayeredRenderer
+    from mjsim.render.markers import MarkerLike
+    from mjsim.render.pictures import render_picture, render_pictures
+    from mjsim.render.profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
+    from mjsim.render.renderer import Frame, Renderer
+else:  # hidden from type checkers, which would otherwise accept any name
+    _MODULES = {
+        "cameras": ("CameraPose",),
+        "context": (
+            "GlInfo",
+            "gl_info",
+        ),
+        "floorplan": (
+            "FloorPlan",
+            "largest_scale",
+            "render_floorplan",
+            "render_house_map",
+        ),
+        "labels": ("Labels",),
+        "layered": ("LayeredRenderer",),
+        "markers": ("MarkerLike",),
+        "pictures": (
+            "render_picture",
+            "render_pictures",
+        ),
+        "profiles": (
+            "DRAFT",
+            "FAST",
+            "PROFILES",
+            "QUALITY",
+            "RenderProfile",
+        ),
+        "renderer": (
+            "Frame",
+            "Renderer",
+        ),
+    }
+
+    def __getattr__(name):
+        import importlib
+
+        for module, names in _MODULES.items():
+            if name in names:
+                return getattr(importlib.import_module(f"mjsim.render.{module}"), name)
+        raise AttributeError(f"module 'mjsim.render' has no attribute {name!r}")

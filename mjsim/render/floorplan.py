@@ -13,9 +13,9 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.render.cameras import View, look_rotation
 from mjsim.render.context import current_context
-from mjsim.render.profiles import RenderProfile
+from mjsim.render.profiles import MAX_SIDE, RenderProfile
 from mjsim.render.rasteriser import TOP_DOWN_GROUPS, Rasteriser
-from mjsim.render.scene_settings import MAX_SIDE, DirectionalLight
+from mjsim.render.scene_settings import DirectionalLight
 
 _PAPER = 244  # grey level where there is no house
 # Above any house of one storey.

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from mjsim.errors import RenderError
 
+MAX_SIDE = 8192  # px, of a frame
+
 
 @dataclass(frozen=True)
 class RenderProfile:

@@ -9,9 +9,7 @@ import mujoco
 import numpy as np
 
 from mjsim.errors import RenderError
-from mjsim.render.profiles import RenderProfile
-
-MAX_SIDE = 8192
+from mjsim.render.profiles import MAX_SIDE, RenderProfile
 
 _Flag = mujoco.mjtRndFlag
 

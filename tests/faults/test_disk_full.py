@@ -13,7 +13,7 @@ from experiments.errors import RecordError
 from experiments.files import read_json
 from experiments.replaying.replay import replay
 from experiments.runs import records
-from experiments.session.first_person import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from faults.conftest import FAST

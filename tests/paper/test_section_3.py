@@ -7,7 +7,8 @@ import pytest
 
 from experiments.participants.follower import Follower
 from experiments.runs.records import EventLog
-from experiments.session.first_person import FilmConfig, FirstPersonRenderer
+from experiments.session.film_config import FilmConfig
+from experiments.session.first_person import FirstPersonRenderer
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor

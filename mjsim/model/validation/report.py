@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mjsim.episode import Episode
+from mjsim.episode import POINTS, Episode
 from mjsim.errors import AssetError, EpisodeError, PhysicsError, SamplingError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import CompiledHouse, compiled_house
 from mjsim.model.model_files import elements
-from mjsim.model.sampling import POINTS, points_that_fit, sample_episode
+from mjsim.model.sampling import points_that_fit, sample_episode
 from mjsim.model.scene import assemble
 from mjsim.model.validation.compiled import Compiled, compile_model
 from mjsim.model.validation.episode_rules import check_fit, check_overlaps, check_poses, check_reach

@@ -1,0 +1,23 @@
+"""Size and look of the frames of a film."""
+
+from dataclasses import dataclass
+
+from experiments.errors import ConfigError
+from mjsim.render import PROFILES
+
+
+@dataclass(frozen=True)
+class FilmConfig:
+    """How frames are made: size in px, and the render profile.
+
+    Raises:
+        ConfigError: There is no such profile.
+    """
+
+    width: int = 640
+    height: int = 480
+    profile: str = "fast"
+
+    def __post_init__(self) -> None:
+        if self.profile not in PROFILES:
+            raise ConfigError(f"no render profile {self.profile!r}; there are {', '.join(PROFILES)}")
