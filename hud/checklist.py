@@ -63,7 +63,7 @@ def _draw_row(canvas: Canvas, item: ChecklistItem, row: Row, top: int) -> None:
     if item.number is not None:
         label, face = str(item.number), theme.LABEL if item.current else theme.DETAIL
         right = x + px(theme.NUMBER) - px(3)
-        canvas.text(right - canvas.typeface.width(label, face), top + px(24), label, face, theme.QUIET)
+        canvas.text(right - canvas.typeface.width(label, face), top + px(21), label, face, theme.QUIET)
         x += px(theme.NUMBER)
     canvas.tile(item.picture, x, top + px(3), side, 0.5 if item.done else 1.0)
     if item.target_picture is not None:
@@ -79,11 +79,11 @@ def _draw_text(canvas: Canvas, item: ChecklistItem, row: Row, x: int, top: int) 
     if canvas.typeface.width(item.text, face) > row.text_width:
         face = theme.Face(theme.DETAIL.size, face.weight)
     line = canvas.typeface.fit(item.text, face, row.text_width)
-    baseline = top + (px(17) if row.detail else px(24))
+    baseline = top + (px(15) if row.detail else px(22))
     drawn = canvas.text(x, baseline, line, face, theme.DONE if item.done else theme.TEXT)
     if item.done and drawn > 0:
         y = baseline - px(4.5)
         canvas.shape([(x - px(1), y), (x + drawn + px(1), y)], theme.TEXT, line=max(1.0, 1.2 * px(1)))
     for i, detail in enumerate(row.detail):
-        baseline = top + px(30 + theme.LINE * i)
+        baseline = top + px(28 + theme.LINE * i)
         canvas.text(x, baseline, detail, theme.DETAIL, theme.DONE if item.done else theme.QUIET)

@@ -56,21 +56,21 @@ GAP: Final = 6
 PADDING: Final = 6
 PANEL_RADIUS: Final = 8.0
 LINE: Final = 14  # height of a line of text
-TILE: Final = 34  # side of a picture; objects can be told apart
+TILE: Final = 30  # side of a picture; objects can be told apart
 
 BIN_TILE: Final = 30  # side of a picture in the list of bins, which has to fit above the mini-map
 
 CHIP_HEIGHT: Final = 28
 CHIP_WIDTH: Final = 76
 
-LIST_SHARE: Final = 0.32  # of the frame's width
+LIST_SHARE: Final = 0.3  # of the frame's width
 MAX_LIST_WIDTH: Final = 230
 LIST_BOTTOM: Final = 64  # kept free below the lists, so that objects at the feet are seen
 HEADER: Final = 24
 FOOTER: Final = 17
-ROW: Final = 40
+ROW: Final = 36
 NUMBER: Final = 19
-TARGET: Final = 24  # side of the picture of the receptacle
+TARGET: Final = 20  # side of the picture of the receptacle
 
 BINS_WIDTH: Final = 160
 BINS_WIDTH_WIDE: Final = 170  # on frames that are wider than 4 : 3
