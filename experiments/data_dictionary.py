@@ -13,6 +13,7 @@ from experiments.runs.health import COUNTED
 from experiments.runs.metrics import Metrics
 from experiments.runs.trajectory import HEALTH
 from experiments.trials.trial_config import TrialConfig
+from mjsim.motion_parameters import GROUPS
 from mjsim.person_parameters import PersonParameters
 
 _HEAD = """\
@@ -82,7 +83,7 @@ def _metrics_rows() -> Iterator[str]:
     yield from _rows(_described(TrialConfig, leave_out={"seed", "person", "behaviour"}))
     yield "| `fingerprint` | str | Hash of the settings and of all else that the trial depends on. |"
     yield "| `simulated` | bool | Whether the participant is simulated: whoever is not `human`. |"
-    yield from _rows(_described(PersonParameters, leave_out={"motion"}), prefix="person_")
+    yield from _rows(_described(PersonParameters, leave_out=set(GROUPS)), prefix="person_")
     yield "| `behaviour_...` | float | Values of the participant model, where it has any (docs/participants.md). |"
     yield from _rows(_described(Metrics))
     for name in HEALTH:

@@ -4,67 +4,18 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 from mjsim.errors import PersonError
+from mjsim.motion_parameters import (
+    GROUP_RANGES,
+    GROUPS,
+    CarryingParameters,
+    MotionParameters,
+    WalkingParameters,
+)
 
 PICTURE_ASPECT = 4 / 3  # width over height of the picture whose whole height a person sees
-
-
-class MotionParameters(NamedTuple):
-    """How the person turns, looks, reaches, lifts, travels with a load, lowers it and withdraws; also for kernels.
-
-    Attributes:
-        turn_gain: Yaw rate per heading error while turning to an object or receptacle, 1/s.
-        turn_timeout: Longest time that the turn may take, s.
-        object_tolerance: Heading error that is good enough for reaching, rad.
-        receptacle_tolerance: Heading error that is good enough for placing, rad.
-        standing_speed: Slower than this the person stands, m/s.
-        standing_turn_rate: Turning slower than this the person stands, rad/s.
-        look_gain: Share of a pitch error by which the head moves in one control step.
-        look_speed: Fastest pitch of the head during a motion, rad/s.
-        reach_time: From the hand's posture to the grip, s.
-        align_time: At the grip before the lift, s.
-        lift_time: From the floor to the carrying posture, s.
-        lead: Share of a reach or lift by which one of its parts (across, up) leads the other.
-        start_time: Added to distance over speed for a hand to start and stop, s.
-        least_travel: A hand does not travel over less than this, m.
-        travel_speed: Speed of a hand that carries a load over a receptacle, m/s.
-        descent_speed: Speed of a hand that lowers a load, m/s.
-        hover_gap: From a travelling load to whatever it passes over, m.
-        hover_time: Above the slot before the descent, s.
-        release_gap: From a load to what is below it when the hand opens, m.
-        withdraw_steps: Control steps in which the opened hand goes straight up.
-        withdraw_step: By how much in each of them, m.
-        posture_gain: Speed of a hand on its way to a posture per distance left, 1/s.
-        posture_speed: Its fastest, m/s.
-        posture_acceleration: How fast that speed changes, m/s^2.
-    """
-
-    turn_gain: float = 6.0
-    turn_timeout: float = 3.0
-    object_tolerance: float = 0.35
-    receptacle_tolerance: float = 0.04
-    standing_speed: float = 0.1
-    standing_turn_rate: float = 0.5
-    look_gain: float = 0.25
-    look_speed: float = 2.0
-    reach_time: float = 0.44
-    align_time: float = 0.12
-    lift_time: float = 0.64
-    lead: float = 0.2
-    start_time: float = 0.12
-    least_travel: float = 0.005
-    travel_speed: float = 0.9
-    descent_speed: float = 0.65
-    hover_gap: float = 0.03
-    hover_time: float = 0.08
-    release_gap: float = 0.002
-    withdraw_steps: int = 4
-    withdraw_step: float = 0.035
-    posture_gain: float = 7.0
-    posture_speed: float = 1.5
-    posture_acceleration: float = 8.0
 
 
 def _number(default: float, low: float, high: float, unit: str) -> Any:
@@ -81,7 +32,7 @@ class PersonParameters:
     Attributes:
         walking_speed: Usual walk, m/s, at which simulated participants walk; healthy adults walk comfortably at 0.94 to
             1.43 m/s (Bohannon and Williams Andrews, Physiotherapy 97, 2011). `fastest_walk` is 14/13 of it.
-        walking_acceleration: How fast the walking velocity changes, m/s^2; participants plan to brake at half of it.
+        walking_acceleration: How fast the walking velocity changes, m/s^2.
         turning_speed: Fastest turn of the body, rad/s.
         turning_acceleration: How fast the turning rate changes, rad/s^2.
         looking_speed: Fastest pitch of the head while walking, rad/s.
@@ -99,6 +50,8 @@ class PersonParameters:
             words a minute (Brysbaert, Journal of Memory and Language 109, 2019).
         patience: For how long a walk may make no progress before the person steps back or looks for another way, s.
         motion: How the hands pick and place.
+        carrying: How they carry.
+        walking: How a simulated participant walks along a path.
 
     Raises:
         PersonError: A value is no number of its range.
@@ -123,12 +76,15 @@ class PersonParameters:
     reading_time: float = _number(0.0, 0.0, 60.0, "s")
     patience: float = _number(2.0, 1.0, 60.0, "s")
     motion: MotionParameters = field(default_factory=MotionParameters)
+    carrying: CarryingParameters = field(default_factory=CarryingParameters)
+    walking: WalkingParameters = field(default_factory=WalkingParameters)
 
     def __post_init__(self) -> None:
         for name, (low, high, unit) in RANGES.items():
             _check(name, getattr(self, name), low, high, unit)
             object.__setattr__(self, name, float(getattr(self, name)))  # kernels are compiled for one type
-        object.__setattr__(self, "motion", _checked(self.motion))
+        for group in GROUPS:
+            object.__setattr__(self, group, _checked(group, getattr(self, group)))
 
     @property
     def fastest_walk(self) -> float:
@@ -141,8 +97,9 @@ class PersonParameters:
         return 2.0 * math.atan(math.tan(self.field_of_view / 2.0) / PICTURE_ASPECT)
 
     def as_dict(self) -> dict[str, Any]:
-        """Every value by name, JSON-ready; those of the hands under `motion`."""
-        return {**{name: getattr(self, name) for name in RANGES}, "motion": self.motion._asdict()}
+        """Every value by name, JSON-ready; those of `GROUPS` under the group's name."""
+        values: dict[str, Any] = {name: getattr(self, name) for name in RANGES}
+        return values | {group: getattr(self, group)._asdict() for group in GROUPS}
 
     def unusual(self) -> str:
         """The values that are not the usual person's, in words; empty if all are."""
@@ -153,10 +110,10 @@ class PersonParameters:
             if getattr(self, name) != getattr(usual, name)
         ]
         words = [f"{name.replace('_', ' ')} {getattr(self, name):.4g} {unit}" for name, unit in others]
-        hands = self.motion._asdict().items() - usual.motion._asdict().items()
-        return ", ".join(
-            [*words, *(f"{name.replace('_', ' ')} {value:.4g}" for name, value in sorted(hands))]
-        )
+        for group in GROUPS:
+            changed = getattr(self, group)._asdict().items() - getattr(usual, group)._asdict().items()
+            words += [f"{name.replace('_', ' ')} {value:.4g}" for name, value in sorted(changed)]
+        return ", ".join(words)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "PersonParameters":
@@ -165,35 +122,17 @@ class PersonParameters:
         Raises:
             PersonError: A name is unknown or missing, or a value is unusable.
         """
-        motion = values.get("motion")
-        expected = {*RANGES, "motion"}
-        if set(values) != expected or not isinstance(motion, Mapping):
+        expected = {*RANGES, *GROUPS}
+        if set(values) != expected:
             raise PersonError(f"a person has the values {sorted(expected)}, got {sorted(values)}")
-        if set(motion) != set(MotionParameters._fields):
-            raise PersonError(f"motion has the values {list(MotionParameters._fields)}, got {sorted(motion)}")
-        return cls(**{**values, "motion": MotionParameters(**motion)})
+        groups: dict[str, Any] = {}
+        for name, group in GROUPS.items():
+            found = values[name]
+            if not isinstance(found, Mapping) or set(found) != set(group._fields):
+                raise PersonError(f"{name} has the values {list(group._fields)}, got {found!r}")
+            groups[name] = group(**found)
+        return cls(**{**values, **groups})
 
-
-# Whoever picks or places is done within 30 s.
-_MOTION_RANGES = {
-    "turn_timeout": (0.04, 4.0),
-    "look_gain": (0.01, 1.0),
-    "reach_time": (0.1, 3.0),
-    "align_time": (0.0, 2.0),
-    "lift_time": (0.1, 3.0),
-    "lead": (0.0, 0.9),
-    "start_time": (0.0, 1.0),
-    "travel_speed": (0.25, 5.0),
-    "descent_speed": (0.25, 5.0),
-    "hover_gap": (0.0, 0.3),
-    "hover_time": (0.0, 2.0),
-    "release_gap": (0.0, 0.1),
-    "withdraw_steps": (1, 20),
-    "withdraw_step": (0.001, 0.1),
-    "posture_gain": (1.0, 50.0),
-    "posture_speed": (0.2, 10.0),
-    "posture_acceleration": (1.0, 100.0),
-}
 
 # Name of every number of a person -> lowest and highest value, and its unit.
 RANGES: dict[str, tuple[float, float, str]] = {
@@ -211,10 +150,12 @@ def _check(name: str, value: object, low: float, high: float, unit: str) -> None
         raise PersonError(said)
 
 
-def _checked(motion: MotionParameters) -> MotionParameters:
-    for name, value in motion._asdict().items():
-        _check(f"motion.{name}", value, *_MOTION_RANGES.get(name, (1e-4, 10.0)), "in SI units")
-    if motion.withdraw_steps != int(motion.withdraw_steps):
-        raise PersonError(f"motion.withdraw_steps must be a whole number, got {motion.withdraw_steps!r}")
-    numbers: dict[str, Any] = {name: float(value) for name, value in motion._asdict().items()}
-    return MotionParameters(**{**numbers, "withdraw_steps": int(motion.withdraw_steps)})
+def _checked(group: str, values: Any) -> Any:
+    for name, value in values._asdict().items():
+        _check(f"{group}.{name}", value, *GROUP_RANGES.get(f"{group}.{name}", (1e-4, 10.0)), "in SI units")
+    numbers: dict[str, Any] = {name: float(value) for name, value in values._asdict().items()}
+    if "withdraw_steps" in numbers:
+        if not numbers["withdraw_steps"].is_integer():
+            raise PersonError(f"motion.withdraw_steps must be a whole number, got {values.withdraw_steps!r}")
+        numbers["withdraw_steps"] = int(numbers["withdraw_steps"])
+    return type(values)(**numbers)

@@ -10,8 +10,9 @@ from mjsim.actions import IDLE, Move, Pick, Place
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import Scene, compose
+from mjsim.motion_parameters import MotionParameters
 from mjsim.options import FIDELITIES, WorldOptions
-from mjsim.person_parameters import MotionParameters, PersonParameters
+from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 
 CHANGED = MotionParameters(

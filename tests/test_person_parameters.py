@@ -19,8 +19,9 @@ from mjsim.errors import PersonError
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import Scene, compose
+from mjsim.motion_parameters import MotionParameters
 from mjsim.options import FIDELITIES, WorldOptions
-from mjsim.person_parameters import RANGES, MotionParameters, PersonParameters
+from mjsim.person_parameters import RANGES, PersonParameters
 from mjsim.render.cameras import camera_pose
 from mjsim.visibility import FieldOfView, visible_objects
 from mjsim.world import World
@@ -139,7 +140,7 @@ def test_participants_walk_at_the_persons_pace() -> None:
     person = PersonParameters(
         walking_speed=0.9, walking_acceleration=2.0, turning_speed=1.5, body_radius=0.1, patience=1.0
     )
-    assert Pace.of(person) == pytest.approx((0.9, 1.0, 1.5, 0.3, 1.0))
+    assert Pace.of(person)[:5] == pytest.approx((0.9, 1.0, 1.5, 0.3, 1.0))
 
 
 @pytest.fixture(scope="module")

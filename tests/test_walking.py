@@ -8,11 +8,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from experiments.session.path_following import (
-    LOOK_AHEAD,
-    LOOK_BEYOND,
-    MIN_AHEAD,
-    SIDESTEP_RANGE,
-    TURN_GAIN,
     Obstacles,
     Pace,
     follow,
@@ -21,6 +16,8 @@ from experiments.session.path_following import (
     turn_towards,
     wrap_angle,
 )
+from mjsim.motion_parameters import WalkingParameters
+from mjsim.person_parameters import PersonParameters
 from planner.navmesh import NavMesh
 from planner.polyline import first_off_path, path_length, point_along, project, rest_of
 
@@ -29,7 +26,19 @@ PATIENT = settings(deadline=None)  # the first case compiles
 coordinate = st.floats(-5, 5).map(lambda v: round(v, 3))
 spots = st.tuples(coordinate, coordinate)
 points = st.lists(spots, min_size=2, max_size=6).map(np.array)
-PACE = Pace(speed=1.3, braking=1.5, turning_speed=2.5, clearance=0.4, patience=2.0)
+PACE = Pace.of(PersonParameters())
+walkers = st.builds(
+    WalkingParameters,
+    look_ahead=st.floats(0.1, 0.6),
+    look_beyond=st.floats(1.0, 2.0),
+    sidestep_range=st.floats(0.3, 0.9),
+    object_clearance=st.floats(0.1, 0.3),
+    sidestep_room=st.floats(0.1, 2.0),
+    braking_share=st.floats(0.2, 1.0),
+    turn_gain=st.floats(1.0, 10.0),
+    facing_tolerance=st.just(0.25),
+    least_progress=st.just(0.05),
+)
 NOTHING = Obstacles(np.zeros((0, 3)), np.zeros(0, bool), np.zeros((0, 4)))
 
 
@@ -72,7 +81,7 @@ def test_projection_is_the_nearest_of_many_points_along_the_path(path, position)
 
 
 def test_turning_takes_the_short_way_round():
-    rate, error = turn_towards(np.pi - 0.1, 0.0, 0.0, -1.0, -0.1, PACE.turning_speed)
+    rate, error = turn_towards(np.pi - 0.1, 0.0, 0.0, -1.0, -0.1, PACE)
     assert rate > 0
     assert 0 < error < 0.3
 
@@ -115,22 +124,22 @@ def test_things_on_the_way_are_walked_around(across):
 def test_a_thing_is_passed_on_its_free_side():
     target, beyond = (0.25, 0.0), (1.0, 0.0)
     south, north = floor_of(_box(-9, -9, 9, -0.2)), floor_of(_box(-9, -9, 9, -0.2), _box(-9, 0.2, 9, 9))
-    assert sidestep(0.0, 0.0, target, beyond, among(ANYWHERE, (0.5, 0.1)), PACE.clearance)[1] < 0
-    assert sidestep(0.0, 0.0, target, beyond, among(south, (0.5, 0.1)), PACE.clearance)[1] > 0
-    assert sidestep(0.0, 0.0, target, beyond, among(north, (0.5, 0.1)), PACE.clearance) == target
+    assert sidestep(0.0, 0.0, target, beyond, among(ANYWHERE, (0.5, 0.1)), PACE)[1] < 0
+    assert sidestep(0.0, 0.0, target, beyond, among(south, (0.5, 0.1)), PACE)[1] > 0
+    assert sidestep(0.0, 0.0, target, beyond, among(north, (0.5, 0.1)), PACE) == target
 
 
 @pytest.mark.parametrize("thing", [(-0.3, 0.0), (1.5, 0.0), (0.4, 0.6)])
 def test_what_is_not_in_the_way_bends_nothing(thing):
     target = (0.25, 0.0)
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), among(ANYWHERE, thing), PACE.clearance) == target
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), among(ANYWHERE, thing), PACE) == target
 
 
 def test_what_is_sought_or_put_away_bends_nothing():
     target, obstacles = (0.25, 0.0), among(ANYWHERE, (0.4, 0.0))
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), obstacles, PACE.clearance) != target
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), obstacles, PACE) != target
     ignored = obstacles._replace(is_obstacle=np.array([False]))
-    assert sidestep(0.0, 0.0, target, (1.0, 0.0), ignored, PACE.clearance) == target
+    assert sidestep(0.0, 0.0, target, (1.0, 0.0), ignored, PACE) == target
 
 
 def _box(x0, y0, x1, y1):
@@ -160,7 +169,8 @@ def along_in_numpy(path, arc):
     return np.array([np.interp(arc, along, path[:, 0]), np.interp(arc, along, path[:, 1])])
 
 
-def sidestep_in_numpy(position, target, beyond, things, is_free):
+def sidestep_in_numpy(position, target, beyond, things, is_free, person):
+    clearance = person.body_radius + person.walking.object_clearance
     reach = np.linalg.norm(beyond - position)
     if reach < 1e-9:
         return target
@@ -170,36 +180,40 @@ def sidestep_in_numpy(position, target, beyond, things, is_free):
     in_the_way = [
         (r @ ahead, r @ left)
         for r in offsets
-        if 0.0 < r @ ahead < SIDESTEP_RANGE and abs(r @ left) < PACE.clearance
+        if 0.0 < r @ ahead < person.walking.sidestep_range and abs(r @ left) < clearance
     ]
     if not in_the_way:
         return target
     along, across = min(in_the_way)
     side = -1.0 if across >= 0 else 1.0
     for sign in (side, -side):
-        if sign == -side and along < MIN_AHEAD * abs(across + sign * PACE.clearance):
+        if sign == -side and along < person.walking.sidestep_room * abs(across + sign * clearance):
             return target
-        step = along * ahead + (across + sign * PACE.clearance) * left
+        step = along * ahead + (across + sign * clearance) * left
         aside = position + step * (np.linalg.norm(target - position) / np.linalg.norm(step))
         if is_free(position + step) and is_free(aside):
             return aside
     return target
 
 
-def follow_in_numpy(path, position, heading, things, is_free):
+def follow_in_numpy(path, position, heading, things, is_free, person):
+    walking = person.walking
     arc, gap = nearest_in_numpy(path, position)
     left = max(polyline(path)[1][-1] - arc, 0.0) + gap
-    beyond = along_in_numpy(path, arc + LOOK_BEYOND)
-    target = sidestep_in_numpy(position, along_in_numpy(path, arc + LOOK_AHEAD), beyond, things, is_free)
+    beyond = along_in_numpy(path, arc + walking.look_beyond)
+    target = sidestep_in_numpy(
+        position, along_in_numpy(path, arc + walking.look_ahead), beyond, things, is_free, person
+    )
     offset = target - position
     assume(np.linalg.norm(offset) > 1e-6)
     error = (np.arctan2(offset[1], offset[0]) - heading + np.pi) % (2 * np.pi) - np.pi
     assume(abs(error) < np.pi - 1e-6)  # straight behind, rounding says which way to turn
-    pace = min(PACE.speed, np.sqrt(2 * PACE.braking * left)) * max(np.cos(error), 0.0) ** 2
+    braking = walking.braking_share * person.walking_acceleration
+    pace = min(person.walking_speed, np.sqrt(2 * braking * left)) * max(np.cos(error), 0.0) ** 2
     return (
         pace * np.cos(error),
         pace * np.sin(error),
-        np.clip(TURN_GAIN * error, -PACE.turning_speed, PACE.turning_speed),
+        np.clip(walking.turn_gain * error, -person.turning_speed, person.turning_speed),
     )
 
 
@@ -212,20 +226,20 @@ def is_no_tie(path, position):
 
 
 @PATIENT
-@given(points, spots, st.floats(-7, 7), st.lists(spots, max_size=4))
-def test_kernels_agree_with_numpy(path, position, heading, things):
+@given(points, spots, st.floats(-7, 7), st.lists(spots, max_size=4), walkers)
+def test_kernels_agree_with_numpy(path, position, heading, things, walking):
     assume(is_no_tie(path, np.array(position)))
     things = [
         (x + 0.000123, y + 0.000217) for x, y in things
     ]  # nothing is exactly at the limits of being in the way
-    there = np.array(position)
+    there, person = np.array(position), PersonParameters(walking=walking)
     walls = NavMesh.build([_box(-1, -1, 1, 0.5), _box(2, -3, 3, 3)], (-6.0, -6.0, 6.0, 6.0))
     for ours, theirs in (
         (project(path, *position), nearest_in_numpy(path, there)),
         (point_along(path, 1.234), along_in_numpy(path, 1.234)),
         (
-            follow(path, *position, heading, among(walls.outline, *things), PACE),
-            follow_in_numpy(path, there, heading, np.array(things), walls.is_navigable),
+            follow(path, *position, heading, among(walls.outline, *things), Pace.of(person)),
+            follow_in_numpy(path, there, heading, np.array(things), walls.is_navigable, person),
         ),
     ):
         assert ours == pytest.approx(theirs, abs=1e-9)

@@ -11,6 +11,7 @@ from experiments.origin import is_simulated
 from experiments.runs.health import summarise_health
 from experiments.runs.phases import FLYTHROUGH
 from experiments.runs.records import PARTICIPANT, PHASE_ENDED, Event
+from mjsim.motion_parameters import GROUPS
 
 REGRETFUL = 0.01  # m; smaller regrets are ties
 COSTLY = 0.1  # m; what a deviation must cost to count in `nd_regret_10cm`
@@ -166,7 +167,7 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
 def _person(events: Sequence[Event]) -> dict[str, Any]:
     """The participant's values, but for those of the hands, as columns: `person_walking_speed` and so on."""
     told: Mapping[str, Any] = next((e for e in events if e["event"] == PARTICIPANT), {"person": {}})
-    body = {f"person_{name}": value for name, value in told["person"].items() if name != "motion"}
+    body = {f"person_{name}": value for name, value in told["person"].items() if name not in GROUPS}
     model = told.get("behaviour") or {}
     return body | {f"behaviour_{name.replace('.', '_')}": value for name, value in model.items()}
 

@@ -13,7 +13,7 @@ from mjsim.files import write_text_atomically
 
 # 6: the participant. 5: distances between places, ties, gaps of suggestions. 4: typed checkpoints. 3: untyped ones.
 # 2: no health of the physics. 1: neither state hashes nor checkpoints.
-LOG_FORMAT = 6
+LOG_FORMAT = 7
 FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
     "events.jsonl",

@@ -21,8 +21,6 @@ from mjsim.observation import ObjectStatus, Observation
 from mjsim.person_parameters import PersonParameters
 from planner.polyline import distance, path_length, project, rest_of
 
-FACING_WITHIN = 0.25  # rad
-MIN_PROGRESS = 0.05  # m
 BACK_OFF = Move(forward=-0.4, left=0.3)
 BACK_OFF_TIME = 0.6  # s
 
@@ -54,14 +52,14 @@ class Step(NamedTuple):
 
 
 @kernel
-def makes_progress(path: Floats, x: float, y: float, time: float, progress: Floats, patience: float) -> bool:
-    """Whether a walk along `path` has got on in the last `patience` seconds; updates `progress`, shape (2,)."""
+def makes_progress(path: Floats, x: float, y: float, time: float, progress: Floats, pace: Pace) -> bool:
+    """Whether a walk along `path` has got on in the last seconds of patience; updates `progress`, shape (2,)."""
     arc, gap = project(path, x, y)
     left = path_length(path) - arc + gap
-    if left < progress[SHORTEST_LEFT] - MIN_PROGRESS or left > progress[SHORTEST_LEFT] + 1.0:
+    if left < progress[SHORTEST_LEFT] - pace.walking.least_progress or left > progress[SHORTEST_LEFT] + 1.0:
         progress[SHORTEST_LEFT], progress[SINCE] = left, time
         return True
-    return bool(time - progress[SINCE] <= patience + TIME_TOLERANCE)
+    return bool(time - progress[SINCE] <= pace.patience + TIME_TOLERANCE)
 
 
 @kernel
@@ -82,11 +80,11 @@ def next_step(
     path = rest_of(walk.path, x, y) if walk.shown else walk.path
     at_the_end = distance(x, y, path[-1, 0], path[-1, 1]) < ARRIVED_WITHIN
     if distance(x, y, walk.goal[0], walk.goal[1]) > walk.stop_distance and not at_the_end:
-        phase = WALKING if makes_progress(path, x, y, time, progress, walk.pace.patience) else BLOCKED
+        phase = WALKING if makes_progress(path, x, y, time, progress, walk.pace) else BLOCKED
         forward, left, turn = follow(path, x, y, heading, obstacles, walk.pace)
         return Step(phase, forward, left, turn)
-    turn, error = turn_towards(heading, x, y, walk.goal[0], walk.goal[1], walk.pace.turning_speed)
-    if walk.face_goal and abs(error) > FACING_WITHIN:
+    turn, error = turn_towards(heading, x, y, walk.goal[0], walk.goal[1], walk.pace)
+    if walk.face_goal and abs(error) > walk.pace.walking.facing_tolerance:
         return Step(TURNING, 0.0, 0.0, turn)
     return Step(ARRIVED, 0.0, 0.0, 0.0)
 

@@ -11,16 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
+from mjsim.motion_parameters import WalkingParameters
 from mjsim.person_parameters import PersonParameters
 from planner.polyline import AT_THE_END, Path, distance, path_length, point_along, project
-
-LOOK_AHEAD = 0.25  # m; longer cuts corners into the walls, shorter wobbles
-LOOK_BEYOND = 1.2  # m; farther than `SIDESTEP_RANGE`
-SIDESTEP_RANGE = 0.8  # m ahead
-HALF_OBJECT = 0.20  # m; a walker keeps that and its own radius from an object's middle
-MIN_AHEAD = 0.6  # m ahead per metre aside on the way around an object's far side; with less one would dither
-BRAKING = 0.5  # of what the body can do, for which a walker plans
-TURN_GAIN = 5.0  # 1/s
 
 
 class Pace(NamedTuple):
@@ -32,6 +25,7 @@ class Pace(NamedTuple):
         turning_speed: Fastest turn, rad/s.
         clearance: Distance kept from the middle of objects on the floor, m.
         patience: Time without progress until the person is blocked, s.
+        walking: How it follows a path.
     """
 
     speed: float
@@ -39,13 +33,15 @@ class Pace(NamedTuple):
     turning_speed: float
     clearance: float
     patience: float
+    walking: WalkingParameters
 
     @classmethod
     def of(cls, person: PersonParameters) -> "Pace":
         """That of a person."""
-        braking = BRAKING * person.walking_acceleration
-        clearance = person.body_radius + HALF_OBJECT
-        return cls(person.walking_speed, braking, person.turning_speed, clearance, person.patience)
+        walking = person.walking
+        braking = walking.braking_share * person.walking_acceleration
+        clearance = person.body_radius + walking.object_clearance
+        return cls(person.walking_speed, braking, person.turning_speed, clearance, person.patience, walking)
 
 
 class Obstacles(NamedTuple):
@@ -70,11 +66,12 @@ def wrap_angle(angle: float) -> float:
 
 @kernel
 def turn_towards(
-    heading: float, x: float, y: float, to_x: float, to_y: float, fastest: float
+    heading: float, x: float, y: float, to_x: float, to_y: float, pace: Pace
 ) -> tuple[float, float]:
-    """Yaw rate (at most `fastest`, rad/s) that turns `heading` towards a point, and the angle still to turn (rad)."""
+    """Yaw rate, rad/s, that turns `heading` towards a point, and the angle still to turn (rad)."""
     error = wrap_angle(math.atan2(to_y - y, to_x - x) - heading)
-    return min(max(TURN_GAIN * error, -fastest), fastest), error
+    fastest = pace.turning_speed
+    return min(max(pace.walking.turn_gain * error, -fastest), fastest), error
 
 
 @kernel
@@ -96,7 +93,7 @@ def sidestep(
     target: tuple[float, float],
     beyond: tuple[float, float],
     obstacles: Obstacles,
-    clearance: float,
+    pace: Pace,
 ) -> tuple[float, float]:
     """Where to walk instead of straight to `target` so that objects on the floor stay beside the feet, m.
 
@@ -110,8 +107,9 @@ def sidestep(
         beyond: Farther along the path, m: it decides what is in the way and on which side, and keeps the person on
             that side, because it lies behind the object.
         obstacles: What to keep clear of.
-        clearance: By how much, m.
+        pace: How the person walks.
     """
+    clearance, walking = pace.clearance, pace.walking
     reach = distance(x, y, beyond[0], beyond[1])
     if reach < AT_THE_END:
         return target
@@ -122,7 +120,7 @@ def sidestep(
             continue
         dx, dy = obstacles.positions[k, 0] - x, obstacles.positions[k, 1] - y
         along, across = dx * ahead_x + dy * ahead_y, dy * ahead_x - dx * ahead_y
-        in_the_way = 0.0 < along < SIDESTEP_RANGE and abs(across) < clearance
+        in_the_way = 0.0 < along < walking.sidestep_range and abs(across) < clearance
         nearer = along < nearest_along or (along == nearest_along and across < nearest_across)
         if in_the_way and nearer:
             nearest_along, nearest_across = along, across
@@ -132,7 +130,7 @@ def sidestep(
     side = -1.0 if nearest_across >= 0.0 else 1.0
     for sign in (side, -side):
         out = nearest_across + sign * clearance
-        if sign != side and nearest_along < MIN_AHEAD * abs(out):
+        if sign != side and nearest_along < walking.sidestep_room * abs(out):
             break
         step_x = nearest_along * ahead_x - out * ahead_y
         step_y = nearest_along * ahead_y + out * ahead_x
@@ -162,9 +160,9 @@ def follow(
     """
     arc, gap = project(path, x, y)
     left = max(path_length(path) - arc, 0.0) + gap
-    beyond = point_along(path, arc + LOOK_BEYOND)
-    target = sidestep(x, y, point_along(path, arc + LOOK_AHEAD), beyond, obstacles, pace.clearance)
-    turn, error = turn_towards(heading, x, y, target[0], target[1], pace.turning_speed)
+    beyond = point_along(path, arc + pace.walking.look_beyond)
+    target = sidestep(x, y, point_along(path, arc + pace.walking.look_ahead), beyond, obstacles, pace)
+    turn, error = turn_towards(heading, x, y, target[0], target[1], pace)
     ahead = max(math.cos(error), 0.0)
     speed = min(pace.speed, math.sqrt(2.0 * pace.braking * left)) * ahead * ahead
     return speed * math.cos(error), speed * math.sin(error), turn

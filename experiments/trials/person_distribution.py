@@ -1,7 +1,7 @@
 """How people differ: a distribution for each value of a person, from which a trial draws its participant.
 
 Distributions are given in TOML (`experiments.distribution`), in a file or between braces on the command line. Names and
-units are those of `mjsim.PersonParameters`; values of the hands are `motion.reach_time` and so on. What is not named is
+units are those of `mjsim.PersonParameters`; values of a group are `motion.reach_time` and so on. What is not named is
 the same for everybody.
 """
 
@@ -17,9 +17,10 @@ import numpy as np
 from experiments.distribution import AnyDistribution, distribution
 from experiments.errors import ConfigError
 from mjsim.errors import PersonError
-from mjsim.person_parameters import RANGES, MotionParameters, PersonParameters
+from mjsim.motion_parameters import GROUPS
+from mjsim.person_parameters import RANGES, PersonParameters
 
-_NAMES = (*RANGES, *(f"motion.{name}" for name in MotionParameters._fields))
+_NAMES = (*RANGES, *(f"{group}.{name}" for group, values in GROUPS.items() for name in values._fields))
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class PersonDistribution:
         for name, _ in self.parameters:
             if name not in _NAMES:
                 raise ConfigError(
-                    f"a person has no {name!r}; it has {', '.join(RANGES)}, and motion (docs/people.md)"
+                    f"a person has no {name!r}; it has {', '.join([*RANGES, *GROUPS])} (docs/people.md)"
                 )
         self._quantiles({name: 0.5 for name, _ in self.parameters})
 
@@ -52,8 +53,8 @@ class PersonDistribution:
         """
         found: dict[str, AnyDistribution] = {}
         for name, value in values.items():
-            if name == "motion" and isinstance(value, Mapping):
-                found |= {f"motion.{part}": distribution(f"motion.{part}", v) for part, v in value.items()}
+            if name in GROUPS and isinstance(value, Mapping):
+                found |= {f"{name}.{part}": distribution(f"{name}.{part}", v) for part, v in value.items()}
             else:
                 found[name] = distribution(name, value)
         return cls(tuple(sorted(found.items())))
@@ -102,11 +103,13 @@ class PersonDistribution:
                 values[name] = described.quantile(shares[name], low, high)
             except ConfigError as error:
                 raise ConfigError(f"{name}: {error}") from error
-        hands = {name.removeprefix("motion."): v for name, v in values.items() if name.startswith("motion.")}
+        if "motion.withdraw_steps" in values:
+            values["motion.withdraw_steps"] = round(values["motion.withdraw_steps"])
         try:
-            if "withdraw_steps" in hands:
-                hands["withdraw_steps"] = round(hands["withdraw_steps"])
-            motion = PersonParameters().motion._replace(**hands)
-            return PersonParameters(motion=motion, **{n: v for n, v in values.items() if n in RANGES})
+            groups: dict[str, Any] = {
+                group: usual(**{n.split(".")[1]: v for n, v in values.items() if n.startswith(f"{group}.")})
+                for group, usual in GROUPS.items()
+            }
+            return PersonParameters(**groups, **{n: v for n, v in values.items() if n in RANGES})
         except PersonError as error:
             raise ConfigError(str(error)) from error

@@ -12,6 +12,7 @@ from mjsim.fidelity.kinematics import Gait
 from mjsim.fidelity.trunk_contact import Floor
 from mjsim.kernels import kernel
 from mjsim.model.clearance import ClearanceField
+from mjsim.motion_parameters import CarryingParameters
 from mjsim.person.postures import BodyMotion, Contacts, Hands, Holding, update_hands
 from mjsim.rollout import RolloutArrays
 
@@ -53,6 +54,7 @@ class KinematicModel(NamedTuple):
         grips: Pose of an object in the frame of the hand that holds it, by object and grip, shape (n, 2, 7).
         loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
         posture_pace: As `Hands.pace`, shape (3,).
+        carrying: How the person carries.
         postures: Where an empty left hand belongs (`REST`), and one that holds something while walking (`CARRY`),
             turning (`TUCKED`) or when the other hand reaches (`ASIDE`), m, shape (4, 3).
         clearance: Clearance at the heights of carried objects.
@@ -66,6 +68,7 @@ class KinematicModel(NamedTuple):
     grips: Floats
     loads: Floats
     posture_pace: Floats
+    carrying: CarryingParameters
     postures: Floats
     clearance: ClearanceField
     timestep: float
@@ -107,6 +110,7 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
             model.loads,
             model.posture_pace,
         ),
+        model.carrying,
         Holding(held_in(vector, 0), held_in(vector, 1), moving, model.postures[posture]),
         Contacts(_NO_GEOMS, _NO_FRAMES, _NO_OWNERS),
         model.gait.dt,

@@ -59,6 +59,7 @@ class KinematicWorld:
             grips=_grip_poses(scene),
             loads=carrying.loads,
             posture_pace=full.person.posture_pace,
+            carrying=scene.person.carrying,
             postures=np.array([avatar.REST, avatar.CARRY, avatar.TUCKED, avatar.ASIDE]),
             clearance=carrying.clearance,
             timestep=float(scene.model.opt.timestep),

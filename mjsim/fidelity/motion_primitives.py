@@ -23,8 +23,8 @@ from mjsim.fidelity.kinematic_steps import (
 )
 from mjsim.fidelity.kinematics import Gait
 from mjsim.kernels import kernel
+from mjsim.motion_parameters import MotionParameters
 from mjsim.person.hand_path import progress
-from mjsim.person_parameters import MotionParameters
 from mjsim.rollout import RolloutArrays
 
 Floats = NDArray[np.float64]

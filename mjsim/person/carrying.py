@@ -15,9 +15,9 @@ from mjsim.model import avatar
 from mjsim.model.carry_clearance import carry_clearance
 from mjsim.model.clearance import ClearanceField
 from mjsim.model.scene import Scene
+from mjsim.motion_parameters import CarryingParameters
 from mjsim.person.person import Person
 from mjsim.person.postures import (
-    MIN_HEIGHT,
     BodyMotion,
     Contacts,
     Hands,
@@ -68,6 +68,7 @@ class Carrying:
             targets, person.hand_velocities, self._compliance, np.zeros((2, 3)), rest, self.loads,
             person.posture_pace,
         )  # fmt: skip
+        self._parameters = tuple(person.parameters.carrying)
         self._strained = np.zeros(2, np.int64)
 
     def reset(self) -> None:
@@ -96,7 +97,7 @@ class Carrying:
         moving = -1 if person.moving_hand is None else person.moving_hand
         holding = (left, right, moving, self._postures[held_posture])
         contacts = self._contacts() if left >= 0 or right >= 0 else self._no_contacts
-        _update_hands(self._body, self._hands, holding, contacts, person.dt)
+        _update_hands(self._body, self._hands, self._parameters, holding, contacts, person.dt)
 
     def carry_position(self, hand: int, item: int, body: BodyMotion | None = None) -> NDArray[np.float64]:
         """Where a hand best carries object `item`, clear of the house: body frame, m, (3,).
@@ -108,10 +109,10 @@ class Carrying:
         """
         radius, height = self.loads[item].tolist()
         forward, left, up = avatar.posture(hand, avatar.CARRY)
-        rig = self._person.rig
+        rig, carrying = self._person.rig, self._person.parameters.carrying
         body = body or BodyMotion(rig.pose, rig.motion, self.clearance)
-        point = drawn_in(forward, left, radius, body)
-        return np.array([*point, max(up, MIN_HEIGHT + height)])
+        point = drawn_in(forward, left, radius, body, carrying)
+        return np.array([*point, max(up, carrying.least_height + height)])
 
     def _contacts(self) -> tuple[Any, ...]:
         """All contacts of the physics, as `Contacts`."""
@@ -143,11 +144,13 @@ class Carrying:
 
 
 @kernel
-def _update_hands(body: Any, hands: Any, holding: Any, contacts: Any, dt: float) -> None:
+def _update_hands(body: Any, hands: Any, carrying: Any, holding: Any, contacts: Any, dt: float) -> None:
     """`update_hands` with plain tuples: numba takes them from Python in half the time of named ones."""
     pose, command, clearance = body
     motion = BodyMotion(pose, command, ClearanceField(*clearance))
-    update_hands(motion, Hands(*hands), Holding(*holding), Contacts(*contacts), dt)
+    update_hands(
+        motion, Hands(*hands), CarryingParameters(*carrying), Holding(*holding), Contacts(*contacts), dt
+    )
 
 
 def _load(person: Person, item: int) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
 from mjsim.model.clearance import ClearanceField, clearance_at
-from mjsim.person_parameters import MotionParameters
+from mjsim.motion_parameters import CarryingParameters, MotionParameters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -24,18 +24,9 @@ Ints = NDArray[np.int32]
 X, Y, HEADING = 0, 1, 2
 FORWARD, LEFT, TURN = 0, 1, 2
 
-MIN_HEIGHT = 0.97  # m, for the underside of what is carried: above counters
-MARGIN = 0.03  # m
-NEAR, FAR = 0.15, 0.3  # s, how far ahead a hand looks
 ROUNDS = 3
-MAX_SHIFT = 0.2  # m
 # Of the line from the body's axis to the posture.
 EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
-OVER_GAP = 0.04  # m, between two held objects one above the other
-PASSING = 0.10  # m of approach over which one is raised above the other
-PUSH_BACK = 0.25  # m/s beyond the speed of approach
-RELAX = 0.9  # 1/s
-MAX_COMPLIANCE = 0.15  # m
 UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
 
 _ARRIVED = 0.0005  # m
@@ -112,34 +103,42 @@ def posture_pace(motion: MotionParameters) -> Floats:
 
 
 @kernel
-def update_hands(body: BodyMotion, hands: Hands, holding: Holding, contacts: Contacts, dt: float) -> None:
+def update_hands(
+    body: BodyMotion,
+    hands: Hands,
+    carrying: CarryingParameters,
+    holding: Holding,
+    contacts: Contacts,
+    dt: float,
+) -> None:
     """Set the targets of the hands that no motion moves, and keep the walking command off contacts.
 
     Args:
         body: The command is changed.
         hands: Targets, velocities and compliance are changed.
+        carrying: How the person carries.
         holding: What each hand is doing.
         contacts: Contacts of the physics; none where nothing is held or there is no physics.
         dt: Control step, s.
     """
     for hand in range(2):
         side = 1.0 - 2.0 * hand
-        hands.compliance[hand, 0] *= 1.0 - RELAX * dt
-        hands.compliance[hand, 1] *= 1.0 - RELAX * dt
+        hands.compliance[hand, 0] *= 1.0 - carrying.return_rate * dt
+        hands.compliance[hand, 1] *= 1.0 - carrying.return_rate * dt
         goal = hands.goals[hand]
         goal[0], goal[1], goal[2] = hands.rest[0], side * hands.rest[1], hands.rest[2]
         item = holding.left if hand == 0 else holding.right
         if item < 0 or hand == holding.moving:
             continue
-        _comply(hand, item, body, hands, contacts, dt)
+        _comply(hand, item, body, hands, carrying, contacts, dt)
         radius, height = hands.loads[item, 0], hands.loads[item, 1]
-        forward, left = drawn_in(holding.posture[0], side * holding.posture[1], radius, body)
+        forward, left = drawn_in(holding.posture[0], side * holding.posture[1], radius, body, carrying)
         goal[0] = forward + hands.compliance[hand, 0]
         goal[1] = left + hands.compliance[hand, 1]
-        goal[2] = max(holding.posture[2], MIN_HEIGHT + height)
+        goal[2] = max(holding.posture[2], carrying.least_height + height)
     if holding.left >= 0 and holding.right >= 0 and holding.moving < 0:
         loads, left, right = hands.loads, holding.left, holding.right
-        _raise_right(hands.goals, loads[left, 0] + loads[right, 0], loads[right, 1])
+        _raise_right(hands.goals, loads[left, 0] + loads[right, 0], loads[right, 1], carrying)
     for hand in range(2):
         if hand != holding.moving:
             goal = hands.goals[hand]
@@ -173,25 +172,28 @@ def move_hand(
 
 
 @kernel
-def drawn_in(forward: float, left: float, radius: float, body: BodyMotion) -> tuple[float, float]:
+def drawn_in(
+    forward: float, left: float, radius: float, body: BodyMotion, carrying: CarryingParameters
+) -> tuple[float, float]:
     """Place nearest to a posture (forward, left), m, where a load is clear of the house, now and shortly.
 
     First a shift sideways, as past a door frame. If that is not enough, a place between the body's axis and the
     posture, as far out as the line from the axis is clear: the far side of a wall is clear, too, but out of reach.
     """
-    shift_f, shift_l = _sideways(forward, left, radius + MARGIN, body)
+    needed = radius + carrying.margin
+    shift_f, shift_l = _sideways(forward, left, needed, body, carrying)
     forward, left = forward + shift_f, left + shift_l
-    if _clear_throughout(forward, left, radius + MARGIN, body):
+    if _clear_throughout(forward, left, needed, body, carrying):
         return forward, left
     best_f, best_l, best_room, before = 0.0, 0.0, -math.inf, -math.inf
     for share in EXTENSIONS:
         at_f, at_l = share * forward, share * left
         room = math.inf
-        for horizon in (0.0, NEAR, FAR):
+        for horizon in (0.0, carrying.near, carrying.far):
             there, _, _ = _room(at_f, at_l, horizon, body)
             room = min(room, there)
         room -= radius
-        clear = room >= 0.5 * MARGIN
+        clear = room >= 0.5 * carrying.margin
         if not clear and room < before:
             break
         if clear or room > best_room:
@@ -201,10 +203,12 @@ def drawn_in(forward: float, left: float, radius: float, body: BodyMotion) -> tu
 
 
 @kernel
-def _clear_throughout(forward: float, left: float, needed: float, body: BodyMotion) -> bool:
+def _clear_throughout(
+    forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
+) -> bool:
     """Whether a load is clear between axis and posture, as the clearance at both ends and their distance tell."""
     length = math.sqrt(forward * forward + left * left)
-    for horizon in (0.0, NEAR, FAR):
+    for horizon in (0.0, carrying.near, carrying.far):
         axis, _, _ = _room(0.0, 0.0, horizon, body)
         there, _, _ = _room(forward, left, horizon, body)
         if min(axis, there, 0.5 * (axis + there - length)) < needed:
@@ -213,10 +217,12 @@ def _clear_throughout(forward: float, left: float, needed: float, body: BodyMoti
 
 
 @kernel
-def _sideways(forward: float, left: float, needed: float, body: BodyMotion) -> tuple[float, float]:
+def _sideways(
+    forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
+) -> tuple[float, float]:
     """Shift in the body frame, away from what is too near."""
     shift_f, shift_l = 0.0, 0.0
-    for horizon in (0.0, NEAR, FAR):
+    for horizon in (0.0, carrying.near, carrying.far):
         for _ in range(ROUNDS):
             room, away_f, away_l = _room(forward + shift_f, left + shift_l, horizon, body)
             if room >= needed:
@@ -224,7 +230,7 @@ def _sideways(forward: float, left: float, needed: float, body: BodyMotion) -> t
             shift_f += (needed - room) * away_f
             shift_l += (needed - room) * away_l
     size = math.hypot(shift_f, shift_l)
-    limit = min(1.0, MAX_SHIFT / size) if size > 0.0 else 1.0
+    limit = min(1.0, carrying.most_shift / size) if size > 0.0 else 1.0
     return shift_f * limit, shift_l * limit
 
 
@@ -242,16 +248,24 @@ def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tupl
 
 
 @kernel
-def _raise_right(goals: Floats, radii: float, height: float) -> None:
+def _raise_right(goals: Floats, radii: float, height: float, carrying: CarryingParameters) -> None:
     """Where two held objects would meet, pass the right one over the left one."""
     apart = math.hypot(goals[1, 0] - goals[0, 0], goals[1, 1] - goals[0, 1])
-    near = (radii + PASSING - apart) / PASSING
-    over = goals[0, 2] + height + OVER_GAP - goals[1, 2]
+    near = (radii + carrying.stacking_distance - apart) / carrying.stacking_distance
+    over = goals[0, 2] + height + carrying.stacking_gap - goals[1, 2]
     goals[1, 2] += min(1.0, max(0.0, near)) * max(0.0, over)
 
 
 @kernel
-def _comply(hand: int, item: int, body: BodyMotion, hands: Hands, contacts: Contacts, dt: float) -> None:
+def _comply(
+    hand: int,
+    item: int,
+    body: BodyMotion,
+    hands: Hands,
+    carrying: CarryingParameters,
+    contacts: Contacts,
+    dt: float,
+) -> None:
     """Give way to everything static that a held object touches from the side."""
     owners = contacts.owners
     for contact in range(len(contacts.geoms)):
@@ -265,24 +279,33 @@ def _comply(hand: int, item: int, body: BodyMotion, hands: Hands, contacts: Cont
         nx, ny = sign * contacts.frames[contact, 0], sign * contacts.frames[contact, 1]
         size = math.sqrt(nx * nx + ny * ny)
         if size > UPRIGHT:
-            _give_way(hand, nx / size, ny / size, body, hands, dt)
+            _give_way(hand, nx / size, ny / size, body, hands, carrying, dt)
 
 
 @kernel
-def _give_way(hand: int, nx: float, ny: float, body: BodyMotion, hands: Hands, dt: float) -> None:
+def _give_way(
+    hand: int,
+    nx: float,
+    ny: float,
+    body: BodyMotion,
+    hands: Hands,
+    carrying: CarryingParameters,
+    dt: float,
+) -> None:
     """Move a hand's offset along a contact's normal; at its limit, keep the body from moving into the contact."""
     command, target, offset = body.command, hands.targets[hand], hands.compliance[hand]
     c, s = math.cos(body.pose[HEADING]), math.sin(body.pose[HEADING])
     away_f, away_l = c * nx + s * ny, c * ny - s * nx
     swing = (away_l * target[0] - away_f * target[1]) * command[TURN]
     approach = -(away_f * command[FORWARD] + away_l * command[LEFT] + swing)
-    push = (max(approach, 0.0) + PUSH_BACK) * dt
+    push = (max(approach, 0.0) + carrying.push_back) * dt
     offset[0] += away_f * push
     offset[1] += away_l * push
     size = math.sqrt(offset[0] ** 2 + offset[1] ** 2)
-    if size > MAX_COMPLIANCE:
-        offset[0] *= MAX_COMPLIANCE / size
-        offset[1] *= MAX_COMPLIANCE / size
+    most = carrying.most_compliance
+    if size > most:
+        offset[0] *= most / size
+        offset[1] *= most / size
         if swing < 0.0:
             command[TURN] = 0.0
         into = away_f * command[FORWARD] + away_l * command[LEFT]
