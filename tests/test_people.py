@@ -126,8 +126,8 @@ def test_a_design_says_who_takes_part(tmp_path: Path) -> None:
     usual, _, other = read_design(file).trials
     assert draw_person(usual) == PersonParameters()
     assert other.person == PersonDistribution.of({"walking_speed": {"normal": [1.2, 0.2]}})
-    file.write_text(file.read_text().replace("walking_speed", "walking"))
-    with pytest.raises(ConfigError, match=r"no 'walking'.*cells\[1\]"):
+    file.write_text(file.read_text().replace("walking_speed", "walking_pace"))
+    with pytest.raises(ConfigError, match=r"no 'walking_pace'.*cells\[1\]"):
         read_design(file)
 
 
