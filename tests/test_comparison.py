@@ -68,6 +68,17 @@ def test_pairs_that_are_missing_are_named_and_left_out(tmp_path):
     assert (found.pairs, found.means, found.difference) == (2, (2.5, 5.0), 2.5)
 
 
+@pytest.mark.parametrize("unknown", [None, np.nan])
+def test_a_metric_that_no_pair_knows_has_no_row_and_is_named(unknown, tmp_path, capsys):
+    rows = [row(name, seed, 1.0 + seed) for name in ("none", "optimal") for seed in range(2)]
+    rows = [r | {"total_regret_m": unknown if r["assistance"] == "none" else 1.0} for r in rows]
+    write_tables(tmp_path, rows)
+    assert main(["compare", str(tmp_path)]) == 0
+    printed = capsys.readouterr()
+    assert "total_regret_m" not in printed.out and "nan" not in printed.out
+    assert "total_regret_m is not known in both trials of any pair of none and optimal" in printed.err
+
+
 def test_unlike_participants_are_no_pair(tmp_path):
     write_tables(tmp_path, [row("none", 0, 1.0, user="searcher"), row("optimal", 0, 2.0, user="follower")])
     blocks = read_blocks(tmp_path)

@@ -137,6 +137,20 @@ def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
                 yield f"{where}without a counterpart in {one} or {other}: {counted(len(lone), 'trial')}, seeds {seeds}"
 
 
+def unknown_metrics(
+    blocks: Sequence[Block], metrics: Sequence[str], differences: Sequence[Difference]
+) -> Iterator[str]:
+    """A line for every metric that no pair of two conditions knows: there is no row for it."""
+    shown = {(d.block, d.metric, d.conditions) for d in differences}
+    for block in blocks:
+        where = f"{block.label}: " if block.label else ""
+        for metric in metrics:
+            pairs = [pair for pair in itertools.combinations(block.rows, 2) if _common(block, pair)]
+            lost = [" and ".join(pair) for pair in pairs if (block.label, metric, pair) not in shown]
+            if lost:
+                yield f"{where}{metric} is not known in both trials of any pair of {', '.join(lost)}"
+
+
 def compare(blocks: Sequence[Block], metrics: Sequence[str] = METRICS) -> list[Difference]:
     """Every two conditions in every metric, on the pairs that are complete.
 
@@ -167,13 +181,9 @@ def compare(blocks: Sequence[Block], metrics: Sequence[str] = METRICS) -> list[D
 def _compare(block: Block, metric: str, conditions: tuple[str, str]) -> Difference | None:
     one, other = (block.rows[name] for name in conditions)
     values = np.array(
-        [
-            (one[seeds][metric], other[seeds][metric])
-            for seeds in sorted(one.keys() & other.keys())
-            if one[seeds][metric] is not None and other[seeds][metric] is not None
-        ],
-        float,
-    )
+        [(one[key][metric], other[key][metric]) for key in _common(block, conditions)], float
+    ).reshape(-1, 2)
+    values = values[np.isfinite(values).all(axis=1)]  # null, and so NaN, where a metric is not known
     if not len(values):
         return None
     gaps = values[:, 1] - values[:, 0]
@@ -188,6 +198,12 @@ def _compare(block: Block, metric: str, conditions: tuple[str, str]) -> Differen
         mean_interval(gaps),
         *_effect(gaps),
     )
+
+
+def _common(block: Block, conditions: tuple[str, str]) -> list[tuple[Any, ...]]:
+    """Seeds and persons of the trials that both conditions have."""
+    one, other = (block.rows[name] for name in conditions)
+    return sorted(one.keys() & other.keys())
 
 
 def mean_interval(values: NDArray[np.float64]) -> Interval:

@@ -19,6 +19,7 @@ from experiments.analysis.comparison import (
     compare,
     missing_pairs,
     read_blocks,
+    unknown_metrics,
 )
 from experiments.commands.options import add_command, text_list
 from experiments.errors import ConfigError
@@ -70,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     origin = batch_origin(blocks)
     _show(differences, origin)
     console = Console(stderr=True, highlight=False, markup=False)
-    for line in missing_pairs(blocks):
+    for line in (*missing_pairs(blocks), *unknown_metrics(blocks, arguments.metrics, differences)):
         console.print(line, style="yellow", soft_wrap=True)
     if arguments.csv is not None:
         _write_csv(arguments.csv, differences, origin)
