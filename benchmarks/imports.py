@@ -20,13 +20,16 @@ REQUIREMENTS = (
 )
 
 
-def measure(quick: bool = False, count: int | None = None, workers: int | None = None) -> dict[str, Any]:
+def measure(
+    quick: bool = False, count: int | None = None, workers: int | None = None, only: int | None = None
+) -> dict[str, Any]:
     """Run the benchmark; everything in it can be written as JSON.
 
     Args:
         quick: A few placements of each.
         count: Placements of each object in each tier, rounded up to whole sessions.
         workers: Processes; one per core unless said.
+        only: Number of the one session to run, to look at a failure again.
     """
     wanted = count or (QUICK if quick else COUNT)
     with tempfile.TemporaryDirectory() as folder:
@@ -35,7 +38,7 @@ def measure(quick: bool = False, count: int | None = None, workers: int | None =
         sessions = -(-wanted // OWN)
         run = functools.partial(run_session, keys=tuple(keys))
         found = run_sessions(
-            run, sessions * len(keys) * len(TIERS), workers=workers, house=str(extension.path)
+            run, sessions * len(keys) * len(TIERS), workers=workers, only=only, house=str(extension.path)
         )
     return summarise(keys, [placement for session in found for placement in session], wanted)
 

@@ -111,6 +111,13 @@ BROKEN = {
         "floor",
         "z = 0.030",
     ),
+    "a narrow sill": (
+        "house.xml",
+        END,
+        '<geom type="box" pos="3 2 0.01" size="0.01 0.4 0.02"/>' + END,
+        "floor",
+        "z = 0.030",
+    ),
     "bin 3 m up": ("house.xml", TRAY, TRAY.replace('3.6 0"', '3.6 3"'), "reach", "above the floor"),
     "bin below the floor": (
         "house.xml",
@@ -192,7 +199,25 @@ BROKEN = {
     "an object for no bin": ("tray.xml", "0.24", "0.055", "capacity", "does not fit"),
     "a heavy object": ("ball.xml", 'mass="0.1"', 'mass="1000"', "mass", "1000 kg"),
 }
+# An L of 0.8 m, 0.3 m wide: its hull fills the corner.
+_CORNERS = [(0, 0), (0.8, 0), (0.8, 0.3), (0.3, 0.3), (0.3, 0.8), (0, 0.8)]
+_VERTICES = " ".join(f"{x} {y} {z}" for z in (0, 0.8) for x, y in _CORNERS)
+_CAPS = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
+_FACES = [(a, c, b) for a, b, c in _CAPS] + [(a + 6, b + 6, c + 6) for a, b, c in _CAPS]
+_FACES += [f for a in range(6) for b in [(a + 1) % 6] for f in ((a, b, b + 6), (a, b + 6, a + 6))]
+SOFA = (
+    f'<asset><mesh name="sofa" vertex="{_VERTICES}" face="{" ".join(f"{a} {b} {c}" for a, b, c in _FACES)}"/></asset>'
+    '<worldbody><geom name="sofa" type="mesh" mesh="sofa" pos="0.5 0.5 0.4"/>'
+)
 SURPRISING = {
+    "a corner sofa of one mesh": ("house.xml", "<worldbody>", SOFA, "hulls", "geom 'sofa' collides as its"),
+    "a lamp at 1.9 m": (
+        "house.xml",
+        END,
+        '<geom type="box" pos="1.5 1 2.2" size="0.3 0.3 0.3"/>' + END,
+        "headroom",
+        "down to 1.90 m",
+    ),
     "a door of 0.6 m": ("house.xml", SOUTH, SOUTH.replace("0.75", "0.95"), "passages", "0.6"),
     "rooms that overlap": (
         "house.xml",

@@ -13,7 +13,7 @@ from mjsim.model.rays import SOLID
 from mjsim.model.validation.bin_rules import check_bins
 from mjsim.model.validation.compiled import Compiled
 from mjsim.model.validation.findings import Finding
-from mjsim.model.validation.floor import BORDER, Floor
+from mjsim.model.validation.floor import BODY_BAND, BORDER, Floor
 from mjsim.person_parameters import PersonParameters
 
 USUAL = PersonParameters()  # a study may have others
@@ -21,8 +21,9 @@ PASSAGE = 0.70  # m, width below which people squeeze through
 LEAST_PASSAGE = 0.50  # m, width of the body with the planner's clearance
 ROOM_AREA = 0.25  # m^2 of floor to stand on
 FLOOR_GAP = 0.006  # m, between the floor and z = 0
-_FLOOR_RAYS = 3000
-_DOWN = np.array([0.0, 0.0, -1.0])
+HEADROOM = 2.0  # m, the highest eyes
+_RAYS = 3000
+_CHEST = 1.0  # m, where rays begin: nothing that a person can stand at is there
 
 
 def check_floor(floor: Floor) -> list[Finding]:
@@ -118,9 +119,8 @@ def _narrowest(
 
 def _level(floor: Floor) -> Iterator[Finding]:
     """Wherever one can walk, the floor is at z = 0."""
-    points, _ = floor.walkable
-    points = points[:: max(1, len(points) // _FLOOR_RAYS)]
-    heights = np.array([1.0 - _ray_down(floor.compiled, (*p, 1.0)) for p in points.tolist()])
+    points = np.vstack([_places(floor), _low_things(floor)])
+    heights = np.array([_CHEST - _free(floor.compiled, p, -1.0) for p in points])
     wrong = np.flatnonzero(~(np.abs(heights) <= FLOOR_GAP))
     if len(wrong):
         worst = wrong[np.abs(np.where(np.isfinite(heights), heights, -1e9))[wrong].argmax()]
@@ -134,11 +134,54 @@ def _level(floor: Floor) -> Iterator[Finding]:
         )
 
 
-def _ray_down(compiled: Compiled, start: tuple[float, float, float]) -> float:
-    """Distance to the first solid geom below a point, m; infinite where there is none."""
+def _headroom(floor: Floor) -> Iterator[Finding]:
+    """Nothing hangs into the way of eyes; what hangs below 1.8 m is walked around."""
+    points = _places(floor)
+    heights = np.array([_CHEST + _free(floor.compiled, p, 1.0) for p in points])
+    low = int(heights.argmin())
+    if heights[low] < HEADROOM - 1e-3:
+        yield floor.compiled.warning(
+            "headroom",
+            f"something hangs down to {heights[low]:.2f} m at ({points[low, 0]:.2f}, {points[low, 1]:.2f})",
+            f"raise it to {HEADROOM:g} m: tall people would look through it",
+            (*points[low], heights[low]),
+        )
+
+
+def _places(floor: Floor) -> NDArray[np.float64]:
+    """Points (k, 2), m, all over the walkable floor."""
+    points, _ = floor.walkable
+    return points[:: max(1, len(points) // _RAYS)]
+
+
+def _low_things(floor: Floor) -> NDArray[np.float64]:
+    """Middles (k, 2), m, of colliding geoms that are too low to be walked around, where one can walk."""
+    compiled, found = floor.compiled, [np.empty((0, 2))]
+    points, area = floor.walkable
+    for geom in compiled.solid:
+        if compiled.model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE:
+            low, high = compiled.extent(np.array([geom]))
+            middle = (low + high)[None, :2] / 2
+            if FLOOR_GAP < high[2] <= BODY_BAND[0] and np.abs(points - middle).max(axis=1).min() < math.sqrt(
+                area
+            ):
+                found.append(middle)
+    return np.vstack(found)
+
+
+def _free(compiled: Compiled, point: NDArray[np.float64], up: float) -> float:
+    """Distance, m, from chest height over a floor point (2,) to the first solid geom above (1) or below (-1)."""
     geom = np.zeros(1, np.int32)
-    distance = mujoco.mj_ray(compiled.model, compiled.data, np.array(start), _DOWN, SOLID, 1, -1, geom)
+    start, along = np.array([*point, _CHEST]), np.array([0.0, 0.0, up])
+    distance = mujoco.mj_ray(compiled.model, compiled.data, start, along, SOLID, 1, -1, geom)
     return distance if distance >= 0 else math.inf
 
 
-RULES: tuple[Callable[[Floor], Iterator[Finding]], ...] = (_shell, _rooms, _passages, _level, check_bins)
+RULES: tuple[Callable[[Floor], Iterator[Finding]], ...] = (
+    _shell,
+    _rooms,
+    _passages,
+    _level,
+    _headroom,
+    check_bins,
+)

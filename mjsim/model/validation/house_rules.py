@@ -17,6 +17,7 @@ from mjsim.model.validation.compiled import (
     compile_model,
 )
 from mjsim.model.validation.findings import Finding
+from mjsim.model.validation.hull_rules import check_hulls
 
 SIZE = (1.5, 150.0)  # m, sides of the rectangle around all rooms
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2
@@ -128,5 +129,6 @@ FILE_RULES: tuple[Callable[[Compiled], Iterator[Finding]], ...] = (
     check_groups,
     check_contact_bits,
     _options,
+    check_hulls,
 )
 CATALOGUE_RULES: tuple[Callable[[Compiled, Catalogue], Iterator[Finding]], ...] = (_names, _rooms, _mounts)
