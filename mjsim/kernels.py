@@ -3,13 +3,13 @@
 The planner and the experiments use this module too. It is the one thing that they share with mjsim below them.
 """
 
+import functools
 import hashlib
 import os
 import re
 import shutil
 import time
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -32,18 +32,33 @@ def kernel(function: F) -> F:
 
     Where no cache folder is writable (no home, a full disk), each process compiles anew.
     """
+    return cast(F, _cached(functools.partial(numba.njit, **_OPTIONS), function))
+
+
+def c_function(signature: str, function: Callable[..., Any]) -> Any:
+    """Compile a function at once for callers in C; its `ctypes` is a pointer that lives as long as what is returned.
+
+    Args:
+        signature: Its types as numba writes them, such as `float64(int64)`.
+        function: Takes and returns numbers.
+    """
+    return _cached(functools.partial(numba.cfunc, signature), function)
+
+
+def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
+    """What a compiler makes of a function, with the machine code on disk where that is possible."""
     folder, chosen = cache_folder(Path(function.__code__.co_filename)), numba.config.CACHE_DIR
     if folder is not None:
         numba.config.CACHE_DIR = str(
             folder
         )  # read when decorating; other packages' kernels keep their folder
         try:
-            return cast(F, numba.njit(cache=True, **_OPTIONS)(function))
+            return compiler(cache=True)(function)
         except RuntimeError:  # how numba says that it cannot cache
             pass
         finally:
             numba.config.CACHE_DIR = chosen
-    return cast(F, numba.njit(**_OPTIONS)(function))
+    return compiler()(function)
 
 
 def cache_base() -> Path:
@@ -52,7 +67,7 @@ def cache_base() -> Path:
     return Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
 
 
-@cache
+@functools.cache
 def cache_folder(source: Path) -> Path | None:
     """Folder for the machine code of a module's kernels, None where none is writable.
 
@@ -90,7 +105,7 @@ def _compiled_in(source: Path) -> set[Path]:
     return found
 
 
-@cache
+@functools.cache
 def _has_kernels(path: Path) -> bool:
     return path.is_file() and MARK in path.read_bytes()
 

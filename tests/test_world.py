@@ -357,6 +357,20 @@ def test_an_object_knocked_out_of_its_receptacle_is_loose_again(make: Make) -> N
     assert world.observation().object_status == (ObjectStatus.LOOSE,)
 
 
+def test_mujoco_keeps_no_time_in_a_world_but_by_a_clock_that_somebody_has_set(make: Make) -> None:
+    step, clock = mujoco.mjtTimer.mjTIMER_STEP, iter(range(10**9))
+    world = make((1.5, 2.0, 0.0))
+    run(world, [IDLE])
+    assert world.data.timer[step].number and not world.data.timer[step].duration
+    mujoco.set_mjcb_time(lambda: float(next(clock)))
+    try:
+        world = make((1.5, 2.0, 0.0))
+        run(world, [IDLE])
+        assert world.data.timer[step].duration > 0.0
+    finally:
+        mujoco.set_mjcb_time(None)
+
+
 def test_a_state_that_is_not_finite_is_an_error(make: Make) -> None:
     world = make((1.5, 2.0, 0.0), ("cube", 2.1, 2.0))
     world.data.qvel[world.scene.index.dofs[0]] = np.nan

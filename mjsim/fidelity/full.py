@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mjsim.actions import IDLE, Action, ActionResult, Move, Pick, Place
 from mjsim.errors import ActionError, StateError
+from mjsim.fidelity.engine_clock import stop_engine_clock
 from mjsim.fidelity.episode_state import EpisodeState
 from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.fidelity.tier import Tier
@@ -55,6 +56,7 @@ class Full(Tier):
     """
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
+        stop_engine_clock()
         self.scene = scene
         self.data = mujoco.MjData(scene.model)
         self.episode_state = EpisodeState(scene, options.capacity)
