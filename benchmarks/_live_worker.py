@@ -59,12 +59,12 @@ def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
 def replan(guide: LiveReplanner, state: TaskState) -> dict[str, Any]:
     """What the caller waits for, and what comes of it in the background."""
     wall, own, cpu = time.perf_counter(), time.thread_time(), time.process_time()
-    first = guide.update(state).cost
+    first = guide.update(state).plan.cost
     record = {"wall": time.perf_counter() - wall, "cpu": time.thread_time() - own}
     guide.wait()
     record |= {"proof_wall": time.perf_counter() - wall, "proof_cpu": time.process_time() - cpu}
     guide.poll(state)
-    best, plan = guide.route.cost, guide.route.plan
+    best, plan = guide.route.plan.cost, guide.route.plan
     gap = 100 * (first / best - 1) if best else 0.0
     return record | {"gap": gap, "proven": plan.status is Status.OPTIMAL, "left": len(state.loose)}
 

@@ -141,7 +141,7 @@ class LiveReplanner(Replanner):
         first = next(plans)
         self._warm = self._warm.updated(problem, first)
         self._start(_Proof(problem, first.visits, stop), plans)
-        return self._follow(Route(first.visits, first.cost, first), state)
+        return self._follow(Route(first.visits, first), state)
 
     def poll(self, state: TaskState) -> Route | None:
         """A better route, or the same one with a better bound, if the search has found one; costs nothing otherwise.
@@ -179,9 +179,9 @@ class LiveReplanner(Replanner):
         cost, new_cost = self.problems.length(state, rest), self.problems.length(state, better)
         if new_cost < cost - TIE:
             self._proof = replace(proof, shown=plan.visits)
-            return self._follow(Route(better, new_cost, plan), state)
+            return self._follow(Route(better, plan), state)
         before, shown = self.route.plan, _with_bound(proof, plan)
-        self._route = Route(rest, cost, shown)
+        self._route = Route(rest, shown)
         return self._route if shown.improves_on(before) else None
 
     def _stop_proof(self) -> None:

@@ -72,7 +72,7 @@ class Replanner:
 
     def _plan(self, state: TaskState, solver: "Solver | TaskSolver") -> Route:
         plan = solver.solve(self.problems.problem(state), seed=self._seed, limit=self._limit)
-        return self._follow(Route(plan.visits, plan.cost, plan), state)
+        return self._follow(Route(plan.visits, plan), state)
 
     def prepare(self, state: TaskState, *, seconds: float | None = None) -> Route:  # noqa: ARG002 - it never waits
         """Plan the task before its clock starts.
@@ -115,7 +115,7 @@ class Replanner:
         if self._route is None or rest is None:
             self.replans += self._route is not None
             return self.plan(state) if shown else self._plan(state, self._task_solver)
-        self._route = Route(rest, self.problems.length(state, rest), self._route.plan)
+        self._route = Route(rest, self._route.plan)
         return self._route
 
     def _follow(self, route: Route, state: TaskState) -> Route:

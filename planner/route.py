@@ -47,13 +47,11 @@ class Route:
 
     Attributes:
         visits: Remaining visits.
-        cost: Length of the open tour from the position the route was made or last updated for, m.
         plan: The plan it follows, with its bound and status. While a route is followed this stays the plan as
             it was made, done visits included.
     """
 
     visits: tuple[Visit, ...]
-    cost: float
     plan: Plan
 
     @property

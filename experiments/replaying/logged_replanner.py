@@ -55,7 +55,7 @@ class LoggedReplanner:
         if self._route is None:
             raise ReplayError("the log has no plan for the start of the task; the first bad step is 0", 0)
         rest = tuple(v for v in self._route.visits if _is_open(v, state))
-        self._route = Route(rest, self._route.cost, self._route.plan)
+        self._route = Route(rest, self._route.plan)
         return self._route
 
     @property
@@ -82,6 +82,6 @@ def _route(event: Event, state: TaskState) -> Route:
             if name not in (state.loose if kind == "pick" else state.deliveries):
                 raise ValueError(f"nothing to {kind} is called {name!r}")
             visits.append(Visit(VisitKind(kind), name))
-        return Route(tuple(visits), cost, plan)
+        return Route(tuple(visits), plan)
     except (KeyError, TypeError, ValueError) as error:
         raise ReplayError(f"the plan logged at t = {event['t']} s is malformed: {error!r}") from error
