@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from planner.errors import UnreachableError
 from planner.navmesh import TOLERANCE, NavMesh
-from planner.visibility_graph import VisibilityGraph, direct_distances, join, visible_vertices
+from planner.path_search import Views, distances, shortest_path
+from planner.visibility_graph import VisibilityGraph, direct_distances, visible_vertices
 
 MAX_REMEMBERED = (
     4096  # points whose visible vertices are kept; bins and objects at rest are asked for again and again
@@ -35,13 +34,11 @@ class ShortestPath:
 
 @dataclass(frozen=True, eq=False)
 class _Query:
-    """Points on the navmesh and the vertices they see; rows as `visibility_graph.join` takes them."""
+    """Points on the navmesh, m, (m, 2), the island of each, (m,), and the vertices they see."""
 
     points: NDArray[np.float64]
     island: NDArray[np.int64]
-    starts: NDArray[np.int32]
-    seen: NDArray[np.int32]
-    lengths: NDArray[np.float64]
+    views: Views
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,18 +75,10 @@ class Geodesics:
         if np.isfinite(straight) and islands[0] == islands[1]:
             return ShortestPath(points, straight)
         query = self._query(points, islands)
-        from_a, before = dijkstra(
-            self._with_sources(query, 1), indices=[self._size], return_predecessors=True
-        )
-        total, corner = join(from_a[:, : self._size], query.starts[1:], query.seen, query.lengths)
-        if not np.isfinite(total[0, 0]):
+        length, path = shortest_path(self._graph.edges, query.points, query.views)
+        if not np.isfinite(length):
             raise _unreachable(points[0], points[1])
-        corners, vertex = [], int(corner[0, 0])
-        while vertex != self._size:
-            corners.append(vertex)
-            vertex = int(before[0, vertex])
-        path = np.concatenate([points[:1], self._graph.vertices[corners[::-1], :2], points[1:]])
-        return ShortestPath(_without_repeats(path), float(total[0, 0]))
+        return ShortestPath(path, length)
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
         """Geodesic distances between all pairs of points (m, 2), m; (m, m), symmetric, zero diagonal, m.
@@ -99,7 +88,7 @@ class Geodesics:
             UnreachableError: Two points lie on different islands.
         """
         query = self._query(*self._locate(points))
-        result = self._between(query, query, len(query.points))
+        result = self._between(query, query)
         result = np.minimum(result, result.T)
         np.fill_diagonal(result, 0.0)
         return result
@@ -123,11 +112,7 @@ class Geodesics:
             UnreachableError: Two points lie on different islands.
         """
         source, target = (self._query(*self._locate(points)) for points in (sources, targets))
-        return self._between(source, target, len(source.points))
-
-    @property
-    def _size(self) -> int:
-        return len(self._graph.vertices)
+        return self._between(source, target)
 
     def _locate(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Points (m, 2), m, snapped where they are not navigable, and the island of each."""
@@ -147,7 +132,7 @@ class Geodesics:
         np.cumsum([len(seen) for seen, _ in views], out=starts[1:])
         seen = np.concatenate([np.empty(0, np.int32), *(seen for seen, _ in views)])
         lengths = np.concatenate([np.empty(0), *(lengths for _, lengths in views)])
-        return _Query(points, islands, starts, seen, lengths)
+        return _Query(points, islands, Views(starts, seen, lengths))
 
     def _view(self, x: float, y: float, island: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Vertices that a point, m, sees along tangents, and the distances to them, m."""
@@ -160,28 +145,15 @@ class Geodesics:
             )
         return self._remembered[x, y]
 
-    def _with_sources(self, query: _Query, count: int) -> csr_array:
-        """The vertex graph and the first `count` points of a query as further nodes, edges leading out."""
-        graph, size = self._graph, self._size
-        used = query.starts[count]
-        indptr = np.concatenate([graph.indptr, graph.indptr[-1] + query.starts[1 : count + 1]])
-        indices = np.concatenate([graph.indices, query.seen[:used]])
-        # A stored zero would mean no edge; a point on a vertex is at the smallest distance instead.
-        weights = np.concatenate([graph.weights, np.maximum(query.lengths[:used], 1e-300)])
-        return csr_array((weights, indices, indptr), shape=(size + count, size + count))
-
-    def _between(self, sources: _Query, targets: _Query, count: int) -> NDArray[np.float64]:
-        """Distances from the first `count` sources to all targets; typed errors instead of infinities."""
-        graph, size = self._graph, self._size
-        apart = sources.island[:count, None] != targets.island[None, :]
+    def _between(self, sources: _Query, targets: _Query) -> NDArray[np.float64]:
+        """Distances from sources to targets; typed errors instead of infinities."""
+        graph = self._graph
+        apart = sources.island[:, None] != targets.island[None, :]
         if apart.any():
             i, j = np.argwhere(apart)[0]
             raise _unreachable(sources.points[i], targets.points[j])
-        if count == 0:
-            return np.zeros((0, len(targets.points)))
-        over = dijkstra(self._with_sources(sources, count), indices=np.arange(size, size + count))
-        bent, _ = join(over[:, :size], targets.starts, targets.seen, targets.lengths)
-        result = np.minimum(bent, direct_distances(sources.points[:count], targets.points, graph.walls))
+        bent = distances(graph.edges, sources.views, targets.views)
+        result = np.minimum(bent, direct_distances(sources.points, targets.points, graph.walls))
         lost = np.argwhere(~np.isfinite(result))
         if lost.size:
             raise _unreachable(sources.points[lost[0][0]], targets.points[lost[0][1]])
@@ -193,10 +165,3 @@ def _unreachable(a: NDArray[np.float64], b: NDArray[np.float64]) -> UnreachableE
         f"no path from ({a[0]:.3f}, {a[1]:.3f}) to ({b[0]:.3f}, {b[1]:.3f}): they lie on different islands "
         "of the navmesh; move one, or build the navmesh with a smaller agent_radius"
     )
-
-
-def _without_repeats(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Drop corners that repeat the one before; both ends stay."""
-    keep = np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-9]
-    keep[-1] = True
-    return points[keep]

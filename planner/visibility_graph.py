@@ -15,6 +15,7 @@ from shapely.geometry.polygon import orient
 from mjsim.kernels import kernel
 from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
+from planner.path_search import Edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +26,13 @@ class VisibilityGraph:
         vertices: Reflex vertices, (v, 6): x, y, then the ring's previous and next vertex, m.
         island: Island of each vertex, (v,) int64.
         walls: Edges of the solid obstacles.
-        indptr, indices, weights: Rows of the vertex-vertex graph, as in a `csr_array`; weights in m.
+        edges: Which vertices see each other.
     """
 
     vertices: NDArray[np.float64]
     island: NDArray[np.int64]
     walls: SegmentGrid
-    indptr: NDArray[np.int32]
-    indices: NDArray[np.int32]
-    weights: NDArray[np.float64]
+    edges: Edges
 
     @classmethod
     def build(cls, navmesh: NavMesh) -> "VisibilityGraph":
@@ -52,9 +51,7 @@ class VisibilityGraph:
             vertices=vertices,
             island=island.astype(np.int64),
             walls=walls,
-            indptr=graph.indptr.astype(np.int32),
-            indices=graph.indices.astype(np.int32),
-            weights=graph.data,
+            edges=Edges(vertices, graph.indptr.astype(np.int32), graph.indices.astype(np.int32), graph.data),
         )
 
 
@@ -164,33 +161,3 @@ def direct_distances(
             if is_visible(a[i, 0], a[i, 1], b[j, 0], b[j, 1], walls):
                 result[i, j] = np.hypot(b[j, 0] - a[i, 0], b[j, 1] - a[i, 1])
     return result
-
-
-@kernel
-def join(
-    from_source: NDArray[np.float64],
-    starts: NDArray[np.int32],
-    seen: NDArray[np.int32],
-    lengths: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Distance from each source to each point over the best vertex that the point sees.
-
-    Args:
-        from_source: Distance from each source to each vertex, (s, v), m.
-        starts: First entry of each of the m points in `seen` and `lengths`, (m + 1,).
-        seen, lengths: What `visible_vertices` returned for the points, one after the other.
-
-    Returns:
-        Distances (s, m) in m, infinite without a path, and the last vertex of each path, -1 without.
-    """
-    sources, points = from_source.shape[0], starts.shape[0] - 1
-    distance = np.full((sources, points), np.inf)
-    last = np.full((sources, points), -1, np.int32)
-    for s in range(sources):
-        for p in range(points):
-            for k in range(starts[p], starts[p + 1]):
-                total = from_source[s, seen[k]] + lengths[k]
-                if total < distance[s, p]:
-                    distance[s, p] = total
-                    last[s, p] = seen[k]
-    return distance, last
