@@ -61,6 +61,14 @@ class BehaviourDistribution:
         """The description, as `of` takes it."""
         return {name: described.as_value() for name, described in self.parameters}
 
+    def updated(self, other: "BehaviourDistribution") -> "BehaviourDistribution":
+        """These distributions, replaced by those of `other` where it has any."""
+        return BehaviourDistribution(
+            tuple(
+                sorted({**dict(self.parameters), **dict(other.parameters)}.items(), key=lambda item: item[0])
+            )
+        )
+
     def draw(
         self, model: str, parameters: Mapping[str, Parameter], rng: np.random.Generator
     ) -> dict[str, float]:

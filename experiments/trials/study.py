@@ -3,7 +3,6 @@
 import dataclasses
 import itertools
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -99,14 +98,18 @@ def read_controls(design: Design, path: Path = CONTROLS, *, only: str | None = N
 
 
 def _changed(design: Design, name: str, control: _Control) -> Design:
-    changes: Mapping[str, Any] = {
-        "behaviour": BehaviourDistribution.of(control.behaviour),
-        "person": PersonDistribution.of(control.person),
-        **({"user": control.user} if control.user is not None else {}),
-    }
+    behaviour, person = BehaviourDistribution.of(control.behaviour), PersonDistribution.of(control.person)
+
+    def changed(trial: TrialConfig) -> TrialConfig:
+        if control.user is not None:  # another model has other parameters
+            return dataclasses.replace(trial, user=control.user, behaviour=behaviour, person=person)
+        return dataclasses.replace(
+            trial, behaviour=trial.behaviour.updated(behaviour), person=trial.person.updated(person)
+        )
+
     kept = [t for t in design.trials if control.assistance is None or t.assistance in control.assistance]
     if not kept:
         raise ConfigError(
             f"control {name}: nobody of the design is under {', '.join(control.assistance or [])}"
         )
-    return Design(tuple(dataclasses.replace(trial, **changes) for trial in kept))
+    return Design(tuple(map(changed, kept)))

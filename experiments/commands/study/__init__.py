@@ -7,7 +7,7 @@ from typing import Any
 from experiments.commands.options import HelpFormatter
 
 # A module each, with `add_parser(commands)`.
-SUBCOMMANDS = ("simulate", "controls", "analyze", "score", "power")
+SUBCOMMANDS = ("simulate", "controls", "analyze", "score", "calibrate", "power")
 
 DESCRIPTION = """\
 Studies: who took part, what was found, how it compares with the published study, how many people the next one needs.

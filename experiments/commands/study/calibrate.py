@@ -1,0 +1,92 @@
+"""`mjsim study calibrate`: fits the guest to the published rows at 6 objects, and says what they do not tell."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+from experiments.analysis.statistics import require_statsmodels
+from experiments.commands.options import add_command, add_force
+from experiments.commands.terminal import error_console, progress_bars
+
+DESCRIPTION = """\
+Fit free parameters of the guest (experiments/studies/calibration.toml) to the published rows at 6 objects. No row over
+several numbers of objects is looked at. DIR is a pool of people whose parameters are drawn widely:
+
+  mjsim study simulate pool --people 900 --out runs/pool     # goes on after an interruption
+  mjsim study calibrate runs/pool
+
+A surrogate of trials is learnt from the pool; populations are drawn from the priors, and those are kept whose studies
+are nearest to the published one (approximate Bayesian computation). Writes
+
+  calibration.html    which parameters are identifiable, which trade off, how good the surrogate is
+  calibration.json    the same
+  kept.csv            the parameters that are kept
+  study.toml          the study with the best population, for `mjsim study simulate` to confirm
+
+What fits is not therefore true; docs/study.md says what may be concluded."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands,
+        "calibrate",
+        run,
+        summary="fit the guest to the published rows at 6 objects",
+        description=DESCRIPTION,
+    )
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the pool")
+    parser.add_argument(
+        "--study", default="paper", metavar="STUDY.toml", help="study to write for (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--draws", type=int, default=10_000, metavar="N", help="populations (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of all chance")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: DIR/calibration)")
+    add_force(parser, "replace an earlier calibration")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Learn, fit, write, say where.
+
+    Raises:
+        ConfigError: An option or a file of the package is unusable.
+        RecordError: The pool is none, or files are in the way.
+        StatisticsError: The pool is too small.
+    """
+    require_statsmodels()
+    from experiments.analysis.calibration.calibrate import calibrate
+    from experiments.analysis.calibration.files import FILES, PAGE, write_calibration
+    from experiments.analysis.calibration.population import read_free_parameters
+    from experiments.analysis.measures import read_measures
+    from experiments.analysis.published import read_published
+    from experiments.analysis.study_table import read_study
+    from experiments.errors import ConfigError
+    from experiments.runs.run_directory import check_file
+    from experiments.trials.study import study_path
+
+    if arguments.draws < 100 or arguments.seed < 0:
+        raise ConfigError(
+            f"--draws {arguments.draws} must be 100 or more, and --seed {arguments.seed} 0 or more"
+        )
+    out = arguments.folder / "calibration" if arguments.out is None else arguments.out
+    for name in FILES:
+        check_file(out / name, replace=arguments.force)
+    pool = read_study(arguments.folder, read_measures())
+    columns = TextColumn("populations"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with progress_bars(error_console(), *columns) as bars:
+        bar = bars.add_task("populations", total=arguments.draws)
+        found = calibrate(
+            pool,
+            read_free_parameters(),
+            read_published(),
+            draws=arguments.draws,
+            seed=arguments.seed,
+            on_progress=lambda done: bars.update(bar, completed=done),
+        )
+    write_calibration(out, found, study_path(arguments.study))
+    print(f"{found.origin}: {out / PAGE}")
+    return 0
