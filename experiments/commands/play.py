@@ -123,13 +123,10 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
 
 
 def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], listener: socket.socket) -> None:
-    from experiments.web.pool import Pool
-
-    pool = Pool(trials[TASK]["house"])
-    pool.warm_up()  # it loads the house while this process loads the rest
     import uvicorn  # imported late, so that other commands start fast
 
     from experiments.web.guards import Addresses
+    from experiments.web.pool import Pool
     from experiments.web.protocol import MAX_TEXT
     from experiments.web.server import PlayConfig, PlayServer
 
@@ -145,7 +142,7 @@ def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], lis
         story=story_text(arguments.story) if STORY in phases else "",
     )
     host, port = listener.getsockname()[:2]
-    app = PlayServer(config, pool).app(Addresses(port, arguments.public_url))
+    app = PlayServer(config, Pool(trials[TASK]["house"])).app(Addresses(port, arguments.public_url))
     server = uvicorn.Server(
         uvicorn.Config(
             app,

@@ -12,7 +12,7 @@ from experiments.web.messages import Message
 from experiments.web.sessions import PlayedSession
 
 HELLO_PATIENCE = 10.0  # s for the first message
-OLD_PATIENCE = 1.0  # s that the connection before has to end, as when a page is loaded again
+OLD_PATIENCE = 0.5  # s that the connection before has to end, as when a page is loaded again
 MAX_WAITING = 300  # messages that wait to be sent
 MAX_STATES_WAITING = 8  # from then on, no further states
 RATE, BURST = 200.0, 400.0  # messages a second, and at once

@@ -96,6 +96,7 @@ class Pool:
                 (sys.executable, "-P", "-m", "experiments.web.forkserver", str(theirs.fileno()), self._house),
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
                 start_new_session=True,  # Ctrl-C in a terminal is for the server alone
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
             )

@@ -141,6 +141,7 @@ class Worker:
             if opened is None:
                 return False
             self._inbox.set(paused=self._inbox.paused or DISCONNECTED)
+        _let_go_of_stderr()
         link = wait_for_server(Path(opened.folder), lambda: self._serving is not None)
         if link is None:
             return False
@@ -233,6 +234,12 @@ class Worker:
             _save(folder, run, house)
         metrics = msgspec.json.decode((run / records.METRICS).read_bytes())
         self._connection.send(messages.Over(metrics["ended"], metrics))
+
+
+def _let_go_of_stderr() -> None:
+    """Whoever waits for the end of what the server says need not wait for this process."""
+    with Path(os.devnull).open("wb") as nothing:
+        os.dup2(nothing.fileno(), 2)
 
 
 def _save(folder: Path, run: Path, house: House) -> None:

@@ -4,7 +4,7 @@ const HEAD = 28; // bytes before the picture of a frame; docs/protocol.md
 const CODECS = { 1: "jpeg", 2: "h264" };
 const BATCH = 64; // inputs of one message
 const FIRST_WAIT = 250; // ms before the first new try
-const LONGEST_WAIT = 5000; // ms
+const LONGEST_WAIT = 500; // ms; a server that was started again is there within a second
 const FINAL = new Set([4000, 4001, 4002, 4003]); // codes after which the page does not connect by itself
 
 export class Connection {
