@@ -14,6 +14,7 @@ from experiments.runs.run_directory import check_file
 from experiments.session.film_config import FilmConfig
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
+from mjsim.errors import RenderError
 from mjsim.files import replacing
 
 SEED = 7
@@ -58,6 +59,11 @@ def _names(arguments: argparse.Namespace) -> list[str]:
     return [*names, SHEET]
 
 
+def _fail(warning: str) -> None:
+    """A picture that a trial does without is all that a gallery wants of it."""
+    raise RenderError(warning)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Take the pictures."""
     console = error_console()
@@ -71,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if not arguments.contact_sheet:
         with tempfile.TemporaryDirectory() as folder, replacing(arguments.out / TOPDOWN) as drawn:
-            run_trial(WALK, Path(folder) / "run")
+            run_trial(WALK, Path(folder) / "run", on_warning=_fail)
             shutil.copyfile(Path(folder) / "run" / TOPDOWN, drawn)
         console.print(str(arguments.out / TOPDOWN), soft_wrap=True)
         for name, frame in take_pictures(SHOTS, film_config(arguments)).items():

@@ -1,5 +1,6 @@
 """First-person frames with the HUD over them, and films of them."""
 
+import contextlib
 from pathlib import Path
 from typing import Any, Self
 
@@ -150,7 +151,8 @@ class TrialFilm:
         except RecordError as error:
             self._give_up(error)
         if self._renderer is not None:
-            self._renderer.close()
+            with contextlib.suppress(RenderError):  # a driver that is gone has nothing to free
+                self._renderer.close()
         if self.failure is not None:
             self._path.unlink(missing_ok=True)
 

@@ -10,11 +10,14 @@ import contextlib
 import importlib
 import os
 import queue
+import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
+
+import mujoco
 
 from mjsim.errors import RenderError
 from mjsim.gl_choice import BACKENDS, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
@@ -58,6 +61,7 @@ class _ProcessContext:
         self._lock = threading.RLock()
         self._gl: Any = None
         self._egl: ModuleType | None = None
+        self._failure: RenderError | None = None
         self._pid = 0
         self._depth = 0
         self._owned: dict[int, Any] = {}
@@ -69,14 +73,15 @@ class _ProcessContext:
             if self._depth:  # already current: a nested use in the same thread
                 yield
                 return
-            previous = self._current_binding()
-            self._gl.make_current()
-            self._depth = 1
-            try:
-                yield
-            finally:
-                self._depth = 0
-                self._restore(previous)
+            with _as_render_errors():
+                previous = self._current_binding()
+                self._gl.make_current()
+                self._depth = 1
+                try:
+                    yield
+                finally:
+                    self._depth = 0
+                    self._restore(previous)
 
     def own(self, mujoco_context: Any) -> int:
         """Register a MuJoCo context, to be freed by `release` or when the process ends."""
@@ -116,8 +121,14 @@ class _ProcessContext:
             return False
 
     def _ensure(self) -> None:
+        if self._failure is not None:  # a driver that failed once says less the second time, or hangs again
+            raise self._failure
         if self._gl is None:
-            module, self._gl = _start()
+            try:
+                module, self._gl = _start()
+            except RenderError as error:
+                self._failure = error
+                raise
             self._egl = getattr(module, "EGL", None)
             self._pid = os.getpid()
             atexit.register(self.close)
@@ -145,6 +156,23 @@ class _ProcessContext:
             display = egl.eglGetCurrentDisplay()
             previous = (display, egl.EGL_NO_SURFACE, egl.EGL_NO_SURFACE, egl.EGL_NO_CONTEXT)
         egl.eglMakeCurrent(*previous)
+
+
+@contextlib.contextmanager
+def _as_render_errors() -> Iterator[None]:
+    """Drivers may fail at any moment: a GPU is lost, memory runs out."""
+    try:
+        yield
+    except (mujoco.FatalError, *_opengl_errors()) as error:
+        raise RenderError(
+            f"OpenGL failed while drawing ({' '.join(str(error).split())}); {EGL_REMEDY}"
+        ) from error
+
+
+def _opengl_errors() -> tuple[type[Exception], ...]:
+    """PyOpenGL's errors; it is imported only where something is drawn."""
+    module = sys.modules.get("OpenGL.error")
+    return () if module is None else (module.Error,)
 
 
 def _start() -> tuple[ModuleType, Any]:

@@ -2,11 +2,17 @@
 
 import json
 
+import mujoco
 import pytest
 
 from experiments.files import read_json
+from experiments.replaying.replay import replay
 from experiments.runs import records
+from experiments.session.first_person import FilmConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
 from faults.conftest import FAST, one_line
+from mjsim.render import context
 
 PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
 
@@ -49,3 +55,42 @@ def test_the_doctor_works_where_mujoco_does_not(tmp_path, mjsim):
     assert "libmujoco.so is damaged" in done.stdout
     run = mjsim("run", "--out", "out", PYTHONPATH=f"{tmp_path}")
     assert run.returncode == 1 and "mjsim doctor" in one_line(run.stderr)
+
+
+class Driver:
+    """A GL context that is lost after so many uses."""
+
+    def __init__(self, gl, uses, error):
+        self._gl, self._uses, self._error = gl, uses, error
+
+    def make_current(self):
+        self._uses -= 1
+        if self._uses < 0:
+            raise self._error
+        self._gl.make_current()
+
+
+def opengl_error():
+    """Imported late: PyOpenGL looks at its first import for a display, or for none."""
+    from OpenGL.error import GLError
+
+    return GLError(12302)
+
+
+@pytest.mark.parametrize("error", [opengl_error, lambda: mujoco.FatalError("gladLoadGL error")])
+@pytest.mark.parametrize("uses", [0, 20])
+def test_a_driver_that_fails_late_costs_the_pictures_alone(uses, error, house, tmp_path, monkeypatch):
+    """As a GPU that is lost: at the first frame, or in the middle of the film."""
+    context.gl_info()
+    lost = Driver(context._PROCESS._gl, uses, error())
+    monkeypatch.setattr(context._PROCESS, "_gl", lost)
+    warnings = []
+    config = TrialConfig(objects=2, assistance="optimal", seed=0, fidelity="event", regret=False)
+    out = tmp_path / "out"
+    metrics = run_trial(config, out, film=FilmConfig(160, 120), house=house, on_warning=warnings.append)
+    assert metrics["ended"] == "all delivered" and metrics["frames_sha256"] is None
+    assert [warning.partition(": ")[0] for warning in warnings] == ["no video", "no floor plan"]
+    assert all("\n" not in warning for warning in warnings)
+    assert not {records.VIDEO, records.TOPDOWN} & {path.name for path in out.iterdir()}
+    assert replay(out, house=house).ended == "all delivered"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
