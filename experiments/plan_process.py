@@ -17,6 +17,9 @@ from typing import Any, NoReturn, TextIO
 from planner.errors import PlannerError
 
 GRACE = 0.15  # s beyond a time limit after which the planner is stopped
+GRACE_FOR_FIRST = (
+    0.45  # s, where it has not given any tour yet: a process may take so long to start on a busy machine
+)
 ON_TERMINAL, ELSEWHERE = 1.0, 10.0  # s between reports of progress
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
 
@@ -97,7 +100,8 @@ class PlanProcess:
         buffer = b""
         while True:
             passed = time.perf_counter() - self._started
-            left = 3600.0 if self._seconds is None else self._seconds + GRACE - passed
+            grace = GRACE if self.best else GRACE_FOR_FIRST
+            left = 3600.0 if self._seconds is None else self._seconds + grace - passed
             if left <= 0:
                 return
             if not select.select([self._pipe], [], [], min(left, 0.2))[0]:

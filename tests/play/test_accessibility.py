@@ -1,0 +1,87 @@
+"""No page of a visit breaks a rule that axe-core checks, and the keyboard alone leads through all of them."""
+
+import numpy as np
+import pytest
+
+from benchmarks import play
+from benchmarks.support.play_keys import CHROMIUM
+from benchmarks.support.play_server import PATIENCE, PlayProcess
+from experiments.session.video import VideoWriter
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+DESK = {"viewport": {"width": 1280, "height": 720}}
+
+
+def violations(page):
+    """What axe-core finds on a page, in words."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    found = Axe().run(page).response["violations"]
+    return [f"{page.title()}: {v['id']} ({v['help']}): {[n['html'] for n in v['nodes']]}" for v in found]
+
+
+def visit(browser, server, look):
+    """Go through a visit by keys; what axe-core finds on its pages and dialogs."""
+    page = browser.new_context(**look).new_page()
+    page.set_default_timeout(1000.0 * PATIENCE)
+    found = []
+
+    def check():
+        found.extend(violations(page))
+
+    page.goto(server.url)
+    check()
+    page.keyboard.press("Enter")  # on the button, which has the focus
+    page.get_by_role("heading", name="The apartment").wait_for()
+    check()
+    page.get_by_role("button", name="Go on").press("Enter")
+    page.get_by_role("heading", name="Training").wait_for()
+    check()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")  # skip the training
+    page.get_by_role("heading", name="Your task").wait_for()
+    page.wait_for_function("document.activeElement.textContent === 'Start'")
+    check()
+    page.keyboard.press("Enter")
+    page.locator("#list li").first.wait_for(state="attached")
+    check()
+    page.keyboard.press("h")
+    page.get_by_role("heading", name="Keys").wait_for()
+    check()
+    page.keyboard.press("Escape")
+    page.keyboard.press("p")
+    page.get_by_role("heading", name="Paused").wait_for()
+    check()
+    page.keyboard.press("p")
+    page.locator("#panel").wait_for(state="hidden")
+    page.locator("#end-button").press("Enter")
+    page.get_by_role("heading", name="End the task now?").wait_for()
+    check()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    page.get_by_role("heading", name="Your result").wait_for()
+    check()
+    page.goto(f"{server.url}nothing-here")
+    check()
+    page.context.close()
+    return found
+
+
+@pytest.mark.skipif(not CHROMIUM.is_file(), reason=f"no browser at {CHROMIUM}")
+def test_every_page_passes_axe_and_is_left_by_keys(tmp_path):
+    from playwright.sync_api import sync_playwright
+
+    film = tmp_path / "flythrough.mp4"
+    with VideoWriter(film, width=64, height=48) as writer:
+        for _ in range(10):
+            writer.write(np.zeros((48, 64, 3), np.uint8))
+    words = ("--objects", "6", "--assistance", "guided", "--film", str(film), *play.FAST)
+    with PlayProcess(tmp_path / "visits", *words) as server, sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+        found = [
+            v
+            for look in (DESK, {**PHONE, "color_scheme": "dark", "reduced_motion": "reduce"})
+            for v in visit(browser, server, look)
+        ]
+        browser.close()
+    assert found == []
