@@ -112,9 +112,9 @@ def client(tmp_path, pool):
         yield client
 
 
-def begin(client):
+def begin(client, **form):
     """Begin a visit; its link."""
-    answer = client.post("/visits", headers={"Origin": ORIGIN})
+    answer = client.post("/visits", headers={"Origin": ORIGIN}, data=form)
     assert answer.status_code == 303
     return answer.headers["location"]
 
@@ -149,6 +149,13 @@ def inputs(*numbers, **values):
     return {"type": "inputs", "inputs": [{"number": number, **values} for number in numbers]}
 
 
+def before_the_task(pool):
+    """What the worker was told of the phases before the task."""
+    opened = [told for told in pool.workers[0].told if isinstance(told, messages.Open)]
+    assert [told.before for told in opened[:-1]] == [[]] * (len(opened) - 1)
+    return opened[-1].before
+
+
 def test_a_visit_from_the_story_to_the_result(client, pool):
     assert "<p>A story.</p>" in client.get("/").text
     link = begin(client)
@@ -172,11 +179,32 @@ def test_a_film_comes_first_where_there_is_one(tmp_path, pool):
     film = tmp_path / "film.mp4"
     film.write_bytes(b"0123456789")
     with serving(tmp_path / "visits", pool, film=film) as client:
-        link = begin(client)
+        opened = re.search(r'name="opened" value="(\d+)"', client.get("/").text)[1]
+        link = begin(client, opened=str(int(opened) - 90_000))
         assert "<video" in client.get(link).text
         assert client.get(f"{link}/film", headers={"Range": "bytes=2-4"}).content == b"234"
         assert client.post(f"{link}/film", headers={"Origin": ORIGIN}).status_code == 303
         assert 'data-phase="training"' in client.get(link).text
+        for phase in ("training", "task"):
+            with connected(client, link) as socket:
+                begun(socket, phase)
+                socket.send_json({"type": "leave"})
+                until(socket, "over")
+    story, watched, trained = before_the_task(pool)
+    assert story["phase"] == "story" and 90.0 <= story["duration_s"] < 100.0
+    assert watched["phase"] == "flythrough" and 0.0 < watched["duration_s"] < 10.0
+    assert trained == {"phase": "training", "duration_s": 125.0, "reason": "all delivered"}
+
+
+@pytest.mark.parametrize("opened", ["", "x", "-1", "9" * 15, "9" * 400])
+def test_a_form_that_was_tampered_with_only_spoils_its_own_reading_time(client, pool, opened):
+    link = begin(client, opened=opened)
+    for phase in ("training", "task"):
+        with connected(client, link) as socket:
+            begun(socket, phase)
+            socket.send_json({"type": "leave"})
+            until(socket, "over")
+    assert before_the_task(pool)[0] == {"phase": "story", "duration_s": 0.0}
 
 
 def test_only_the_hash_of_a_token_is_kept(client, tmp_path, caplog):

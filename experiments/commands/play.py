@@ -25,7 +25,7 @@ from experiments.commands.options import (
 from experiments.errors import ConfigError, RecordError
 from experiments.familiarisation.story import story_text
 from experiments.origin import HUMAN
-from experiments.runs.phases import PHASES, STORY, TASK, TRAINING, phases_of
+from experiments.runs.phases import FLYTHROUGH, PHASES, STORY, TASK, TRAINING, phases_of
 from experiments.trials.training import training_config
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition
@@ -111,8 +111,7 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
             "objects": OBJECTS,
             **given_options(arguments, ("objects",)),
             **trial_options(arguments),
-            "phases": TASK,  # the server leads through the others
-            "story": None,
+            "phases": ",".join(_phases(arguments)),
         },
     )
     condition(task.assistance)
@@ -120,6 +119,16 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
         solver(task.planner)
     training = dataclasses.replace(training_config(task), time_limit=TRAINING_LIMIT)
     return {TRAINING: training.settings(), TASK: task.settings()}
+
+
+def _phases(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """The phases of a visit; a fly-through needs a film.
+
+    Raises:
+        ConfigError: There is no such phase.
+    """
+    names = phases_of(arguments.phases or ",".join(PHASES))
+    return tuple(name for name in names if name != FLYTHROUGH or arguments.film is not None)
 
 
 def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], listener: socket.socket) -> None:
@@ -131,7 +140,7 @@ def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], lis
     from experiments.web.server import PlayConfig, PlayServer
 
     _log_to_stderr()
-    phases = phases_of(arguments.phases or ",".join(PHASES))
+    phases = _phases(arguments)
     config = PlayConfig(
         phases=phases,
         trials=trials,

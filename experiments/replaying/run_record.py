@@ -32,7 +32,7 @@ from mjsim.observation import Observation
 from mjsim.person_parameters import PersonParameters
 
 STATUS = {code: status for status, code in STATUS_CODE.items()}
-EXTERNAL = ("scroll", "overrun", "pause", "resume")  # events that come from outside of the simulation
+EXTERNAL = ("scroll", "overrun", "pause", "resume", "blur")  # events that come from outside of the simulation
 WORLD_EVENTS = {kind.value: kind for kind in EventKind}
 
 

@@ -239,6 +239,18 @@ class Resume(Logged, frozen=True):
     wall: float
 
 
+class Blur(Logged, frozen=True):
+    """The page lost the keyboard to another window, or got it back.
+
+    Attributes:
+        away: Whether it lost it.
+        wall: When, s since 1970.
+    """
+
+    away: bool
+    wall: float
+
+
 class Outcome(Logged, frozen=True):
     """Something happened in the world.
 
@@ -274,6 +286,7 @@ TYPES: tuple[type[Logged], ...] = (
     Overrun,
     Pause,
     Resume,
+    Blur,
     End,
 )
 

@@ -32,6 +32,8 @@ class Clock:
         deadline, paused = time.monotonic(), False
         try:
             while (reason := live.end_reason) is None:
+                if inbox.begun:
+                    self._note_blurs()
                 if not inbox.runs:
                     if inbox.closed:
                         return None
@@ -67,6 +69,10 @@ class Clock:
             self._live.session.show()  # what the inputs led to is on its way a control step earlier
         self._sync.request(self._live.input, self._live.session.recording.step)
         return deadline + self._live.world.control_timestep
+
+    def _note_blurs(self) -> None:
+        for away, wall in self._inbox.take_blurs():
+            self._live.session.note("blur", away=away, wall=round(wall, 3))
 
     def _pause(self, reason: str) -> bool:
         self._live.session.note("pause", reason=reason, wall=round(time.time(), 3))

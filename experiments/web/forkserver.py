@@ -8,6 +8,7 @@ import gc
 import os
 import signal
 import socket
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection as Pipe
 from multiprocessing.connection import wait
@@ -35,7 +36,7 @@ class ForkServer:
     def run(self) -> None:
         """Serve until the server is gone."""
         house = House.load(self._name)
-        drawing = _draw_pictures(house.catalogue)
+        self._drawing = drawing = _draw_pictures(house.catalogue)
         warmup.plan()
         warmup.act(house)
         gc.freeze()  # collecting garbage would copy what is shared
@@ -49,10 +50,8 @@ class ForkServer:
                     return
 
     def _take_pictures(self, drawing: Pipe) -> None:
-        try:
+        with suppress(EOFError), drawing:  # where they could not be drawn, workers try again and say why
             self._pictures = drawing.recv()
-        except EOFError:
-            return  # workers say what is wrong, when they draw
 
     def _fork(self, house: House) -> bool:
         """Fork a worker; False if the server is gone."""
@@ -62,6 +61,7 @@ class ForkServer:
         with socket.socket(fileno=descriptors[0]) as link:
             if os.fork() == 0:
                 self._control.close()
+                self._drawing.close()
                 signal.signal(signal.SIGCHLD, signal.SIG_DFL)
                 _exit_after(Worker(link, self._name, house, self._pictures))
         return True
@@ -81,14 +81,16 @@ def _draw_pictures(catalogue: Catalogue) -> Pipe:
     """Draw pictures in a process of their own, which says them to the end of a pipe that is given back."""
     context = get_context("fork")
     ours, theirs = context.Pipe(duplex=False)
-    context.Process(target=_say_pictures, args=(theirs, catalogue), daemon=True).start()
+    context.Process(target=_say_pictures, args=(theirs, ours, catalogue), daemon=True).start()
     theirs.close()
     return ours
 
 
-def _say_pictures(pipe: Pipe, catalogue: Catalogue) -> None:
+def _say_pictures(pipe: Pipe, other_end: Pipe, catalogue: Catalogue) -> None:
+    other_end.close()  # so that nobody is left to read once the process that asked is gone
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    pipe.send(render_pictures(catalogue))
+    with suppress(BrokenPipeError):
+        pipe.send(render_pictures(catalogue))
 
 
 def main() -> None:

@@ -1,6 +1,7 @@
 """What the server has said and the session has not taken yet; one thread fills it, another empties it."""
 
 import threading
+import time
 from dataclasses import dataclass, field
 
 from experiments.web.controls import Input
@@ -24,6 +25,7 @@ class Inbox:
     leave: bool = False
     closed: bool = False
     _inputs: list[Input] = field(default_factory=list)
+    _blurs: list[tuple[bool, float]] = field(default_factory=list)
     _changed: threading.Condition = field(default_factory=threading.Condition)
 
     def add(self, inputs: list[Input]) -> None:
@@ -46,6 +48,17 @@ class Inbox:
         """All inputs that came since the last call."""
         with self._changed:
             taken, self._inputs = tuple(self._inputs), []
+        return taken
+
+    def add_blur(self, away: bool) -> None:
+        """The page lost the keyboard, or got it back, at this moment."""
+        with self._changed:
+            self._blurs.append((away, time.time()))
+
+    def take_blurs(self) -> list[tuple[bool, float]]:
+        """What `add_blur` was told since the last call, each with its time, s since 1970."""
+        with self._changed:
+            taken, self._blurs = self._blurs, []
         return taken
 
     def wait_until_running(self, seconds: float) -> bool:

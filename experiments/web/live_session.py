@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import RecordError
+from experiments.familiarisation.familiarise import Familiarisation
 from experiments.house import House
 from experiments.participants.base import Decision, Percept
 from experiments.participants.behaviour import BehaviourDistribution
@@ -81,6 +82,7 @@ class LiveSession:
         house: The house of the trial.
         config: The trial; None to go on with the one in the journal.
         viewer: Sees every control step.
+        before: The phases before this one, as `phase_ended` events say of them.
 
     Attributes:
         config: The trial.
@@ -94,7 +96,13 @@ class LiveSession:
     """
 
     def __init__(
-        self, journal: Journal, house: House, config: TrialConfig | None = None, viewer: Viewer | None = None
+        self,
+        journal: Journal,
+        house: House,
+        config: TrialConfig | None = None,
+        viewer: Viewer | None = None,
+        *,
+        before: Sequence[dict[str, Any]] = (),
     ) -> None:
         self._journal = journal
         opened, steps, closed = decode(journal.records) if journal.records else (None, [], None)
@@ -131,6 +139,7 @@ class LiveSession:
             world=self.world,
             user=self._human,
         )
+        Familiarisation(tuple(before), None).log(self._log)
         self.input = 0
         if steps:
             self._resume(steps)

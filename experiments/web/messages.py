@@ -27,12 +27,14 @@ class Open(Message, frozen=True):
         run: Run directory to write when it is over.
         config: Settings of the trial; those of a session that is in the journal already stand there.
         paused: Why the clock is to stand at first, or None.
+        before: The phases before this one, as `phase_ended` events say of them.
     """
 
     folder: str
     run: str
     config: dict[str, Any] | None = None
     paused: str | None = None
+    before: list[dict[str, Any]] = []
 
 
 class Begin(Message, frozen=True):
@@ -77,6 +79,12 @@ class Resume(Message, frozen=True):
     """Let the clock run again."""
 
 
+class Blur(Message, frozen=True):
+    """The page lost the keyboard to another window, or got it back; only the log takes notice."""
+
+    away: bool
+
+
 class Leave(Message, frozen=True):
     """End the session now."""
 
@@ -85,7 +93,7 @@ class Exit(Message, frozen=True):
     """End the process now; the journal keeps the session."""
 
 
-ToWorker = Open | Begin | Inputs | View | Seen | Pause | Resume | Leave | Exit
+ToWorker = Open | Begin | Inputs | View | Seen | Pause | Resume | Blur | Leave | Exit
 
 
 class Started(Message, frozen=True):

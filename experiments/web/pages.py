@@ -1,6 +1,7 @@
 """The pages, from the files in `templates/`; everything that is put into them is escaped."""
 
 import html
+import time
 from collections.abc import Mapping
 from importlib import resources
 from string import Template
@@ -46,7 +47,8 @@ def story_page(story: str, trial: Mapping[str, Any], *, training: bool) -> HTMLR
     """
     condition = str(trial["assistance"]).split("-")[0]
     texts = [*story.split("\n\n"), HELP.get(condition, ""), TRAINING if training else ""]
-    return page("story", "Tidy the apartment", paragraphs=[text for text in texts if text.strip()])
+    shown = [text for text in texts if text.strip()]
+    return page("story", "Tidy the apartment", paragraphs=shown, opened=round(1000.0 * time.time()))
 
 
 def play_page(phase: str, count: int) -> HTMLResponse:

@@ -11,6 +11,7 @@ import msgspec
 
 from experiments.web.messages import (
     Begin,
+    Blur,
     Busy,
     Failed,
     Frame,
@@ -57,7 +58,7 @@ class TakeOver(Message, frozen=True):
     """Go on here with a session that is open elsewhere; the answer to `occupied`."""
 
 
-FromBrowser = Hello | TakeOver | Begin | Inputs | View | Seen | Pause | Resume | Leave
+FromBrowser = Hello | TakeOver | Begin | Inputs | View | Seen | Pause | Resume | Blur | Leave
 
 
 class Queue(Message, frozen=True):

@@ -2,11 +2,14 @@
 
 import asyncio
 import logging
+import re
+import time
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
@@ -24,11 +27,13 @@ from experiments.web.guards import Addresses, Guards, Rate
 from experiments.web.pages import message_page, page, play_page, result_page, story_page
 from experiments.web.pool import Places, Pool
 from experiments.web.sessions import Sessions
-from experiments.web.visits import PLAYED, RESULT, Visit, Visits, token_hash
+from experiments.web.visits import PLAYED, RESULT, Ended, Visit, Visits, token_hash
 
 LOG = logging.getLogger("mjsim.play")
 STATIC = Path(__file__).parent / "static"
 MAX_QUEUE = 100  # visits that may wait for a place
+OPENED = re.compile(r"\d{1,15}")  # ms since 1970
+LONGEST_READING = 24 * 3600.0  # s; a page may stay open over night
 NEW_VISITS = 30, 60.0  # from one address within so many seconds
 
 
@@ -125,9 +130,17 @@ class PlayServer:
             return message_page(503, "Everything is full", "Please come back later.")
         left_out = (STORY,) if self._config.film else (STORY, FLYTHROUGH)
         phases = [name for name in self._config.phases if name not in left_out]
-        token = self._visits.create(phases, self._config.trials)
+        token = self._visits.create(phases, self._config.trials, self._read(await request.body()))
         LOG.info("session %s begins", token_hash(token)[:12])
         return RedirectResponse(f"/play/{token}", 303)
+
+    def _read(self, form: bytes) -> list[Ended]:
+        """The story, as the form at its end has it: when the page was made, s since 1970."""
+        if STORY not in self._config.phases:
+            return []
+        opened = parse_qs(form.decode("ascii", "replace")).get("opened", [""])[0]
+        seconds = time.time() - int(opened) / 1000.0 if OPENED.fullmatch(opened) else 0.0
+        return [Ended(STORY, round(min(max(0.0, seconds), LONGEST_READING), 3))]
 
     async def _visit(self, request: Request) -> Response:
         token = request.path_params["token"]
@@ -137,6 +150,7 @@ class PlayServer:
         if visit.phase == FLYTHROUGH and self._config.film is None:
             visit.finish(FLYTHROUGH)
         if visit.phase == FLYTHROUGH:
+            visit.show()
             return page("film", "The apartment", link=f"/play/{token}/film")
         if visit.phase in PLAYED:
             return play_page(visit.phase, visit.settings(visit.phase)["objects"])

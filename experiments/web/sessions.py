@@ -212,13 +212,18 @@ class PlayedSession:
                 self._worker = await self._pool.take(visit.journal(phase))
             self._worker.send(
                 messages.Open(
-                    str(visit.journal(phase)), str(visit.run(phase)), visit.settings(phase), self._paused
+                    str(visit.journal(phase)),
+                    str(visit.run(phase)),
+                    visit.settings(phase),
+                    self._paused,
+                    visit.before(phase),
                 )
             )
             over = await self._relay(self._worker)
             self._ready = None
             if over is not None:
-                visit.finish(phase)
+                done = over.metrics or {}
+                visit.finish(phase, done.get("completion_time_s", 0.0), done.get("ended"))
                 LOG.info(
                     "session %s: %s is over (%s): %s", visit.name[:12], phase, over.reason, visit.run(phase)
                 )

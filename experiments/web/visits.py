@@ -6,6 +6,7 @@ A link holds a token that cannot be guessed. Only its SHA-256 is kept, as the na
 import hashlib
 import re
 import secrets
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,20 @@ RESULT = "result"  # what follows the last phase
 PLAYED = (TRAINING, TASK)
 
 
+class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A phase that is over, as the event `phase_ended` has it.
+
+    Attributes:
+        phase: Its name.
+        duration_s: How long it took, s.
+        reason: Why a training ended.
+    """
+
+    phase: str
+    duration_s: float
+    reason: str | None = None
+
+
 class _Stored(msgspec.Struct, frozen=True):
     """`visit.json`.
 
@@ -32,12 +47,16 @@ class _Stored(msgspec.Struct, frozen=True):
         phase: Phase that is next or under way.
         phases: All of them, in order.
         trials: Settings of its trials by phase.
+        ended: Phases that are over.
+        shown: When the phase was shown first, s since 1970; None where it was not, or has a clock of its own.
         version: Of this format.
     """
 
     phase: str
     phases: list[str]
     trials: dict[str, dict[str, Any]]
+    ended: list[Ended] = []
+    shown: float | None = None
     version: int = 1
 
 
@@ -78,16 +97,44 @@ class Visit:
         """Folder of a phase's journal."""
         return self.folder / JOURNALS / phase
 
-    def finish(self, phase: str) -> None:
-        """Go on to the phase after this one; nothing happens if the visit is further already.
+    def before(self, phase: str) -> list[dict[str, Any]]:
+        """What `phase_ended` events say of the phases before the task; other phases stand by themselves."""
+        return [msgspec.to_builtins(ended) for ended in self._stored.ended] if phase == TASK else []
+
+    def show(self) -> None:
+        """The phase is shown; its time runs from the first time on.
 
         Raises:
             OSError: The folder cannot be written.
         """
-        if phase == self.phase:
-            after = self._stored.phases[self._stored.phases.index(phase) + 1 :]
-            self._stored = msgspec.structs.replace(self._stored, phase=after[0] if after else RESULT)
+        if self._stored.shown is None:
+            self._stored = msgspec.structs.replace(self._stored, shown=time.time())
             self.save()
+
+    def finish(self, phase: str, duration: float | None = None, reason: str | None = None) -> None:
+        """Go on to the phase after this one; nothing happens if the visit is further already.
+
+        Args:
+            phase: The one that is over.
+            duration: How long it took, s; None for as long as it was shown.
+            reason: Why a training ended.
+
+        Raises:
+            OSError: The folder cannot be written.
+        """
+        if phase != self.phase:
+            return
+        stored, now = self._stored, time.time()
+        if duration is None:
+            duration = max(0.0, now - (stored.shown or now))
+        after = stored.phases[stored.phases.index(phase) + 1 :]
+        self._stored = msgspec.structs.replace(
+            stored,
+            phase=after[0] if after else RESULT,
+            ended=[*stored.ended, Ended(phase, round(duration, 3), reason)],
+            shown=None,
+        )
+        self.save()
 
     def save(self) -> None:
         """Write how far it has got.
@@ -123,12 +170,15 @@ class Visits:
         self._folder = folder
         self._known: dict[str, Visit] = {}
 
-    def create(self, phases: Sequence[str], trials: Mapping[str, dict[str, Any]]) -> str:
+    def create(
+        self, phases: Sequence[str], trials: Mapping[str, dict[str, Any]], ended: Sequence[Ended] = ()
+    ) -> str:
         """Begin a visit; its token.
 
         Args:
-            phases: Its phases, in order.
+            phases: Its phases that are still to come, in order.
             trials: Settings of its trials by phase.
+            ended: Phases that are over already.
 
         Raises:
             OSError: The folder cannot be written.
@@ -136,7 +186,7 @@ class Visits:
         token = secrets.token_urlsafe(32)
         folder = self._folder / token_hash(token)
         folder.mkdir()
-        visit = Visit(folder, _Stored(phases[0], list(phases), dict(trials)))
+        visit = Visit(folder, _Stored(phases[0], list(phases), dict(trials), list(ended)))
         visit.save()
         sync_folder(self._folder)
         self._known[visit.name] = visit

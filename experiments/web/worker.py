@@ -178,6 +178,8 @@ class Worker:
             self._inbox.set(paused=message.reason)
         elif isinstance(message, messages.Resume):
             self._inbox.set(paused=None)
+        elif isinstance(message, messages.Blur):
+            self._inbox.add_blur(message.away)
         elif isinstance(message, messages.Leave):
             self._inbox.set(leave=True)
         elif isinstance(message, messages.View):
@@ -200,7 +202,7 @@ class Worker:
             if is_over(journal.records):
                 self._finish(folder, Path(opened.run), house)
                 return
-            live = LiveSession(journal, house, config, self._window)
+            live = LiveSession(journal, house, config, self._window, before=opened.before)
             inbox = self._inbox
             pictures = partial(self._pictures_of, house)
             with Drawer(live.scene, live.house, pictures, self._connection.send) as drawer:

@@ -193,7 +193,11 @@ function watchPage() {
     release();
     hidden = setTimeout(() => pause("hidden"), GRACE);
   });
-  window.addEventListener("blur", release);
+  window.addEventListener("blur", () => {
+    release();
+    connection.send({ type: "blur", away: true });
+  });
+  window.addEventListener("focus", () => connection.send({ type: "blur", away: false }));
   window.addEventListener("pagehide", () => connection.close());
   let resized = null;
   window.addEventListener("resize", () => {
