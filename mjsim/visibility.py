@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.kernels import kernel
+from mjsim.model.drawn_state import drawn_state
 from mjsim.model.scene import Scene
 from mjsim.person_parameters import PersonParameters
 
@@ -178,7 +179,8 @@ def _rays(
     field: FieldOfView | None,
     among: Collection[str] | None,
 ) -> _Rays:
-    sight = scene.once("sight", lambda: _sight_geometry(scene))
+    scene, data = drawn_state(scene, data)
+    sight = _sight(scene)
     names = scene.index.names
     looked_for = frozenset(names if among is None else among)
     wanted = np.array([name in looked_for for name in names], np.bool_)
@@ -206,7 +208,7 @@ def in_field_of_view(
 
 def persons_geoms(scene: Scene) -> NDArray[np.bool_]:
     """Which geoms belong to the person, shape (ngeom,)."""
-    return scene.once("sight", lambda: _sight_geometry(scene)).person
+    return _sight(scene).person
 
 
 def first_hit(
@@ -226,6 +228,10 @@ def first_hit(
         distance += SKIP
         distance += mujoco.mj_ray(model, data, eye + distance * ray, ray, DRAWN_GROUPS, True, -1, geom)
     return int(geom[0]), float(distance)
+
+
+def _sight(scene: Scene) -> SightGeometry:
+    return scene.once("sight", lambda: _sight_geometry(scene))
 
 
 def _sight_geometry(scene: Scene) -> SightGeometry:

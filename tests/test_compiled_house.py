@@ -1,6 +1,7 @@
 """A house is read and compiled once per content; visuals of objects are apart from what collides."""
 
 import copy
+import math
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -11,14 +12,18 @@ import pytest
 
 from experiments.cli import main
 from experiments.house import House
+from mjsim.actions import Move, Pick
 from mjsim.episode import Episode
 from mjsim.errors import AssetError
 from mjsim.model import house
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.drawn_state import drawn_state
 from mjsim.model.house import compiled_house
 from mjsim.model.model_files import content_hash, read_model
 from mjsim.model.object_model import VISUAL_BODY, separate_visuals
 from mjsim.model.scene import compose
+from mjsim.visibility import visible_objects
+from mjsim.world import World
 from mjsim.world_state import model_fingerprint
 
 _OBJECT = """
@@ -138,6 +143,33 @@ def test_a_scene_without_visuals_moves_the_same(catalogue: Catalogue, episode: E
         mujoco.mj_step(scene.model, data, nstep=250)
         ends.append((data.qpos.tobytes(), data.qvel.tobytes()))
     assert ends[0] == ends[1]
+
+
+def test_states_fit_a_scene_with_and_without_visuals_and_who_looks_sees_the_same(
+    catalogue: Catalogue, episode: Episode
+) -> None:
+    """To the bit: where everything is drawn, and what the person then sees."""
+    worlds = [World(compose(episode, catalogue, visuals=visuals)) for visuals in (True, False)]
+    whole, lean = worlds[0].scene, worlds[1].scene
+    assert lean.model.ngeom < whole.model.ngeom and lean.model.nbody == whole.model.nbody
+    assert lean.counterpart(visuals=True).model.ngeom == whole.model.ngeom
+    for step in range(200):
+        action = Pick() if step == 20 else Move(forward=0.6, turn=0.8, look=-0.2)
+        results = [world.step(action) for world in worlds]
+        assert results[0].result == results[1].result
+    assert worlds[0].state_hash() == worlds[1].state_hash()
+    assert worlds[0].state().hash == worlds[1].state().hash
+    _, drawn = drawn_state(lean, worlds[1].data)
+    for name in ("xpos", "xmat", "xipos", "ximat", "geom_xpos", "geom_xmat"):
+        assert getattr(drawn, name).tobytes() == getattr(worlds[0].data, name).tobytes(), name
+    now = worlds[0].observation()
+    seen = [
+        visible_objects(world.scene, world.data, now.eye, heading, 0.0)
+        for heading in np.linspace(-math.pi, math.pi, 12)
+        for world in worlds
+    ]
+    assert seen[::2] == seen[1::2] and any(seen)
+    assert len({model_fingerprint(s.counterpart(visuals=False).model) for s in (whole, lean)}) == 1
 
 
 def test_a_scene_from_a_shared_house_is_the_same_every_time(catalogue: Catalogue, episode: Episode) -> None:

@@ -193,6 +193,6 @@ def provenance(world: World) -> dict[str, Any]:
     """Versions, compiled model and rules, on which a run depends as it does on its configuration; JSON-ready."""
     return {
         "versions": engine_versions(),
-        "model": model_fingerprint(world.model),
+        "model": model_fingerprint(world.scene.counterpart(visuals=False).model),
         "world": dataclasses.asdict(world.options),
     }

@@ -41,6 +41,7 @@ def draw_topdown(
         origin: Whether the participant is simulated (`experiments.origin`).
     """
     scale = _scale(house.bounds)
+    scene = scene.counterpart(visuals=True)
     floor = render_floorplan(scene.model, World(scene).data, house.bounds, pixels_per_metre=scale)
     x_min, y_min, x_max, y_max = floor.bounds
     inches = 0.95 * scale / PIXELS_PER_METRE  # per metre

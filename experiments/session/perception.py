@@ -10,6 +10,7 @@ from experiments.session.assistant import Assistant
 from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
 from mjsim.actions import ActionResult
+from mjsim.model.drawn_state import drawn_state
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.receptacle_visibility import visible_receptacles
@@ -66,16 +67,17 @@ class SessionPercept(Percept):
 
     def look_for(self, receptacles: Mapping[str, ReceptacleGeometry]) -> frozenset[str]:
         """Those in view, by rays from the eye."""
-        seen, world = self._seen, self._world
+        seen = self._seen
+        scene, data = drawn_state(self._world.scene, self._world.data)
         return visible_receptacles(
-            world.scene.model,
-            world.data,
+            scene.model,
+            data,
             receptacles,
             seen.eye,
             seen.heading,
             seen.pitch,
             field=FieldOfView.of(self.person),
-            own=persons_geoms(world.scene),
+            own=persons_geoms(scene),
         )
 
     def hud(self) -> HudState:

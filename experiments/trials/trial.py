@@ -74,7 +74,8 @@ def run_trial(
         with run_directory(out, replace=replace) as folder:
             person = draw_person(config)
             house = (house or House.load(config.house)).for_person(person)
-            scene = compose(trial_episode(config, house), house.catalogue, person=person)
+            episode = trial_episode(config, house)
+            scene = compose(episode, house.catalogue, person=person, visuals=film is not None)
 
             def progress(now: Progress) -> None:
                 on_progress(now)
@@ -181,7 +182,7 @@ def _before_the_task(
     started, training = time.perf_counter(), training_config(config)
     place = folder / records.TRAINING
     place.mkdir()
-    scene = compose(trial_episode(training, house), house.catalogue, person=person)
+    scene = compose(trial_episode(training, house), house.catalogue, person=person, visuals=False)
     result = _Trial(training, house, scene, place, None, Familiarisation((), known.seen)).run(on_progress)
     if result.error is not None and not result.has_steps:
         raise result.error

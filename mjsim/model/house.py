@@ -98,9 +98,10 @@ class CompiledHouse:
         Raises:
             AssetError: The file is malformed or has no top-level body `object`.
         """
-        prepare = separate_visuals if visuals else remove_visuals
-        read = self.once(path, lambda: read_model(path, body="object"))
-        return self.once((path, visuals), lambda: prepare(read.copy()))
+        if visuals:
+            return self.once((path, True), lambda: separate_visuals(read_model(path, body="object")))
+        whole = self.object_spec(path)
+        return self.once((path, False), lambda: remove_visuals(whole.copy()))
 
     def once(self, key: Any, compute: Callable[[], T]) -> T:
         """What `compute` returned at the first call with `key`."""

@@ -8,7 +8,10 @@ VISUAL_BODY = "looks"  # body of an object's visual geoms
 
 
 def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Remove what has no effect on motion, in place: geoms that meet nothing, materials, textures, unused meshes."""
+    """Remove what has no effect on motion, in place: geoms that meet nothing, materials, textures, unused meshes.
+
+    Bodies stay, so that a state fits the models with and without visuals.
+    """
     spec.compiler.discardvisual = True
     spec.compile()
     return spec

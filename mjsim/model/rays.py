@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjsim.model.receptacles import ReceptacleGeometry
 
-# Structure and furniture (0), ceilings (1), collision guards (3); not decoration (2) and not the person (4).
-SOLID = np.array([1, 1, 0, 1, 0, 0], np.uint8)
+# What collides: structure and furniture (0), collision guards (3); not ceilings (1), decoration (2) or the person (4).
+SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)
 _MAX_SKIPS = 32
 _RIM = 0.06  # m, from a receptacle's volume to the outside of its walls
 

@@ -106,6 +106,7 @@ class Scene:
         receptacles: Receptacle key -> geometry.
         spec: The editable description, for export.
         person: Who walks in it.
+        visuals: Whether the model includes what is only drawn.
     """
 
     model: mujoco.MjModel
@@ -116,6 +117,7 @@ class Scene:
     receptacles: Mapping[str, ReceptacleGeometry]
     spec: mujoco.MjSpec
     person: PersonParameters
+    visuals: bool
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
     def once(self, key: str, make: Callable[[], T]) -> T:
@@ -123,6 +125,14 @@ class Scene:
         if key not in self._derived:
             self._derived[key] = make()
         return cast(T, self._derived[key])
+
+    def counterpart(self, *, visuals: bool) -> "Scene":
+        """The same episode, with the person, with or without what is only drawn; states fit both."""
+        if visuals == self.visuals:
+            return self
+        return self.once(
+            "counterpart", lambda: assemble(self.episode, self.catalogue, person=self.person, visuals=visuals)
+        )
 
 
 def compose(
@@ -140,7 +150,8 @@ def compose(
         catalogue: Catalogue of the episode's house.
         person: Who walks in it; None for the usual person.
         avatar: Whether to add the person's body.
-        visuals: Whether to include what is only drawn; without it a scene moves the same and compiles faster.
+        visuals: Whether to include what is only drawn. Without it a scene moves the same, compiles faster and steps
+            faster, but cannot be rendered.
 
     Raises:
         AssetError: A model is malformed, or does not compile.
@@ -193,6 +204,7 @@ def assemble(
         receptacles=house.receptacles,
         spec=spec,
         person=person,
+        visuals=visuals,
     )
 
 

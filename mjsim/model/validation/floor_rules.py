@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from mjsim.model.clearance import ClearanceField
-from mjsim.model.rays import SOLID
 from mjsim.model.validation.bin_rules import check_bins
 from mjsim.model.validation.compiled import Compiled
 from mjsim.model.validation.findings import Finding
@@ -23,6 +22,7 @@ ROOM_AREA = 0.25  # m^2 of floor to stand on
 FLOOR_GAP = 0.006  # m, between the floor and z = 0
 HEADROOM = 2.0  # m, the highest eyes
 _RAYS = 3000
+_HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)  # groups of what collides, and of ceilings and lamps
 _CHEST = 1.0  # m, where rays begin: nothing that a person can stand at is there
 
 
@@ -173,7 +173,7 @@ def _free(compiled: Compiled, point: NDArray[np.float64], up: float) -> float:
     """Distance, m, from chest height over a floor point (2,) to the first solid geom above (1) or below (-1)."""
     geom = np.zeros(1, np.int32)
     start, along = np.array([*point, _CHEST]), np.array([0.0, 0.0, up])
-    distance = mujoco.mj_ray(compiled.model, compiled.data, start, along, SOLID, 1, -1, geom)
+    distance = mujoco.mj_ray(compiled.model, compiled.data, start, along, _HANGING, 1, -1, geom)
     return distance if distance >= 0 else math.inf
 
 

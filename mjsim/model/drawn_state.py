@@ -1,0 +1,81 @@
+"""The state of a scene without visuals, in the model that has them: what somebody who looks around needs."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.kernels import kernel
+from mjsim.model.scene import Scene
+
+Floats = NDArray[np.float64]
+
+
+def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData]:
+    """Scene and state with what is only drawn, for rays; those given, where that is in them.
+
+    Args:
+        scene: The composed episode.
+        data: Its state.
+
+    Returns:
+        The scene with visuals, and its state, in which bodies and geoms are placed as in `data`, until the next call
+        with a state of the same scene.
+    """
+    if scene.visuals:
+        return scene, data
+    drawn = scene.once("drawn state", lambda: _DrawnState(scene.counterpart(visuals=True)))
+    drawn.place(data)
+    return drawn.scene, drawn.data
+
+
+class _DrawnState:
+    """Poses of bodies and geoms in a scene with visuals."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.data = scene, mujoco.MjData(scene.model)
+        model, data = scene.model, self.data
+        mujoco.mj_kinematics(model, data)  # places what never moves
+        geoms = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
+        self._geoms = (
+            geoms, model.geom_bodyid[geoms], model.geom_pos[geoms], model.geom_quat[geoms],
+            data.geom_xpos, data.geom_xmat,
+        )  # fmt: skip
+
+    def place(self, data: mujoco.MjData) -> None:
+        """Place everything as in the state of a model with the same bodies."""
+        mine = self.data
+        mine.xpos[:], mine.xquat[:], mine.xmat[:] = data.xpos, data.xquat, data.xmat
+        mine.xipos[:], mine.ximat[:] = data.xipos, data.ximat
+        place_geoms(self._geoms, data.xpos, data.xquat, data.xmat)
+
+
+@kernel
+def place_geoms(geoms: Any, positions: Floats, quaternions: Floats, rotations: Floats) -> None:
+    """Place geoms on their bodies, with the operations of MuJoCo in the same order.
+
+    Args:
+        geoms: Ids, (g,); body of each, (g,); positions, m, (g, 3), and quaternions, (g, 4), in the body frame; poses of
+            all geoms as in `MjData`, (ngeom, 3) and (ngeom, 9), changed.
+        positions: Of bodies, m, (nbody, 3).
+        quaternions: Their orientations, (nbody, 4).
+        rotations: Their axes, row by row, (nbody, 9).
+    """
+    ids, bodies, local_positions, local_quaternions, geom_xpos, geom_xmat = geoms
+    for k in range(len(ids)):
+        position, rotation, r = local_positions[k], geom_xmat[ids[k]], rotations[bodies[k]]
+        for i in range(3):
+            offset = r[3 * i] * position[0] + r[3 * i + 1] * position[1] + r[3 * i + 2] * position[2]
+            geom_xpos[ids[k], i] = offset + positions[bodies[k], i]
+        a, b = quaternions[bodies[k]], local_quaternions[k]
+        w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
+        x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
+        y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
+        z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
+        rotation[0] = w * w + x * x - y * y - z * z
+        rotation[4] = w * w - x * x + y * y - z * z
+        rotation[8] = w * w - x * x - y * y + z * z
+        rotation[1], rotation[2] = 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+        rotation[3], rotation[5] = 2.0 * (x * y + w * z), 2.0 * (y * z - w * x)
+        rotation[6], rotation[7] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
