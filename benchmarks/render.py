@@ -25,6 +25,7 @@ from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.state import HudState
+from hud.task import KnownPlan, TaskStep
 from mjsim.model.scene import Scene, compose
 from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info, render_pictures
 from mjsim.render.cameras import View
@@ -32,7 +33,6 @@ from mjsim.render.context import current_context
 from mjsim.render.markers import add_markers
 from mjsim.render.scene_settings import buffer_settings
 from mjsim.world import World
-from planner.plan import Visit, VisitKind
 
 SIZES = ((320, 240), (640, 480), (1280, 720))
 REPEATS = {"draft": 5, "fast": 7, "quality": 1}
@@ -134,8 +134,10 @@ def make_subject(clock: Callable[[], float]) -> Subject:
     world = World(scene)
     seen = world.reset()
     path = house.geodesics.shortest_path(seen.position, seen.object_positions[0, :2]).points
+    x, y, z = seen.object_positions[0].tolist()
+    goal = (x, y, z)
     view = TaskBoard(house, scene.episode, seen.object_names).view(
-        seen, visits=[Visit(VisitKind.PICK, seen.object_names[0])], path=path
+        seen, ahead=KnownPlan((TaskStep("pick", seen.object_names[0]),), path=path, goal=goal)
     )
     places = [seen.position, *house.rooms.centers]
     turns = [seen.heading, *np.random.default_rng(0).uniform(0.0, math.tau, len(house.rooms.centers))]

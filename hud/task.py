@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypeVar, get_args
+from typing import Literal, NamedTuple, Protocol, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,40 @@ class TaskReceptacle:
     position: Vec3
 
 
+class PlanAhead(Protocol):
+    """What the planner suggests; may be worked out when it is first asked for."""
+
+    @property
+    def steps(self) -> tuple[TaskStep, ...]:
+        """Remaining steps in planned order, the next one first; empty without a planner."""
+        ...
+
+    @property
+    def segment(self) -> NDArray[np.float64] | None:
+        """As in `TaskView`, m, shape (k, 2)."""
+        ...
+
+    @property
+    def path(self) -> NDArray[np.float64] | None:
+        """As in `TaskView`, m, shape (k, 2)."""
+        ...
+
+    @property
+    def goal(self) -> Vec3 | None:
+        """Where the next step happens, m."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class KnownPlan:
+    """A `PlanAhead` that is there already; the attributes are the same."""
+
+    steps: tuple[TaskStep, ...] = ()
+    segment: NDArray[np.float64] | None = None
+    path: NDArray[np.float64] | None = None
+    goal: Vec3 | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class TaskView:
     """State of the task and of the plan, in the house frame.
@@ -87,11 +121,7 @@ class TaskView:
         hands: Object name in the left and in the right hand, or None.
         capacity: How many objects are carried at most.
         steps_done: Successful picks and places so far, in order.
-        plan: Remaining steps in planned order, the next one first; empty without a planner.
-        segment: Shortest floor path from where the last step was done, or the start, to the next one, m, shape (k, 2);
-            None when nothing is left to do.
-        path: As `segment`, but from where the person is, and anew when the person leaves it.
-        goal: Where the next step happens (the object, or its receptacle), m, or None.
+        ahead: What the planner suggests: `plan`, `segment`, `path` and `goal`.
         position: Floor position of the person, m.
         eye: Position of the eye, m.
         message: What the message bar shows, or None.
@@ -104,8 +134,7 @@ class TaskView:
             their regrets are known.
 
     Raises:
-        TaskViewError: A name is unknown or repeated, `order` is not a permutation of the objects, or
-            `segment` or `path` has the wrong shape or is not finite.
+        TaskViewError: A name is unknown or repeated, or `order` is not a permutation of the objects.
     """
 
     objects: tuple[TaskObject, ...]
@@ -114,10 +143,7 @@ class TaskView:
     hands: tuple[str | None, str | None] = (None, None)
     capacity: int = 2
     steps_done: tuple[TaskStep, ...] = ()
-    plan: tuple[TaskStep, ...] = ()
-    segment: NDArray[np.float64] | None = None
-    path: NDArray[np.float64] | None = None
-    goal: Vec3 | None = None
+    ahead: PlanAhead = KnownPlan()
     position: tuple[float, float] = (0.0, 0.0)
     eye: Vec3 = (0.0, 0.0, 1.6)
     message: Message | None = None
@@ -141,14 +167,45 @@ class TaskView:
                 raise TaskViewError(f"{o.name} belongs to {o.receptacle!r}, none of the receptacles {keys}")
             if o.status not in get_args(Status):
                 raise TaskViewError(f"status of {o.name} is {o.status!r}, must be one of {get_args(Status)}")
-        for kind, name in (*self.steps_done, *self.plan):
-            if kind not in get_args(StepKind) or name not in names:
-                raise TaskViewError(f"step {(kind, name)} must be a pick or place of one of {names}")
+        self._check_steps(self.steps_done)
         for hand in self.hands:
             if hand is not None and hand not in names:
                 raise TaskViewError(f"hands hold {hand!r}, which is none of {names}")
-        _check_path("segment", self.segment)
-        _check_path("path", self.path)
+
+    @property
+    def plan(self) -> tuple[TaskStep, ...]:
+        """Remaining steps in planned order, the next one first; empty without a planner.
+
+        Raises:
+            TaskViewError: A step is of no object of the task.
+        """
+        self._check_steps(self.ahead.steps)
+        return self.ahead.steps
+
+    @property
+    def segment(self) -> NDArray[np.float64] | None:
+        """Shortest floor path from where the last step was done, or the start, to the next one, m, shape (k, 2).
+
+        None when nothing is left to do.
+
+        Raises:
+            TaskViewError: It has another shape, or is not finite.
+        """
+        return _checked_path("segment", self.ahead.segment)
+
+    @property
+    def path(self) -> NDArray[np.float64] | None:
+        """As `segment`, but from where the person is, and anew when the person leaves it.
+
+        Raises:
+            TaskViewError: As for `segment`.
+        """
+        return _checked_path("path", self.ahead.path)
+
+    @property
+    def goal(self) -> Vec3 | None:
+        """Where the next step happens (the object, or its receptacle), m, or None."""
+        return self.ahead.goal
 
     def object(self, name: str) -> TaskObject:
         """The object called `name`.
@@ -166,6 +223,12 @@ class TaskView:
         """
         return _named("receptacle", {r.key: r for r in self.receptacles}, key)
 
+    def _check_steps(self, steps: tuple[TaskStep, ...]) -> None:
+        names = [o.name for o in self.objects]
+        for kind, name in steps:
+            if kind not in get_args(StepKind) or name not in names:
+                raise TaskViewError(f"step {(kind, name)} must be a pick or place of one of {names}")
+
 
 def _named(what: str, values: Mapping[str, _Value], name: str) -> _Value:
     if name not in values:
@@ -173,9 +236,10 @@ def _named(what: str, values: Mapping[str, _Value], name: str) -> _Value:
     return values[name]
 
 
-def _check_path(what: str, path: NDArray[np.float64] | None) -> None:
+def _checked_path(what: str, path: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
     if path is None:
-        return
+        return None
     shaped = path.ndim == 2 and path.shape[1] == 2 and len(path) >= 1
     if not shaped or not np.isfinite(path).all():
         raise TaskViewError(f"{what} must be finite with shape (k, 2), k >= 1, got shape {path.shape}")
+    return path

@@ -136,14 +136,14 @@ class Geodesics:
 
     def _view(self, x: float, y: float, island: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Vertices that a point, m, sees along tangents, and the distances to them, m."""
-        if (x, y) not in self._remembered:
+        view = self._remembered.get((x, y))
+        if view is None:
             if len(self._remembered) >= MAX_REMEMBERED:
                 self._remembered.clear()
             graph = self._graph
-            self._remembered[x, y] = visible_vertices(
-                x, y, graph.vertices, graph.island == island, graph.walls, TOLERANCE
-            )
-        return self._remembered[x, y]
+            view = visible_vertices(x, y, graph.vertices, graph.island == island, graph.walls, TOLERANCE)
+            self._remembered[x, y] = view  # another thread may clear it at once
+        return view
 
     def _between(self, sources: _Query, targets: _Query) -> NDArray[np.float64]:
         """Distances from sources to targets; typed errors instead of infinities."""

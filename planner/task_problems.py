@@ -26,6 +26,7 @@ class TaskProblems:
     def __init__(self, geodesics: Geodesics, capacity: int = 2) -> None:
         self._geodesics = geodesics
         self._capacity = capacity
+        self._snapped: dict[XY, XY] = {}  # places of visits
         self._row: dict[XY, int] = {}  # of each place in the distances of the last problem
         self._distances: NDArray[np.float64] = np.zeros((0, 0))
 
@@ -57,6 +58,14 @@ class TaskProblems:
             RESOLUTION,
         )
 
+    def check(self, state: TaskState) -> None:
+        """Make sure that every object left can be fetched and delivered.
+
+        Raises:
+            UnreachableError: Objects that cannot be; `names` lists them.
+        """
+        self._places(state)
+
     def length(self, state: TaskState, visits: Sequence[Visit]) -> float:
         """Length of an open tour from the state's position, m.
 
@@ -84,7 +93,9 @@ class TaskProblems:
         places, faults = {}, {}
         for visit, at in wanted.items():
             try:
-                places[visit] = self._snap(at, self._geodesics.max_snap)
+                if at not in self._snapped:
+                    self._snapped[at] = self._snap(at, self._geodesics.max_snap)
+                places[visit] = self._snapped[at]
             except NotNavigableError as error:
                 faults[visit.object] = f"{visit.object} ({visit.kind.value}: {error})"
         if faults:

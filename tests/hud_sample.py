@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from hud.projection import CameraView
 from hud.state import Message
-from hud.task import Status, TaskObject, TaskReceptacle, TaskStep, TaskView
+from hud.task import KnownPlan, Status, TaskObject, TaskReceptacle, TaskStep, TaskView
 
 EYE = (0.0, 0.0, 1.6)
 ROOMS = ("Kitchen", "Living room", "Bedroom", "Office", "Hallway")
@@ -90,10 +90,7 @@ def task(
         order=tuple(o.name for o in sorted(items, key=lambda o: (int(o.name[-2:]) * 7) % 25)),
         hands=(carried[0] if carried else None, carried[1] if len(carried) > 1 else None),
         steps_done=tuple(done),
-        plan=left,
-        segment=way,
-        path=way,
-        goal=goal,
+        ahead=KnownPlan(left, segment=way, path=way, goal=goal),
         eye=EYE,
         message=message,
         clock=clock,

@@ -24,13 +24,12 @@ from hud.messages import message
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView, in_view
 from hud.state import HudState, Marker
-from hud.task import TaskStep, TaskView
+from hud.task import KnownPlan, TaskStep, TaskView
 from mjsim.episode import Episode
 from mjsim.model.scene import Scene, compose
 from mjsim.render import CameraPose, Renderer, render_house_map, render_pictures
 from mjsim.testing import FrameMismatchError, compare_frame, fixtures, psnr
 from mjsim.world import World
-from planner.plan import Visit, VisitKind
 
 Image = NDArray[np.uint8]
 Compare = fixtures.GoldenFrame
@@ -79,11 +78,11 @@ def studio():
     heading = math.atan2(ahead[1], ahead[0])
     direction = np.array([math.cos(heading), math.sin(heading), -0.35])
     pose = CameraPose.looking_at(seen.eye, seen.eye + direction, FOVY)
+    steps = tuple(TaskStep(kind, n) for n in ("object_09", *names[:3]) for kind in ("pick", "place"))
+    goal = tuple(seen.object_positions[names.index("object_09")].tolist())
     view = TaskBoard(house, scene.episode, names[::-1]).view(
         dataclasses.replace(seen, heading=heading),
-        visits=[Visit(k, n) for n in ("object_09", *names[:3]) for k in (VisitKind.PICK, VisitKind.PLACE)],
-        segment=path,
-        path=path,
+        ahead=KnownPlan(steps, segment=path, path=path, goal=goal),
         camera=CameraView(pose.position, pose.rotation, pose.fovy, 640, 480),
     )
     view = dataclasses.replace(view, message=message("started"), clock=83.0)

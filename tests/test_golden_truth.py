@@ -213,7 +213,7 @@ from mjsim.episode import Episode
 from mjsim.render import Renderer, render_pictures
 from mjsim.model.scene import compose
 from mjsim.world import World
-from planner.plan import Visit, VisitKind
+from hud.task import KnownPlan, TaskStep
 import pathlib
 house = House.load("apartment")
 scene = compose(Episode.load(pathlib.Path(sys.argv[1])), house.catalogue)
@@ -221,7 +221,8 @@ world = World(scene)
 seen = world.reset()
 names = list(seen.object_names)
 path = house.geodesics.shortest_path(seen.position, seen.object_positions[9, :2]).points
-view = TaskBoard(house, scene.episode, names).view(seen, visits=[Visit(VisitKind.PICK, names[9])], path=path)
+ahead = KnownPlan((TaskStep("pick", names[9]),), path=path, goal=tuple(seen.object_positions[9]))
+view = TaskBoard(house, scene.episode, names).view(seen, ahead=ahead)
 compositor = Compositor(render_pictures(house.catalogue, 48))
 with Renderer(scene.model, width=320, height=240) as renderer:
     for name in ("none", "highlight-xray", "optimal"):

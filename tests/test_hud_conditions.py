@@ -16,13 +16,19 @@ from hud.options import option_names
 from hud.options.reroute import CLEARANCE
 from hud.schema import from_dict, to_dict
 from hud.state import ChecklistItem, HudState, InventorySlot, MessageKind
-from hud.task import Alternative, TaskStep, TaskView
+from hud.task import Alternative, KnownPlan, TaskStep, TaskView
 
 COUNTS = (6, 12, 18, 24)
 
 
 def shown(name: str, view: TaskView) -> HudState:
     return condition(name)(view)
+
+
+def with_path(view: TaskView, *points: list[float]) -> TaskView:
+    """A view in which another path leads to the next step."""
+    ahead = KnownPlan(view.plan, segment=view.segment, path=np.array(points), goal=view.goal)
+    return dataclasses.replace(view, ahead=ahead)
 
 
 def with_status(view: TaskView, **status: str) -> TaskView:
@@ -171,7 +177,9 @@ def test_optimal_numbers_the_steps_and_highlights_the_next() -> None:
 
 def test_optimal_keeps_the_order_in_which_steps_were_really_done() -> None:
     view = sample.task(6)
-    deviated = dataclasses.replace(view, steps_done=(TaskStep("pick", "object_05"),), plan=view.plan[:3])
+    deviated = dataclasses.replace(
+        view, steps_done=(TaskStep("pick", "object_05"),), ahead=KnownPlan(view.plan[:3])
+    )
     assert [r.text for r in shown("optimal", deviated).checklist] == [
         view.object(n).label for n in ("object_05", "object_00", "object_01", "object_00")
     ]
@@ -186,7 +194,7 @@ def test_optimal_with_everything_done_has_nothing_current_and_nothing_in_the_wor
 def test_optimal_shows_breadcrumbs_along_the_segment_and_the_flagpoles_of_highlight_and_nothing_else() -> (
     None
 ):
-    view = dataclasses.replace(sample.task(12, steps=5), path=np.array([[5.0, 5.0], [6.0, 6.0]]))
+    view = with_path(sample.task(12, steps=5), [5.0, 5.0], [6.0, 6.0])
     state = shown("optimal", view)
     crumbs = tuple(m for m in state.markers if m.role == "breadcrumb")
     assert view.segment is not None and crumbs == breadcrumbs(view.segment)
@@ -196,8 +204,7 @@ def test_optimal_shows_breadcrumbs_along_the_segment_and_the_flagpoles_of_highli
 
 def test_guided_is_optimal_with_its_options() -> None:
     view = dataclasses.replace(
-        sample.task(12, steps=5),
-        path=np.array([[5.0, 5.0], [9.0, 9.0]]),
+        with_path(sample.task(12, steps=5), [5.0, 5.0], [9.0, 9.0]),
         camera=sample.camera(640, 480, yaw=3.0),
     )
     state = shown("guided", view)
@@ -211,7 +218,7 @@ def test_guided_is_optimal_with_its_options() -> None:
 
 
 def test_reroute_adds_nothing_where_there_are_no_breadcrumbs() -> None:
-    view = dataclasses.replace(sample.task(12, steps=5), path=np.array([[5.0, 5.0], [9.0, 9.0]]))
+    view = with_path(sample.task(12, steps=5), [5.0, 5.0], [9.0, 9.0])
     for base in ("none", "highlight"):
         assert shown(f"{base}-reroute-rims", view) == shown(base, view)
 
@@ -239,16 +246,29 @@ def test_the_pointer_is_shown_only_while_the_goal_is_out_of_view() -> None:
     [
         ({"order": ("object_00",)}, "order"),
         ({"hands": ("ghost", None)}, "ghost"),
-        ({"plan": (TaskStep("pick", "ghost"),)}, "ghost"),
         ({"steps_done": (("throw", "object_00"),)}, "throw"),
         ({"receptacles": ()}, "dish_bin"),
-        ({"path": np.zeros((2, 3))}, r"path.*\(2, 3\)"),
-        ({"segment": np.zeros((2, 3))}, r"segment.*\(2, 3\)"),
     ],
 )
 def test_an_inconsistent_view_is_refused_by_name(change: dict[str, object], named: str) -> None:
     with pytest.raises(TaskViewError, match=named):
         dataclasses.replace(sample.task(6), **change)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("asked", "ahead", "named"),
+    [
+        ("plan", KnownPlan((TaskStep("pick", "ghost"),)), "ghost"),
+        ("path", KnownPlan(path=np.zeros((2, 3))), r"path.*\(2, 3\)"),
+        ("segment", KnownPlan(segment=np.zeros((2, 3))), r"segment.*\(2, 3\)"),
+    ],
+)
+def test_an_inconsistent_plan_is_refused_when_it_is_asked_for(
+    asked: str, ahead: KnownPlan, named: str
+) -> None:
+    view = dataclasses.replace(sample.task(6), ahead=ahead)
+    with pytest.raises(TaskViewError, match=named):
+        getattr(view, asked)
 
 
 def test_an_unknown_status_is_refused() -> None:
@@ -407,7 +427,10 @@ def test_a_step_that_was_done_and_can_be_done_again_is_noted_once() -> None:
     mug = dataclasses.replace(plain.objects[0], status="loose")
     again = (TaskStep("pick", plain.objects[1].name), TaskStep("pick", mug.name))
     view = dataclasses.replace(
-        plain, objects=(mug, *plain.objects[1:]), hands=(None, None), plan=again + plain.plan[2:]
+        plain,
+        objects=(mug, *plain.objects[1:]),
+        hands=(None, None),
+        ahead=KnownPlan(again + plain.plan[2:]),
     )
     rows = shown("optimal-regret", knowing(view, Alternative("pick", mug.name, 5.0))).checklist
     assert ["+5.0 m" in row.detail for row in rows[:4]] == [False, False, True, False]

@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 import json
 import math
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
@@ -189,3 +190,34 @@ def test_the_log_knows_the_size_and_hash_of_its_file(tmp_path):
         content = (tmp_path / "events.jsonl").read_bytes()
         assert log.size == memory.size == len(content)
         assert log.hash == memory.hash == int.from_bytes(hashlib.sha1(content).digest()[:8], "little")
+
+
+def test_events_wait_for_those_whose_fields_are_being_worked_out():
+    log, at_once = EventLog(), EventLog()
+    promised = [Future() for _ in range(3)]
+    log.append(0.0, "start")
+    log.append_later(0.04, "plan", promised[0])
+    log.append_later(0.08, "plan", promised[1])
+    log.append(0.12, "picked", object="a")
+    entries = log.entries
+    log.append_later(0.16, "visit", promised[2])
+    for future, fields in zip(promised, ({"cost_m": 1.0}, None, {"kind": "pick"}), strict=True):
+        future.set_result(fields)
+    at_once.append(0.0, "start")
+    at_once.append(0.04, "plan", cost_m=1.0)
+    at_once.append(0.12, "picked", object="a")
+    assert (log.at([0, entries])[0] == [0, at_once.size]).all()
+    assert log.at([entries])[1] == at_once.hash
+    at_once.append(0.16, "visit", kind="pick")
+    assert log.events == at_once.events
+    assert (log.size, log.hash) == (at_once.size, at_once.hash)
+
+
+def test_what_fails_in_working_out_an_event_is_raised_once_and_the_log_goes_on():
+    log, promised = EventLog(), Future()
+    log.append_later(0.0, "plan", promised)
+    promised.set_exception(RecordError("no plan"))
+    with pytest.raises(RecordError, match="no plan"):
+        log.append(0.04, "picked", object="a")
+    log.append(0.08, "end", reason="error")
+    assert [event["event"] for event in log.events] == ["picked", "end"]

@@ -56,8 +56,7 @@ class Recording:
         self._period = max(1, round(CHECKPOINT_PERIOD / world.control_timestep))
         self._first, self._last = first, first
         self._state_hash: list[int] = []
-        self._log_size: list[int] = []
-        self._log_hash: list[int] = []
+        self._log_entries: list[int] = []
         self.checkpoints: dict[int, WorldState] = {}
 
     @property
@@ -81,15 +80,13 @@ class Recording:
 
     def append(self) -> None:
         """Record the state before the next action."""
-        self._log_size.append(self.log.size)
-        self._log_hash.append(self.log.hash)
+        self._log_entries.append(self.log.entries)
         self._state_hash.append(self._world.state_hash())
 
     def extend(self, state_hashes: NDArray[np.uint64]) -> None:
         """Record the states before actions during which nothing was logged, shape (n,)."""
         self._state_hash += state_hashes.tolist()
-        self._log_size += [self.log.size] * len(state_hashes)
-        self._log_hash += [self.log.hash] * len(state_hashes)
+        self._log_entries += [self.log.entries] * len(state_hashes)
 
     @property
     def steps_to_checkpoint(self) -> int:
@@ -109,11 +106,12 @@ class Recording:
         count = len(actions)  # an interruption can fall between recording a step and its action
         kept = {step: state for step, state in self.checkpoints.items() if step < count}
         states = [state.physics for state in kept.values()]
+        log_size, log_hash = self.log.at([*self._log_entries[:count], self.log.entries])
         return Recorded(
             state_hash=np.array(self._state_hash[:count], np.uint64),
             action_hash=action_hashes(actions),
-            log_size=np.array([*self._log_size[:count], self.log.size], np.int64),
-            log_hash=np.array([*self._log_hash[:count], self.log.hash], np.uint64),
+            log_size=log_size,
+            log_hash=log_hash,
             checkpoint_step=np.array(list(kept), np.int64),
             checkpoint_physics=np.array(states) if states else np.zeros((0, 0)),
             checkpoint_details=np.array([state.details_json() for state in kept.values()], np.str_),

@@ -3,10 +3,16 @@
 import contextlib
 import hashlib
 import json
+from collections import deque
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from experiments.errors import RecordError
 from mjsim.files import write_text_atomically
@@ -41,41 +47,86 @@ class EventLog:
         path: File to create, or None to keep the events in memory only.
 
     Attributes:
-        events: Everything logged so far.
-        size: Length of the file so far, bytes.
-        hash: First 64 bits of the SHA-1 of the file so far.
         muted: Whether nothing is logged, because what happens was logged before.
     """
 
     def __init__(self, path: Path | None = None) -> None:
         self._file: TextIO | None = path.open("x", encoding="utf-8") if path else None
-        self.events: list[dict[str, Any]] = []
-        self.size = 0
+        self._events: list[dict[str, Any]] = []
         self._digest = LogDigest()
-        self.hash = self._digest.hash
+        self._waiting: deque[dict[str, Any] | _Promised] = deque()
+        self._sizes, self._hashes = [0], [self._digest.hash]  # of the file after so many entries
         self.muted = False
 
     def append(self, time: float, event: str, **fields: Any) -> None:
         """Log `event` at simulated `time` s, with JSON-ready fields; nothing while the log is muted."""
         if self.muted:
             return
-        self._append({"t": round(time, 6), "event": event, **fields})
+        self._waiting.append({"t": round(time, 6), "event": event, **fields})
+        self._settle(wait=False)
+
+    def append_later(self, time: float, event: str, fields: "Future[Mapping[str, Any] | None]") -> None:
+        """Log an event whose fields are being worked out; none if they are None. Later events wait for it.
+
+        What raises in working them out is raised by whatever uses the log next.
+        """
+        if not self.muted:
+            self._waiting.append(_Promised(time, event, fields))
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """Everything logged so far."""
+        self._settle(wait=True)
+        return self._events
+
+    @property
+    def size(self) -> int:
+        """Length of the file so far, bytes."""
+        self._settle(wait=True)
+        return self._sizes[-1]
+
+    @property
+    def hash(self) -> int:
+        """First 64 bits of the SHA-1 of the file so far."""
+        self._settle(wait=True)
+        return self._hashes[-1]
+
+    @property
+    def entries(self) -> int:
+        """How many events were logged so far, those included whose fields are being worked out."""
+        return len(self._sizes) - 1 + len(self._waiting)
+
+    def at(self, entries: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
+        """What size and hash were after so many `entries`, each of shape (n,)."""
+        self._settle(wait=True)
+        return np.array(self._sizes, np.int64)[entries], np.array(self._hashes, np.uint64)[entries]
 
     def extend(self, lines: Sequence[str]) -> None:
         """Log again what `lines` gave of another log."""
         for line in lines:
-            self._append(json.loads(line))
+            self._waiting.append(json.loads(line))
+        self._settle(wait=False)
 
     def lines(self, first: int = 0) -> list[str]:
         """The lines of the events from the `first` on, without their ends."""
         return [json.dumps(event) for event in self.events[first:]]
 
-    def _append(self, line: dict[str, Any]) -> None:
-        self.events.append(line)
-        text = json.dumps(line) + "\n"
-        self.size += len(text)  # JSON is written as ASCII
+    def _settle(self, *, wait: bool) -> None:
+        """Write what waits, up to the first event whose fields are not known unless it shall `wait` for them."""
+        while self._waiting:
+            entry = self._waiting[0]
+            if not wait and isinstance(entry, _Promised) and not entry.fields.done():
+                return
+            self._waiting.popleft()
+            self._append(entry.line() if isinstance(entry, _Promised) else entry)
+
+    def _append(self, line: dict[str, Any] | None) -> None:
+        text = "" if line is None else json.dumps(line) + "\n"
         self._digest.update(text.encode())
-        self.hash = self._digest.hash
+        self._sizes.append(self._sizes[-1] + len(text))  # JSON is written as ASCII
+        self._hashes.append(self._digest.hash)
+        if line is not None:
+            self._events.append(line)
         if self._file:
             try:
                 self._file.write(text)
@@ -101,6 +152,20 @@ class EventLog:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._close()
+
+
+@dataclass(frozen=True, eq=False)
+class _Promised:
+    """An event whose fields are being worked out."""
+
+    time: float
+    event: str
+    fields: "Future[Mapping[str, Any] | None]"
+
+    def line(self) -> dict[str, Any] | None:
+        """What is logged; waits for the fields."""
+        fields = self.fields.result()
+        return None if fields is None else {"t": round(self.time, 6), "event": self.event, **fields}
 
 
 class LogDigest:

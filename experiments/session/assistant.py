@@ -1,17 +1,19 @@
 """The assistant: sees the whole house, plans, compares each visit with its plan, and says what the HUD shows."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.participants.base import Choice, Guidance
 from experiments.runs.records import EventLog
+from experiments.session.planning import Planning
 from experiments.session.reach_bound import reach_bound
 from experiments.session.regrets import Regrets
 from experiments.session.shown_path import TOLERANCE, PathsToNext
-from experiments.session.task_board import TaskBoard
+from experiments.session.task_board import PlanShown, TaskBoard
 from experiments.session.user_code import shown_by
 from experiments.session.visit_fields import PlaceDistances, alternatives, as_json
 from hud.conditions import condition
@@ -22,6 +24,7 @@ from mjsim.actions import EventKind, WorldEvent
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
 from planner.plan import Status, Visit, VisitKind
+from planner.regret import Regret
 from planner.route import XY, Route, RoutePlanner, TaskState
 
 PLAN_ROLES = frozenset({BREADCRUMB, GOAL})
@@ -32,8 +35,7 @@ VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLAC
 class Assistant:
     """Keeps a route for the state of the task, and says what the HUD shows.
 
-    It plans in every condition, because deviations are counted against its plan in all of them (PAPER section 6);
-    whether the plan is shown is up to the condition.
+    It plans in every condition; whether the plan is shown is up to the condition.
 
     Args:
         board: Describes the task to the condition.
@@ -43,6 +45,7 @@ class Assistant:
         regrets: Works out what alternatives cost; None for one whose answers repeat.
         log_regrets: Whether the regret of every visit is logged.
         options: Rules of the world, for how much a person carries.
+        background: Whether plans that nobody sees are made in a thread (`Planning`).
 
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
@@ -59,21 +62,24 @@ class Assistant:
         regrets: Regrets | None = None,
         log_regrets: bool = False,
         options: WorldOptions | None = None,
+        background: bool = False,
     ) -> None:
         self._board, self._house, self._episode = board, board.house, board.episode
         self._assistance, self._show = assistance, condition(assistance)
-        self._planner = planner
         self._log = log
         self._options = options or WorldOptions()
         self._regrets = regrets or Regrets(self._house.geodesics, self._options.capacity)
+        self._planning = Planning(planner, self._regrets, log, background=background)
         self._log_regrets = log_regrets
         self._number = {placed.name: i for i, placed in enumerate(self._episode.objects)}
         self._approaches = {
             name: self._house.receptacles[key].approach[:2] for name, key in self._episode.targets.items()
         }
         self._deliveries = {name: _xy(approach) for name, approach in self._approaches.items()}
-        self._route: Route | None = None
         self._paths = PathsToNext(self._house.geodesics)
+        self._leads_from: tuple[NDArray[np.float64], Observation] | None = (
+            None  # what the paths are not begun from yet
+        )
         self._visits = 0
         self.shown_roles: frozenset[str] = frozenset()
         self.shows_plan = self._rerouted = False
@@ -90,6 +96,8 @@ class Assistant:
         self._rerouted = state.rerouted
         numbered = any(item.number is not None for item in state.checklist)
         self.shows_plan = numbered or not self.shown_roles.isdisjoint(PLAN_ROLES)
+        if self.shows_plan:
+            self._planning.stay()
 
     def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
         """Take note of the last control step, and of what happened in it; replan where the person left the plan."""
@@ -100,16 +108,15 @@ class Assistant:
         if events:
             self._plan(observation)
             return
-        if self._planner.pending:
-            self._improve(observation)
-        visit = self._next
-        if visit is not None:
+        if self.expecting and self._planning.improve(observation.time, self.task_state(observation)):
+            self._begin_path(observation)
+        if self._leads_from is None and (visit := self._planning.next) is not None:
             self._paths.follow(observation.position, *self._places(observation, visit))
 
     @property
     def expecting(self) -> bool:
         """Whether a better plan may turn up at any moment, so that every control step has to be observed."""
-        return self._planner.pending
+        return self._planning.planner.pending
 
     def observe_walk(self, positions: NDArray[np.float64], observation: Observation) -> None:
         """Take note of a walk on which nothing happened and nothing moved, as `observe` of each step would.
@@ -118,8 +125,7 @@ class Assistant:
             positions: Where the person was after every control step, m, shape (n, 2).
             observation: State at the end.
         """
-        visit = self._next
-        if visit is not None:
+        if self._leads_from is None and (visit := self._planning.next) is not None:
             self._paths.path.follow_walk(positions, *self._places(observation, visit))
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
@@ -134,21 +140,19 @@ class Assistant:
         """What the HUD shows now; a condition needs the eye camera to point to a goal out of view."""
         view = self._board.view(
             observation,
-            visits=self._route.visits if self._route else (),
-            segment=None if self._next is None else self._paths.segment.points,
-            path=None if self._next is None else self._paths.path.ahead(observation.position),
+            ahead=PlanShown(self._board, observation, lambda: self._planning.route, self._paths_to),
             capacity=self._options.capacity,
             camera=camera,
-            regrets=self._regrets.known,
+            regrets=self._known_regrets,
         )
         return shown_by(self._show, self._assistance, view)
 
     def guidance(self, observation: Observation) -> Guidance | None:
         """The next step and the path that the breadcrumbs mark; None where there are none, or when all is done."""
-        visit = self._next
-        if visit is None or BREADCRUMB not in self.shown_roles:
+        if BREADCRUMB not in self.shown_roles or (visit := self._planning.next) is None:
             return None
-        shown = self._paths.path if self._rerouted else self._paths.segment
+        paths = self._paths_to(visit)
+        shown = paths.path if self._rerouted else paths.segment
         return Guidance(visit, shown.points, self._goal(observation, visit), TOLERANCE)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
@@ -161,11 +165,12 @@ class Assistant:
                 found.capped,
                 functools.partial(self._regrets.exact, visit),
             )
-            for visit, found in self._regrets.known().items()
+            for visit, found in self._known_regrets().items()
         )
 
     def finish(self, time: float) -> None:
         """The task is over: log the regrets of visits that were not known in time."""
+        self._planning.stay()
         self._regrets.close()
         for (number, names), regret in self._regrets.later():
             self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
@@ -180,91 +185,81 @@ class Assistant:
             deliveries=self._deliveries,
         )
 
-    @property
-    def _next(self) -> Visit | None:
-        return self._route.next if self._route else None
+    def _known_regrets(self) -> Mapping[Visit, Regret]:
+        """Regrets of all possible next visits; empty as long as they are not known."""
+        _ = self._planning.route  # the regrets are those beside the plan
+        return self._regrets.known()
 
     def _note_visit(self, observation: Observation, event: WorldEvent) -> None:
-        made, suggested = Visit(VISIT_KIND[event.kind], event.object), self._next
-        here = observation.position.copy()
-        walk = self._house.body_geodesics.shortest_path(self._last_visit_at, here)
-        self._log.append(
-            event.time,
-            "visit",
-            kind=made.kind.value,
-            object=made.object,
-            suggested=as_json(suggested) if suggested else None,
-            deviated=self._route is not None and suggested != made,
-            **alternatives(self._state, made, suggested, self._episode.targets, self._options.capacity),
-            **self._regret_fields(made, suggested),
-            position=[round(float(v), 6) for v in here],
-            geodesic_m=round(walk.geodesic_distance, 6),
-            location_m=round(self._places_visited.next(self._state, made), 6),
+        made, here, state = (
+            Visit(VISIT_KIND[event.kind], event.object),
+            observation.position.copy(),
+            self._state,
         )
+        walk = self._house.body_geodesics.shortest_path(self._last_visit_at, here)
+        location, number = self._places_visited.next(state, made), self._visits
+
+        def fields(route: Route | None) -> dict[str, Any]:
+            suggested = route.next if route else None
+            return {
+                "kind": made.kind.value,
+                "object": made.object,
+                "suggested": as_json(suggested) if suggested else None,
+                "deviated": route is not None and suggested != made,
+                **alternatives(state, made, suggested, self._episode.targets, self._options.capacity),
+                **self._regret_fields(number, made, route),
+                "position": [round(float(v), 6) for v in here],
+                "geodesic_m": round(walk.geodesic_distance, 6),
+                "location_m": round(location, 6),
+            }
+
+        self._planning.log(event.time, "visit", fields)
         self._visits += 1
         self._last_visit_at = here
         self._board.note_visit(made)
 
-    def _regret_fields(self, made: Visit, suggested: Visit | None) -> dict[str, float | None]:
+    def _regret_fields(self, number: int, made: Visit, route: Route | None) -> dict[str, float | None]:
         """Extra cost of a visit and of the suggested one, if that is wanted."""
         if not self._log_regrets:
             return {}
-        if suggested is None or suggested == made:
-            return self._regret(("regret_m", "suggested_regret_m"), made)
-        return self._regret(("regret_m",), made) | self._regret(("suggested_regret_m",), suggested)
+        suggested = route.next if route else None
 
-    def _regret(self, names: tuple[str, ...], visit: Visit) -> dict[str, float | None]:
-        """Extra cost of a visit, m, to be logged under these names. The next one of a plan that is proven has none."""
-        regret: float | None = 0.0
-        if self._route is None or self._route.plan.status is not Status.OPTIMAL or self._next != visit:
-            regret = _rounded(self._regrets.evaluate((self._visits, names), visit))
-        return dict.fromkeys(names, regret)
+        def regret(names: tuple[str, ...], visit: Visit) -> dict[str, float | None]:
+            """Under these names; the next visit of a plan that is proven has none."""
+            found: float | None = 0.0
+            if route is None or route.plan.status is not Status.OPTIMAL or suggested != visit:
+                found = _rounded(self._regrets.evaluate((number, names), visit))
+            return dict.fromkeys(names, found)
+
+        if suggested is None or suggested == made:
+            return regret(("regret_m", "suggested_regret_m"), made)
+        return regret(("regret_m",), made) | regret(("suggested_regret_m",), suggested)
 
     def _plan(self, observation: Observation) -> None:
         """Follow the plan on, or make a new one where the task is no longer as planned."""
-        replans, first = self._planner.replans, self._route is None
+        before = self._planning.planner.replans if self.shows_plan else 0
         self._state = state = self.task_state(observation)
-        self._route = self._planner.update(state, shown=self.shows_plan)
-        self._regrets.begin(state, self._route.plan)
+
+        def more(first: Route) -> dict[str, float]:
+            bound = reach_bound(round(first.plan.lower_bound, 6), self._house, self._episode)
+            return {"reach_bound_m": round(bound, 6)}
+
+        self._planning.update(observation.time, state, shown=self.shows_plan, more=more)
         self._begin_path(observation)
-        replanned = self._planner.replans > replans
-        if first:
-            bound = reach_bound(round(self._route.plan.lower_bound, 6), self._house, self._episode)
-            self._log_plan(observation, self._route, reach_bound_m=round(bound, 6))
-        elif replanned:
-            self._log_plan(observation, self._route)
-        if replanned and not first and self.shows_plan:
+        if self.shows_plan and self._planning.planner.replans > before:
             self._board.announce_replan(observation.time)
 
-    def _improve(self, observation: Observation) -> None:
-        """Take up a better plan for the same task, found in the background."""
-        better = self._planner.poll(self.task_state(observation))
-        if better is None:
-            return
-        changed = self._route is None or better.visits != self._route.visits
-        self._route = better
-        self._log_plan(observation, better, improved=True)
-        if changed:
-            self._begin_path(observation)
-
     def _begin_path(self, observation: Observation) -> None:
-        """Show the way to the next visit: the segment from the last one, and the path from here."""
-        visit = self._next
-        if visit is not None:
-            places = self._places(observation, visit)
-            self._paths.begin(self._last_visit_at, observation.position, *places)
+        """From now on, show the way to the next visit: the segment from the last one, and the path from here."""
+        self._leads_from = self._last_visit_at, observation
 
-    def _log_plan(self, observation: Observation, route: Route, **more: bool | float) -> None:
-        # Cost and bound are those of the state that the plan was made for; a better plan comes a little later.
-        self._log.append(
-            observation.time,
-            "plan",
-            cost_m=round(route.plan.cost, 6),
-            lower_bound_m=round(route.plan.lower_bound, 6),
-            status=route.plan.status.value,
-            visits=[as_json(v) for v in route.visits],
-            **more,
-        )
+    def _paths_to(self, visit: Visit) -> PathsToNext:
+        """The paths to the next visit; nothing is done about them before a condition asks for them."""
+        if self._leads_from is not None:
+            last_visit, observation = self._leads_from
+            self._leads_from = None
+            self._paths.begin(last_visit, observation.position, *self._places(observation, visit))
+        return self._paths
 
     def _position_of(self, observation: Observation, name: str) -> NDArray[np.float64]:
         return observation.object_positions[self._number[name], :2]

@@ -2,20 +2,23 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
+from experiments.session.shown_path import PathsToNext
 from hud.messages import fade, message
 from hud.projection import CameraView
 from hud.state import Message, Vec3
-from hud.task import Alternative, TaskObject, TaskReceptacle, TaskStep, TaskView
+from hud.task import Alternative, KnownPlan, PlanAhead, TaskObject, TaskReceptacle, TaskStep, TaskView
 from mjsim.episode import CAPACITY, Episode
 from mjsim.observation import ObjectStatus, Observation
 from planner.plan import Visit, VisitKind
 from planner.regret import Regret
+from planner.route import Route
 
 READING_TIME = 2.0  # s that a message is shown before the announcement of a new plan takes its place
 REPLANNED = "replanned"
@@ -39,6 +42,56 @@ class _Shown(NamedTuple):
     key: str
     since: float
     object: str | None = None
+
+
+class PlanShown:
+    """What the planner suggests in one state of the world; worked out when a condition asks for it (`PlanAhead`).
+
+    Args:
+        board: Describes the task.
+        observation: State of the world.
+        route: Gives the route.
+        paths: Gives the paths to its next visit.
+    """
+
+    def __init__(
+        self,
+        board: "TaskBoard",
+        observation: Observation,
+        route: Callable[[], Route | None],
+        paths: Callable[[Visit], PathsToNext],
+    ) -> None:
+        self._board, self._observation, self._paths = board, observation, paths
+        self._route = route
+
+    @cached_property
+    def steps(self) -> tuple[TaskStep, ...]:
+        """Remaining steps in planned order."""
+        route = self._route()
+        return () if route is None else tuple(task_step(visit) for visit in route.visits)
+
+    @cached_property
+    def segment(self) -> NDArray[np.float64] | None:
+        """Floor points of the plan's segment to the next visit, m, shape (k, 2)."""
+        visit = self._next
+        return None if visit is None else self._paths(visit).segment.points
+
+    @cached_property
+    def path(self) -> NDArray[np.float64] | None:
+        """Floor points of the path from the person to the next visit, m, shape (k, 2)."""
+        visit = self._next
+        return None if visit is None else self._paths(visit).path.ahead(self._observation.position)
+
+    @cached_property
+    def goal(self) -> Vec3 | None:
+        """Where the next visit happens, m."""
+        visit = self._next
+        return None if visit is None else self._board.goal(self._observation, visit)
+
+    @property
+    def _next(self) -> Visit | None:
+        route = self._route()
+        return None if route is None else route.next
 
 
 class TaskBoard:
@@ -88,9 +141,7 @@ class TaskBoard:
         self,
         observation: Observation,
         *,
-        visits: Sequence[Visit] = (),
-        segment: NDArray[np.float64] | None = None,
-        path: NDArray[np.float64] | None = None,
+        ahead: PlanAhead = KnownPlan(),  # noqa: B008 - it never changes
         capacity: int = CAPACITY,
         camera: CameraView | None = None,
         regrets: Callable[[], Mapping[Visit, Regret]] = dict,
@@ -99,9 +150,7 @@ class TaskBoard:
 
         Args:
             observation: State of the world.
-            visits: Remaining visits in planned order.
-            segment: Floor points of the plan's segment to the next visit, m, shape (k, 2).
-            path: Floor points of the path from the person to the next visit, m, shape (k, 2).
+            ahead: What the planner suggests.
             capacity: How many objects the person carries at most.
             camera: The eye camera.
             regrets: Gives the regrets of visits that are possible next.
@@ -113,10 +162,7 @@ class TaskBoard:
             hands=observation.hands,
             capacity=capacity,
             steps_done=tuple(self._done),
-            plan=tuple(task_step(visit) for visit in visits),
-            segment=segment,
-            path=path,
-            goal=self._goal(observation, visits[0]) if visits else None,
+            ahead=ahead,
             position=(float(observation.position[0]), float(observation.position[1])),
             eye=_vec3(observation.eye),
             message=self._message(observation.time),
@@ -149,7 +195,8 @@ class TaskBoard:
         model = next(o.model for o in self.episode.objects if o.name == name)
         return self.house.catalogue.objects[model].label
 
-    def _goal(self, observation: Observation, visit: Visit) -> Vec3:
+    def goal(self, observation: Observation, visit: Visit) -> Vec3:
+        """Where a visit happens: the object itself, or the middle of the receptacle, m."""
         if visit.kind is VisitKind.PICK:
             return _vec3(observation.object_positions[observation.object_names.index(visit.object)])
         return _vec3(self.house.receptacles[self.episode.targets[visit.object]].center)

@@ -26,6 +26,7 @@ from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
+from planner.exact.solver import ExactSolver
 from planner.replanner import Replanner
 from planner.route import RoutePlanner
 from planner.solver import solver
@@ -154,6 +155,9 @@ def _make_assistant(
 ) -> Assistant:
     """The assistant of a trial; for a live one, all that takes long is done before the clock starts."""
     geodesics = board.house.geodesics
+    background = replanner is None and isinstance(
+        solver(config.planner), ExactSolver
+    )  # others' may use no threads
     replanner = replanner or Replanner(geodesics, solver(config.planner), capacity=config.capacity)
     regrets = (LiveRegrets if config.live else Regrets)(geodesics, config.capacity)
     assistant = Assistant(
@@ -164,6 +168,7 @@ def _make_assistant(
         regrets=regrets,
         log_regrets=config.regret,
         options=world.options,
+        background=background,
     )
     if config.live:
         state = assistant.task_state(world.observation())
