@@ -59,7 +59,7 @@ def act(house: House) -> None:
 
 def play(house: House) -> None:
     """Play the beginning of a trial in every condition."""
-    scene = compose(house.sample_episode(objects=2, seed=0), house.catalogue)
+    scene = compose(house.sample_episode(objects=2, seed=0), house.catalogue, visuals=False)
     for assistance in condition_names():
         for fidelity, until in TRIALS:
             config = TrialConfig(
