@@ -12,7 +12,8 @@ from mjsim.model.clearance import ClearanceField
 from mjsim.model.scene import Scene, compose
 from mjsim.motion_parameters import CarryingParameters
 from mjsim.options import FIDELITIES, WorldOptions
-from mjsim.person.postures import BodyMotion, Contacts, Hands, Holding, drawn_in, update_hands
+from mjsim.person.load_room import BodyMotion, drawn_in
+from mjsim.person.postures import Contacts, Hands, Holding, update_hands
 from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
 

@@ -8,7 +8,7 @@ import pytest
 from experiments.data_dictionary import data_dictionary
 from experiments.files import read_json
 from experiments.runs import records
-from experiments.runs.event_types import check_event
+from experiments.runs.event_checks import check_event
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 

@@ -20,7 +20,7 @@ from experiments.replaying.record_checks import (
     check_log_hashes,
 )
 from experiments.runs import records
-from experiments.runs.event_types import check_event
+from experiments.runs.event_checks import check_event
 from experiments.runs.recording import Recorded
 from experiments.runs.records import Event
 from experiments.runs.trajectory import STATUS_CODE, decode_action

@@ -1,10 +1,9 @@
 """The events of a log, one type for each line of `events.jsonl`; docs/data.md is made from them."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
-from experiments.errors import RecordError
 from mjsim.actions import EventKind, Refusal
 from planner.plan import Status, VisitKind
 
@@ -289,31 +288,3 @@ TYPES: tuple[type[Logged], ...] = (
     Blur,
     End,
 )
-
-
-def _decoder() -> msgspec.json.Decoder[Any]:
-    union: Any = Start
-    outcomes = [
-        msgspec.defstruct(
-            kind.name.title(), [], bases=(Outcome,), frozen=True, tag_field="event", tag=kind.value
-        )
-        for kind in EventKind
-    ]
-    for member in (*TYPES[1:], *outcomes):
-        union = union | member
-    return msgspec.json.Decoder(union)
-
-
-_DECODER = _decoder()
-
-
-def check_event(line: bytes) -> None:
-    """Check that a line of a log is an event with the fields of its kind.
-
-    Raises:
-        RecordError: It is not; the message says where.
-    """
-    try:
-        _DECODER.decode(line)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise RecordError(f"events.jsonl has a line that is no event: {error}") from error

@@ -13,7 +13,8 @@ from mjsim.fidelity.trunk_contact import Floor
 from mjsim.kernels import kernel
 from mjsim.model.clearance import ClearanceField
 from mjsim.motion_parameters import CarryingParameters
-from mjsim.person.postures import BodyMotion, Contacts, Hands, Holding, update_hands
+from mjsim.person.load_room import BodyMotion
+from mjsim.person.postures import Contacts, Hands, Holding, update_hands
 from mjsim.rollout import RolloutArrays
 
 Floats = NDArray[np.float64]

@@ -22,8 +22,8 @@ from mjsim.fidelity.kinematic_world import KinematicWorld
 from mjsim.fidelity.motion_primitives import HandMovement, MotionTrajectory
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.person.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
+from mjsim.person.load_room import BodyMotion
 from mjsim.person.placing import hover_height, square_heading
-from mjsim.person.postures import BodyMotion
 from mjsim.person.slots import LoadExtent, Slot, best_slot, object_corners
 
 Vector = NDArray[np.float64]

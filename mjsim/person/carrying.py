@@ -16,15 +16,9 @@ from mjsim.model.carry_clearance import carry_clearance
 from mjsim.model.clearance import ClearanceField
 from mjsim.model.scene import Scene
 from mjsim.motion_parameters import CarryingParameters
+from mjsim.person.load_room import BodyMotion, drawn_in
 from mjsim.person.person import Person
-from mjsim.person.postures import (
-    BodyMotion,
-    Contacts,
-    Hands,
-    Holding,
-    drawn_in,
-    update_hands,
-)
+from mjsim.person.postures import Contacts, Hands, Holding, update_hands
 from mjsim.person.slots import object_corners
 from mjsim.person.strain import count_strain
 

@@ -1,8 +1,7 @@
-"""One control step of the hands' postures, as numba kernels: where a load has room, and how a target moves there.
+"""One control step of the hands' postures, as numba kernels: how a target moves to where there is room.
 
-A person draws a box in when passing a door frame. A hand looks up the clearance around the place where it will be
-shortly, and moves away from what is too near. If its load touches something static all the same, the hand gives way
-along the contact's normal, up to a limit. From there on the body does not walk or turn into the contact.
+If a load touches something static all the same (`mjsim.person.load_room`), the hand gives way along the contact's
+normal, up to a limit. From there on the body does not walk or turn into the contact.
 
 Arrays belong to the `Rig` and to `Carrying`, and are changed in place.
 """
@@ -14,36 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
-from mjsim.model.clearance import ClearanceField, clearance_at
 from mjsim.motion_parameters import CarryingParameters, MotionParameters
+from mjsim.person.load_room import FORWARD, HEADING, LEFT, TURN, BodyMotion, drawn_in
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-# Layout of `Rig.pose` and of `Rig.motion`.
-X, Y, HEADING = 0, 1, 2
-FORWARD, LEFT, TURN = 0, 1, 2
-
-ROUNDS = 3
-# Of the line from the body's axis to the posture.
-EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
 
 _ARRIVED = 0.0005  # m
-
-
-class BodyMotion(NamedTuple):
-    """Where the body is, its command, and what is around it.
-
-    Attributes:
-        pose: x, y, heading and more, m and rad, shape (10,) or longer.
-        command: Commanded velocity in the body frame (forward, left), m/s, and yaw rate, rad/s, shape (3,) or longer.
-        clearance: Clearance at the heights of what is carried.
-    """
-
-    pose: Floats
-    command: Floats
-    clearance: ClearanceField
 
 
 class Hands(NamedTuple):
@@ -169,82 +147,6 @@ def move_hand(
     velocities[hand, 2] += cz * share
     for axis in range(3):
         targets[hand, axis] += velocities[hand, axis] * dt
-
-
-@kernel
-def drawn_in(
-    forward: float, left: float, radius: float, body: BodyMotion, carrying: CarryingParameters
-) -> tuple[float, float]:
-    """Place nearest to a posture (forward, left), m, where a load is clear of the house, now and shortly.
-
-    First a shift sideways, as past a door frame. If that is not enough, a place between the body's axis and the
-    posture, as far out as the line from the axis is clear: the far side of a wall is clear, too, but out of reach.
-    """
-    needed = radius + carrying.margin
-    shift_f, shift_l = _sideways(forward, left, needed, body, carrying)
-    forward, left = forward + shift_f, left + shift_l
-    if _clear_throughout(forward, left, needed, body, carrying):
-        return forward, left
-    best_f, best_l, best_room, before = 0.0, 0.0, -math.inf, -math.inf
-    for share in EXTENSIONS:
-        at_f, at_l = share * forward, share * left
-        room = math.inf
-        for horizon in (0.0, carrying.near, carrying.far):
-            there, _, _ = _room(at_f, at_l, horizon, body)
-            room = min(room, there)
-        room -= radius
-        clear = room >= 0.5 * carrying.margin
-        if not clear and room < before:
-            break
-        if clear or room > best_room:
-            best_f, best_l, best_room = at_f, at_l, room
-        before = room
-    return best_f, best_l
-
-
-@kernel
-def _clear_throughout(
-    forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
-) -> bool:
-    """Whether a load is clear between axis and posture, as the clearance at both ends and their distance tell."""
-    length = math.sqrt(forward * forward + left * left)
-    for horizon in (0.0, carrying.near, carrying.far):
-        axis, _, _ = _room(0.0, 0.0, horizon, body)
-        there, _, _ = _room(forward, left, horizon, body)
-        if min(axis, there, 0.5 * (axis + there - length)) < needed:
-            return False
-    return True
-
-
-@kernel
-def _sideways(
-    forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
-) -> tuple[float, float]:
-    """Shift in the body frame, away from what is too near."""
-    shift_f, shift_l = 0.0, 0.0
-    for horizon in (0.0, carrying.near, carrying.far):
-        for _ in range(ROUNDS):
-            room, away_f, away_l = _room(forward + shift_f, left + shift_l, horizon, body)
-            if room >= needed:
-                break
-            shift_f += (needed - room) * away_f
-            shift_l += (needed - room) * away_l
-    size = math.hypot(shift_f, shift_l)
-    limit = min(1.0, carrying.most_shift / size) if size > 0.0 else 1.0
-    return shift_f * limit, shift_l * limit
-
-
-@kernel
-def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tuple[float, float, float]:
-    """Clearance, m, in `horizon` seconds at a point of the body frame, and the direction of more clearance."""
-    pose, command = body.pose, body.command
-    forward += command[FORWARD] * horizon
-    left += command[LEFT] * horizon
-    heading = pose[HEADING] + command[TURN] * horizon
-    c, s = math.cos(heading), math.sin(heading)
-    x, y = pose[X] + c * forward - s * left, pose[Y] + s * forward + c * left
-    room, away_x, away_y = clearance_at(x, y, body.clearance)
-    return room, c * away_x + s * away_y, c * away_y - s * away_x
 
 
 @kernel
