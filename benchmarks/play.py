@@ -1,19 +1,21 @@
 """`mjsim play` from outside: how fast it answers, what a session costs, and what it does when all goes wrong."""
 
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from benchmarks.support.play_faults import measure_faults
 from benchmarks.support.play_fuzz import measure_fuzz
 from benchmarks.support.play_load import load, measure_latency, measure_masher
+from benchmarks.support.play_pages import measure_pages
 from benchmarks.support.requirements import Requirement, requirement_lines
 
 FAULTS, QUICK_FAULTS = 200, 10
 MESSAGES, QUICK_MESSAGES = 10_000, 300
 MESSAGES_PER_REQUEST = 10
 MINUTES, QUICK_MINUTES = 60.0, 0.5
+OBJECTS, QUICK_OBJECTS = 6, 1
 SECONDS, QUICK_SECONDS = 20.0, 4.0
 SEED = 13
 FAST = ("--fidelity", "event")
@@ -38,6 +40,14 @@ REQUIREMENTS = {
         Requirement("sessions a core can serve with JPEG frames", "sessions_a_core", ">=", 3.0),
         Requirement("sessions a core can serve with states", "state_sessions_a_core", ">=", 10.0),
     ),
+    "pages": (
+        Requirement("tasks that were not done by keys", "undone", "<=", 0),
+        Requirement("tasks unlike their replay", "unlike_replay", "<=", 0),
+        Requirement(
+            "first frame after the click, 10 Mbit/s and 80 ms each way, s", "first_frame_s", "<=", 10.0
+        ),
+        Requirement("transferred until then, MB", "first_frame_mb", "<", 10.0),
+    ),
     "masher": (
         Requirement("growth of a worker's memory", "worker_growth", "<=", 0.05),
         Requirement("growth of the server's memory", "server_growth", "<=", 0.05),
@@ -46,7 +56,12 @@ REQUIREMENTS = {
 
 
 def measure(
-    *, faults: int = 0, messages: int = 0, minutes: float = 0.0, quick: bool = False
+    *,
+    faults: int = 0,
+    messages: int = 0,
+    minutes: float = 0.0,
+    objects: Sequence[int] = (),
+    quick: bool = False,
 ) -> dict[str, Any]:
     """Run the benchmark, or only the parts whose size is given; everything in it can be written as JSON.
 
@@ -54,12 +69,14 @@ def measure(
         faults: How many times to disturb a session.
         messages: How many odd messages to send; a tenth as many odd requests.
         minutes: How long to press keys at random.
+        objects: How many objects to put away by keys in Chromium, in every condition.
         quick: A smaller run.
     """
-    whole = not (faults or messages or minutes)
+    whole = not (faults or messages or minutes or objects)
     if whole:
         faults, messages = (QUICK_FAULTS, QUICK_MESSAGES) if quick else (FAULTS, MESSAGES)
         minutes = QUICK_MINUTES if quick else MINUTES
+        objects = (QUICK_OBJECTS if quick else OBJECTS,)
     result: dict[str, Any] = {"load": load()}
     words = FAST if quick else ()
     with tempfile.TemporaryDirectory(prefix="mjsim-play-") as name:
@@ -67,6 +84,8 @@ def measure(
         if whole:
             found = measure_latency(_place(folder, "latency"), QUICK_SECONDS if quick else SECONDS, *words)
             result["latency"] = {"cases": found, **_ratios(found)}
+        for count in objects:
+            result["pages"] = measure_pages(folder, count, *words)
         if faults:
             result["faults"] = measure_faults(_place(folder, "faults"), faults, SEED, *words)
         if messages:
@@ -97,6 +116,9 @@ def _details(part: str, found: Mapping[str, Any]) -> Iterator[str]:
                 f"{case['kbit_s']:.0f} kbit/s, {case['memory_mb']:.0f} MB, {case['cores']:.2f} cores, "
                 f"server {case['server_cores']:.2f}"
             )
+    elif part == "pages":
+        for name, task in found["tasks"].items():
+            yield f"{name}: " + ", ".join(f"{key} {value}" for key, value in task.items())
     elif part == "faults":
         yield f"{found['faults']} faults; seconds until the session went on, median, 95 %, longest:"
         for name, (median, most, longest) in found["resume_s"].items():
