@@ -43,17 +43,17 @@ class Link:
 
 @dataclass(frozen=True)
 class SeenFrame:
-    """A frame that arrived.
+    """A frame or state that arrived.
 
     Attributes:
         at: When, as `time.perf_counter` has it.
         input: Number of the last input that counts in it.
-        size: Bytes.
+        width: Of a frame, px; 0 for a state.
     """
 
     at: float
     input: int
-    size: int
+    width: int
 
 
 class SimulatedBrowser:
@@ -69,7 +69,7 @@ class SimulatedBrowser:
     Attributes:
         next: Number of the next input.
         acknowledged: Number of the last input that is safe.
-        frames: Those that came.
+        frames: Those that came, and the states.
         last: Type -> the latest message of it.
         sent_at: Number of an input -> when it was sent.
     """
@@ -206,12 +206,14 @@ class SimulatedBrowser:
     def _take(self, message: str | bytes) -> None:
         self.bytes += len(message)
         if isinstance(message, bytes):
-            _, _, _, _, _, _, number, _, shown, _ = FRAME_HEAD.unpack_from(message)
-            self.frames.append(SeenFrame(time.perf_counter(), shown, len(message)))
+            _, _, _, _, width, _, number, _, shown, _ = FRAME_HEAD.unpack_from(message)
+            self.frames.append(SeenFrame(time.perf_counter(), shown, width))
             self.say(type="seen", frame=number)
             return
         content = json.loads(message)
         self.last[content["type"]] = content
+        if content["type"] == "state":
+            self.frames.append(SeenFrame(time.perf_counter(), content["input"], 0))
         if content["type"] == "taken":
             self.acknowledged = max(self.acknowledged, content["input"])
             self._waiting = [new for new in self._waiting if new["number"] > content["input"]]

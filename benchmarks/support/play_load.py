@@ -1,6 +1,7 @@
 """How fast `mjsim play` answers, what a session costs, and whether hours of play leave anything behind."""
 
 import asyncio
+import math
 import os
 import time
 from pathlib import Path
@@ -37,36 +38,85 @@ async def _latency(
 ) -> dict[str, float]:
     address = server.begin()
     browser = SimulatedBrowser(address, codec=codec, state=state, link=link)
-    await begin_task(browser)
-    await browser.until(lambda: bool(browser.frames) or codec == "none")
-    await asyncio.sleep(1.0)
+    await _show_something(browser)
     worker = worker_of(server.journal(address, "task"))
-    browser.frames.clear()
-    browser.bytes, began, first = 0, time.perf_counter(), browser.next
-    processors = [processor_time(pid) for pid in (worker, server.process.pid)]
-    rows = 0
-    while (passed := time.perf_counter() - began) < seconds:
-        rows += 1
-        browser.press(turn=1.0 if rows % 2 else -1.0)
-        await asyncio.sleep(PERIOD)
+    before = [processor_time(pid) for pid in (worker, server.process.pid)]
+    browser.bytes, began = 0, time.perf_counter()
+    trips = await _turn(browser, seconds)
+    passed = time.perf_counter() - began
     busy = [processor_time(pid) for pid in (worker, server.process.pid)]
-    await browser.taken()
-    trips = [
-        1000.0 * (min(seen.at for seen in browser.frames if seen.input >= number) - browser.sent_at[number])
-        for number in range(first, browser.next)
-        if any(seen.input >= number for seen in browser.frames)
-    ]
     result = {
-        "fps": len(browser.frames) / passed,
-        "p95_ms": float(np.percentile(trips, 95)) if trips else 0.0,
-        "median_ms": float(np.median(trips)) if trips else 0.0,
+        **_answers(trips, [len(browser.frames) / passed]),
+        "width": browser.frames[-1].width,
         "kbit_s": 0.008 * browser.bytes / passed,
         "memory_mb": memory(worker),
-        "cores": (busy[0] - processors[0]) / passed,
-        "server_cores": (busy[1] - processors[1]) / passed,
+        "cores": (busy[0] - before[0]) / passed,
+        "server_cores": (busy[1] - before[1]) / passed,
     }
     await browser.leave()
     return result
+
+
+def measure_crowd(folder: Path, seconds: float, codec: str, a_core: int, *words: str) -> dict[str, float]:
+    """So many sessions for each core at once: frames a second of the slowest, and the answers of all.
+
+    Args:
+        folder: Of the visits.
+        seconds: How long.
+        codec: Of their frames; `none` for states.
+        a_core: Sessions for each core.
+        words: Further words of the server's command line.
+    """
+    count = a_core * (os.cpu_count() or 1)
+    with PlayProcess(folder, "--sessions", str(count), *words) as server:
+        return asyncio.run(_crowd(server, seconds, codec, count))
+
+
+async def _crowd(server: PlayProcess, seconds: float, codec: str, count: int) -> dict[str, float]:
+    browsers = [SimulatedBrowser(server.begin(), codec=codec, state=codec == "none") for _ in range(count)]
+    await asyncio.gather(*(_show_something(browser) for browser in browsers))
+    trips = await asyncio.gather(*(_turn(browser, seconds) for browser in browsers))
+    rates = [len(browser.frames) / seconds for browser in browsers]
+    result = {
+        **_answers([trip for times in trips for trip in times], rates),
+        "sessions": count,
+        "width": float(np.median([browser.frames[-1].width for browser in browsers])),
+    }
+    await asyncio.gather(*(browser.leave() for browser in browsers))
+    return result
+
+
+async def _show_something(browser: SimulatedBrowser) -> None:
+    """Start the task of a visit, and wait for frames."""
+    await begin_task(browser)
+    await browser.until(lambda: bool(browser.frames))
+    await asyncio.sleep(1.0)
+
+
+async def _turn(browser: SimulatedBrowser, seconds: float) -> list[float]:
+    """Turn to and fro; the times from an input to what shows it, ms."""
+    browser.frames.clear()
+    first, until = browser.next, time.perf_counter() + seconds
+    while time.perf_counter() < until:
+        browser.press(turn=1.0 if browser.next % 2 else -1.0)
+        await asyncio.sleep(PERIOD)
+    await browser.taken()
+    frames, trips = iter(browser.frames), list[float]()
+    seen = next(frames, None)
+    for number in range(first, browser.next):
+        while seen is not None and seen.input < number:
+            seen = next(frames, None)
+        if seen is not None:
+            trips.append(1000.0 * (seen.at - browser.sent_at[number]))
+    return trips
+
+
+def _answers(trips: list[float], rates: list[float]) -> dict[str, float]:
+    return {
+        "fps": min(rates),
+        "p95_ms": float(np.percentile(trips, 95)) if trips else math.inf,
+        "median_ms": float(np.median(trips)) if trips else math.inf,
+    }
 
 
 def measure_masher(folder: Path, minutes: float, seed: int, *words: str) -> dict[str, Any]:

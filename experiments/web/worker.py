@@ -37,7 +37,6 @@ from mjsim.observation import Observation
 from mjsim.render import render_pictures
 from mjsim.world import World
 
-STATE_PERIOD = 2  # control steps between two states
 DISCONNECTED = "disconnected"  # why the clock stands without a server
 
 
@@ -51,6 +50,7 @@ class Window(Viewer):
         self.states = False
         self._text: messages.Text | None = None
         self._busy: bool | None = None
+        self._stated: int | None = None
 
     def camera(self, world: World) -> CameraView | None:
         """The eye camera, for a pointer to what is out of view."""
@@ -62,7 +62,8 @@ class Window(Viewer):
             return
         step, number = self.live.session.recording.step, self.live.input
         self.drawer.offer(world.data, hud_state, step, number)
-        if self.states and step % STATE_PERIOD == 0:
+        if self.states and step != self._stated:
+            self._stated = step
             self._connection.send(_state(observation, hud_state, step, number))
         text = _text(hud_state)
         if text != self._text:
@@ -74,7 +75,7 @@ class Window(Viewer):
 
     def repeat(self) -> None:
         """Say everything again, to a browser that has just connected."""
-        self._text = self._busy = None
+        self._text = self._busy = self._stated = None
 
 
 class Worker:
