@@ -14,6 +14,7 @@ from pathlib import Path
 FAILED = 1
 USAGE_ERROR = 2
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
+_NULL = ("embedded null byte", "embedded null character")  # what Python says of a path that holds one
 BROKEN_PIPE = 141  # what shells show for a program that SIGPIPE ended
 
 DISTRIBUTIONS = ("mjsim", "mujoco", "numpy", "numba", "ortools", "opencv-python-headless", "pyarrow")
@@ -55,6 +56,8 @@ def exit_code(error: Exception) -> int | None:
     failures = (PhysicsError, RenderError, ReplayError, UserCodeError, OSError, MemoryError, ImportError)
     if isinstance(error, failures):
         return FAILED
+    if str(error) in _NULL:
+        return USAGE_ERROR
     return USAGE_ERROR if isinstance(error, ExperimentError | MjsimError | PlannerError | HudError) else None
 
 
@@ -66,6 +69,8 @@ def message(error: Exception) -> str:
         text = f"not enough memory ({error})" if str(error) else "not enough memory"
     elif isinstance(error, ImportError):
         text = f"{error}; `mjsim doctor` shows what is missing"
+    elif str(error) in _NULL:
+        text = "a path has a null character in it; correct the file that names it"
     else:
         text = str(error)
     return " ".join(text.split())

@@ -103,6 +103,12 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
         read_design(tmp_path / "latin.toml")
 
 
+def test_a_byte_order_mark_is_no_fault(tmp_path):
+    """Some editors begin UTF-8 with one."""
+    text = "[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = 1\n"
+    assert design(tmp_path, "\ufeff" + text) == design(tmp_path, text)
+
+
 def test_the_documented_designs_are_designs():
     counts = {path.name: len(read_design(path).trials) for path in EXAMPLES.glob("*.toml")}
     assert counts == {"two_houses.toml": 24}

@@ -95,7 +95,8 @@ def _run_missing(plan: BatchPlan, workers: int, on_progress: Callable[[BatchProg
     on_progress(progress)
     if not plan.missing:
         return
-    with worker_pool(min(workers, len(plan.missing))) as pool:
+    workers = min(workers, len(plan.missing))
+    with worker_pool(workers) as pool:
         for failure in _results(pool, iter(plan.missing.items()), workers):
             field = "done" if failure is None else "failed"
             count = getattr(progress, field) + 1

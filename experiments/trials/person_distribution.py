@@ -69,7 +69,7 @@ class PersonDistribution:
         try:
             if text.lstrip().startswith("{"):
                 return cls.of(tomllib.loads(f"person = {text}")["person"])
-            return cls.of(tomllib.loads(Path(text).read_text(encoding="utf-8")))
+            return cls.of(tomllib.loads(Path(text).read_text(encoding="utf-8-sig")))
         except OSError as error:
             raise ConfigError(
                 f"cannot read {text}: {error.strerror}; name a TOML file, or give values between braces, such as "

@@ -88,8 +88,14 @@ def read_controls(design: Design, path: Path = CONTROLS, *, only: str | None = N
         ConfigError: The file is unusable, there is no such control, or nobody of the design is left.
     """
     try:
-        tables = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), dict[str, _Control])
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        tables = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8-sig")), dict[str, _Control])
+    except (
+        OSError,
+        UnicodeDecodeError,
+        RecursionError,
+        tomllib.TOMLDecodeError,
+        msgspec.ValidationError,
+    ) as error:
         raise ConfigError(f"cannot use {path}: {error}") from error
     if only is not None and only not in tables:
         raise ConfigError(f"no control {only!r}; there are {', '.join(tables)}")

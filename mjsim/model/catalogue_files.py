@@ -41,7 +41,7 @@ def read_tables(path: Path, extended: tuple[Path, ...] = ()) -> tuple[dict[str, 
         AssetError: A file cannot be read, or catalogues extend each other in a circle.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
         tables = tomllib.loads(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise AssetError(brief(f"cannot read catalogue {path}: {error}")) from error

@@ -35,6 +35,7 @@ def raising(error):
         (MemoryError("Unable to allocate 9 TiB"), 1, "not enough memory (Unable to allocate 9 TiB)"),
         (OSError(errno.ENOSPC, "No space left on device", "/a"), 1, "/a: No space left on device"),
         (ImportError("libGL.so.1: cannot open"), 1, "libGL.so.1: cannot open; `mjsim doctor`"),
+        (ValueError("embedded null byte"), 2, "a path has a null character in it"),
         (KeyError("x"), INTERNAL_ERROR, "internal error (KeyError: 'x')"),
         (ValueError("two\nlines"), INTERNAL_ERROR, "internal error (ValueError: two lines)"),
         (RecursionError("too deep"), INTERNAL_ERROR, "internal error (RecursionError: too deep)"),
