@@ -217,7 +217,7 @@ def measure_set_up(house: House, count: int) -> dict[str, float]:
         times = [clock()]
         episode = house.sample_episode(objects=DEFAULT_OBJECTS, seed=100 + seed)
         times.append(clock())
-        scene = compose(episode, house.catalogue)
+        scene = compose(episode, house.catalogue, visuals=False)
         times.append(clock())
         World(scene)
         times.append(clock())

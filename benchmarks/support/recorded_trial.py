@@ -100,7 +100,7 @@ def record_trial(
     )
     points = max(objects, POINTS)
     episode = sample_episode(house.catalogue, house.navmesh, objects=objects, seed=seed, points=points)
-    scene = compose(episode, house.catalogue)
+    scene = compose(episode, house.catalogue, visuals=False)  # as a trial that is not filmed
     world = RecordingWorld(scene, WorldOptions(fidelity=fidelity))
     session, _ = prepare_session(config, house, scene, EventLog(), world=world)
     session.run()
