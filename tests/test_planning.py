@@ -6,7 +6,7 @@ from experiments.house import House
 from experiments.runs.records import EventLog
 from experiments.session.planning import Planning
 from experiments.session.regrets import Regrets
-from experiments.trials.setup import prepare_session
+from experiments.trials.setup import early_replanner, prepare_session
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from planner.errors import PlannerError, UnreachableError
@@ -25,7 +25,10 @@ def test_a_run_is_the_same_whether_plans_are_made_in_the_background_or_at_once(h
     config = TrialConfig(objects=5, assistance=assistance, seed=2, user=user, fidelity="event")
     scene = compose(house.sample_episode(objects=5, seed=2), house.catalogue)
     runs = []
-    for replanner in (None, Replanner(house.geodesics, ExactSolver())):
+    for replanner in (
+        early_replanner(config, house, scene.episode),
+        Replanner(house.geodesics, ExactSolver()),
+    ):
         log = EventLog()
         session, _ = prepare_session(config, house, scene, log, replanner=replanner)
         assert session.run() == "all delivered"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.house import House
 from experiments.participants.base import Choice, Guidance
 from experiments.runs.records import EventLog
 from experiments.session.planning import Planning
@@ -21,6 +22,7 @@ from hud.markers import BREADCRUMB, GOAL
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.actions import EventKind, WorldEvent
+from mjsim.episode import Episode
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.options import WorldOptions
 from planner.plan import Status, Visit, VisitKind
@@ -72,10 +74,7 @@ class Assistant:
         self._planning = Planning(planner, self._regrets, log, background=background)
         self._log_regrets = log_regrets
         self._number = {placed.name: i for i, placed in enumerate(self._episode.objects)}
-        self._approaches = {
-            name: self._house.receptacles[key].approach[:2] for name, key in self._episode.targets.items()
-        }
-        self._deliveries = {name: _xy(approach) for name, approach in self._approaches.items()}
+        self._deliveries = deliveries(self._house, self._episode)
         self._paths = PathsToNext(self._house.geodesics)
         self._leads_from: tuple[NDArray[np.float64], Observation] | None = (
             None  # what the paths are not begun from yet
@@ -275,7 +274,14 @@ class Assistant:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Where the path to a visit leads, and the goal of the visit, m, both of shape (2,)."""
         goal = self._goal(observation, visit)
-        return goal if visit.kind is VisitKind.PICK else self._approaches[visit.object], goal
+        if visit.kind is VisitKind.PICK:
+            return goal, goal
+        return self._house.receptacles[self._episode.targets[visit.object]].approach[:2], goal
+
+
+def deliveries(house: House, episode: Episode) -> dict[str, XY]:
+    """Where one stands to deliver each object, by name, m."""
+    return {name: _xy(house.receptacles[key].approach) for name, key in episode.targets.items()}
 
 
 def _xy(point: NDArray[np.float64]) -> XY:

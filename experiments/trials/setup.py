@@ -12,7 +12,7 @@ from experiments.participants.base import Participant
 from experiments.runs import records
 from experiments.runs.recording import Recording, provenance
 from experiments.runs.records import EventLog
-from experiments.session.assistant import Assistant
+from experiments.session.assistant import Assistant, deliveries
 from experiments.session.regrets import LiveRegrets, Regrets
 from experiments.session.session import Session
 from experiments.session.task_board import TaskBoard
@@ -26,9 +26,10 @@ from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
+from planner.early import EarlyReplanner
 from planner.exact.solver import ExactSolver
 from planner.replanner import Replanner
-from planner.route import RoutePlanner
+from planner.route import RoutePlanner, TaskState
 from planner.solver import solver
 
 _SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
@@ -85,6 +86,20 @@ def simulated_user(config: TrialConfig, house: House) -> Participant:
     """The participant that a trial names; `house` is what it knows."""
     rng = _session_rng(config.person_seed, _CHANCE)
     return make_participant(config.user, house, rng, draw_behaviour(config))
+
+
+def early_replanner(config: TrialConfig, house: House, episode: Episode) -> Replanner | None:
+    """A replanner that makes its first plan while the world is made; None where the planner has to wait for it."""
+    exact = solver(config.planner)
+    if config.live or not isinstance(exact, ExactSolver):
+        return None
+    first = TaskState(
+        position=(episode.start.x, episode.start.y),
+        loose={placed.name: placed.position[:2] for placed in episode.objects},
+        carried=(),
+        deliveries=deliveries(house, episode),
+    )
+    return EarlyReplanner(house.geodesics, exact, first, capacity=config.capacity)
 
 
 def prepare_session(
@@ -155,9 +170,6 @@ def _make_assistant(
 ) -> Assistant:
     """The assistant of a trial; for a live one, all that takes long is done before the clock starts."""
     geodesics = board.house.geodesics
-    background = replanner is None and isinstance(
-        solver(config.planner), ExactSolver
-    )  # others' may use no threads
     replanner = replanner or Replanner(geodesics, solver(config.planner), capacity=config.capacity)
     regrets = (LiveRegrets if config.live else Regrets)(geodesics, config.capacity)
     assistant = Assistant(
@@ -168,7 +180,7 @@ def _make_assistant(
         regrets=regrets,
         log_regrets=config.regret,
         options=world.options,
-        background=background,
+        background=isinstance(replanner, EarlyReplanner),
     )
     if config.live:
         state = assistant.task_state(world.observation())

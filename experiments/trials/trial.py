@@ -23,6 +23,7 @@ from experiments.session.viewer import OnProgress, Progress
 from experiments.signals import Stopped, signals_postponed
 from experiments.trials.setup import (
     draw_person,
+    early_replanner,
     prepare_session,
     simulated_user,
     trial_episode,
@@ -34,6 +35,7 @@ from mjsim.errors import PhysicsError
 from mjsim.model.scene import Scene, compose
 from mjsim.person_parameters import PersonParameters
 from planner.live import LiveReplanner
+from planner.route import RoutePlanner
 from planner.solver import solver
 
 
@@ -75,6 +77,7 @@ def run_trial(
             person = draw_person(config)
             house = (house or House.load(config.house)).for_person(person)
             episode = trial_episode(config, house)
+            planner = early_replanner(config, house, episode)
             scene = compose(episode, house.catalogue, person=person, visuals=film is not None)
 
             def progress(now: Progress) -> None:
@@ -82,7 +85,7 @@ def run_trial(
                 signals.check()
 
             known = _before_the_task(config, house, person, folder, lambda _: signals.check())
-            result = _Trial(config, house, scene, folder, film, known).run(progress)
+            result = _Trial(config, house, scene, folder, film, known, planner).run(progress)
             if result.error is not None and not result.has_steps:
                 raise result.error
             signals.save()
@@ -119,6 +122,7 @@ class _Trial:
     folder: Path
     film: FilmConfig | None
     known: Familiarisation
+    planner: RoutePlanner | None = None
 
     def run(self, on_progress: OnProgress) -> SessionResult:
         """Run the session; log and video are complete in the folder afterwards."""
@@ -128,11 +132,13 @@ class _Trial:
             for path in self.folder.iterdir():
                 if path.is_file():
                     path.unlink()
-            result = self._run_once(on_progress, rollouts=False)
+            planner = early_replanner(self.config, self.house, self.scene.episode)
+            result = dataclasses.replace(self, planner=planner)._run_once(on_progress, rollouts=False)
         return result
 
     def _run_once(self, on_progress: OnProgress, *, rollouts: bool) -> SessionResult:
-        film = error = replanner = None
+        film = error = None
+        replanner = self.planner
         with ExitStack() as stack:
             log = stack.enter_context(EventLog(self.folder / records.EVENTS))
             if self.film is not None:
