@@ -127,7 +127,8 @@ def _details(part: str, found: Mapping[str, Any]) -> Iterator[str]:
         for name, case in found["cases"].items():
             yield (
                 f"{case['sessions']} sessions at once, {name}: {case['fps']:.1f} a second or more, "
-                f"{case['width']:.0f} px wide, {case['median_ms']:.0f} ms (95 %: {case['p95_ms']:.0f})"
+                f"{case['width']:.0f} px wide, {case['median_ms']:.0f} ms (95 %: {case['p95_ms']:.0f}), "
+                f"{case['memory_mb']:.0f} MB each"
             )
     elif part == "pages":
         for name, task in found["tasks"].items():

@@ -114,11 +114,13 @@ ODD: tuple[Callable[[np.random.Generator], str | bytes], ...] = (
 )
 
 
-def odd_request(rng: np.random.Generator, host: str) -> bytes:
-    """A request that no browser sends."""
+def odd_request(rng: np.random.Generator, host: str, visit: str) -> bytes:
+    """A request that no browser sends; some of them concern a visit, whose path is given."""
     if rng.random() < 0.1:
         return rng.bytes(int(rng.integers(1, 400))) + b"\r\n\r\n"
-    lines = [f"{rng.choice(METHODS)} {rng.choice(PATHS)} HTTP/{rng.choice(['1.0', '1.1', '1.1', '9.9'])}"]
+    path = visit + str(rng.choice(("", "/film", "/floor-plan.png", "/nothing")))
+    path = str(rng.choice(PATHS)) if rng.random() < 0.6 else path
+    lines = [f"{rng.choice(METHODS)} {path} HTTP/{rng.choice(['1.0', '1.1', '1.1', '9.9'])}"]
     if rng.random() < 0.9:
         lines.append(f"Host: {host}")
     if rng.random() < 0.3:
@@ -158,7 +160,7 @@ async def _fuzz(
         odd = [odd_message(rng) for _ in range(count)]
         sent += await _send_odd(address, odd, replies, hello=rng.random() < 0.5)
     for _ in range(requests):
-        replies.append(await _request(server.url, odd_request(rng, urlsplit(server.url).netloc)))
+        replies.append(await _request(server.url, odd_request(rng, *urlsplit(address)[1:3])))
     playing.cancel()
     disturbed = await playing
     await bystander.leave()

@@ -77,9 +77,11 @@ async def _crowd(server: PlayProcess, seconds: float, codec: str, count: int) ->
     await asyncio.gather(*(_show_something(browser) for browser in browsers))
     trips = await asyncio.gather(*(_turn(browser, seconds) for browser in browsers))
     rates = [len(browser.frames) / seconds for browser in browsers]
+    workers = [worker_of(server.journal(browser.address, "task")) for browser in browsers]
     result = {
         **_answers([trip for times in trips for trip in times], rates),
         "sessions": count,
+        "memory_mb": float(np.mean([memory(worker) for worker in workers])),
         "width": float(np.median([browser.frames[-1].width for browser in browsers])),
     }
     await asyncio.gather(*(browser.leave() for browser in browsers))

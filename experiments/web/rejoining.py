@@ -23,6 +23,7 @@ def wait_for_server(folder: Path, waiting: Callable[[], bool]) -> socket.socket 
         Path(path).unlink(missing_ok=True)  # of a worker that was killed
         listener.bind(path)
         try:
+            Path(path).chmod(0o600)  # nobody can connect before it listens
             listener.listen(1)
             listener.settimeout(PERIOD)
             return _accept(listener, waiting)
