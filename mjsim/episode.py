@@ -80,6 +80,8 @@ class Episode:
                 raise EpisodeError(
                     f"target of {name} is {receptacle!r}, which is none of the receptacles {list(self.receptacles)}"
                 )
+        if not 0 <= self.seed < 2**63:
+            raise EpisodeError(f"the seed is {self.seed}; give a whole number from 0 to 2^63 - 1")
         if not all(math.isfinite(v) for v in (self.start.x, self.start.y, self.start.heading)):
             raise EpisodeError(f"the start is not finite: {self.start}; give x and y in m, heading in rad")
         for placed in self.objects:

@@ -13,9 +13,12 @@ DEFAULT = "egl"
 
 
 def postpone_gl() -> None:
-    """Keep MuJoCo, in this process and its children, from loading OpenGL before something is drawn."""
-    choice = os.environ.get(VARIABLE, "")
-    if choice and choice.lower().strip() not in DISABLED and "mujoco" not in sys.modules:
+    """Keep MuJoCo, in this process and its children, from loading OpenGL before something is drawn.
+
+    Without a choice it would load GLFW, which starts another Python to look at its library.
+    """
+    choice = os.environ.get(VARIABLE, "") or DEFAULT
+    if choice.lower().strip() not in DISABLED and "mujoco" not in sys.modules:
         os.environ[POSTPONED], os.environ[VARIABLE] = choice, DISABLED[0]
 
 

@@ -31,7 +31,7 @@ def episodes(draw: st.DrawFn) -> Episode:
     )
     return Episode(
         house=draw(text),
-        seed=draw(st.integers(0, 2**63)),
+        seed=draw(st.integers(0, 2**63 - 1)),
         start=draw(st.builds(StartPose, number, number, number)),
         objects=tuple(replace(draw(placed), name=name) for name in names),
         receptacles=tuple(receptacles),
@@ -85,6 +85,12 @@ def test_targets_must_fit(small: Episode, change: dict[str, dict[str, str]], cul
 def test_names_are_unique(small: Episode) -> None:
     with pytest.raises(EpisodeError, match="unique"):
         replace(small, objects=small.objects * 2)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63, 10**40])
+def test_a_seed_fits_a_table(small: Episode, seed: int) -> None:
+    with pytest.raises(EpisodeError, match=f"the seed is {seed}"):
+        replace(small, seed=seed)
 
 
 @pytest.mark.parametrize("field", ["point", "position", "quaternion"])

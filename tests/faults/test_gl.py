@@ -1,6 +1,9 @@
 """No OpenGL: what draws nothing works, and a run keeps its record and says what is missing."""
 
 import json
+import os
+import subprocess
+import sys
 
 import mujoco
 import pytest
@@ -11,7 +14,7 @@ from experiments.runs import records
 from experiments.session.first_person import FilmConfig
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from faults.conftest import FAST, one_line
+from faults.conftest import FAST, ROOT, one_line
 from mjsim.render import context
 
 PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
@@ -25,6 +28,21 @@ def test_what_draws_nothing_needs_no_opengl(choice, tmp_path, mjsim):
     run = mjsim("run", *FAST, "--no-video", "--no-floor-plan", "--out", "out", MUJOCO_GL=choice)
     assert run.returncode == 0
     assert read_json(tmp_path / "out" / records.METRICS)["ended"] == "all delivered"
+
+
+def test_a_command_starts_no_other_process_for_opengl(tmp_path):
+    """As GLFW does when it is imported: a signal to the group of processes would make those print tracebacks."""
+    (tmp_path / "own.py").write_text(
+        "import sys\nstarted = []\n"
+        "sys.addaudithook(lambda e, a: started.append(a) if e == 'subprocess.Popen' else None)\n"
+        "from experiments.cli import main\ncode = main(sys.argv[1:])\nprint(code, started, 'glfw' in sys.modules)\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "MUJOCO_GL"} | {"PYTHONPATH": str(ROOT)}
+    words = ["house", "--objects", "2", "--seed", "0", "--out", "house.xml"]
+    done = subprocess.run(
+        [sys.executable, "own.py", *words], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert done.stdout.splitlines()[-1] == "0 [] False"
 
 
 @pytest.mark.parametrize("choice", ["foo", "osmesa"])

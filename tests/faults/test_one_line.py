@@ -81,10 +81,12 @@ def test_a_command_line_that_is_none(words, capsys):
 
 
 @pytest.mark.parametrize(
-    ("target", "code"), [("/dev/full", 1), ("| true", 141), (">&-", 0)], ids=["full", "no reader", "closed"]
+    ("target", "code"),
+    [("/dev/full", 1), ("| true", 141), (">&-", 0), ("2>&-", 0)],
+    ids=["full", "no reader", "closed", "errors"],
 )
 def test_an_output_that_takes_nothing(target, code, problem, tmp_path):
-    redirect = target if target[0] in "|>" else f"> {target}"
+    redirect = target if target[0] in "|>2" else f"> {target}"
     command = f"{sys.executable} -m mjsim plan {problem} {redirect}; exit ${{PIPESTATUS[0]}}"
     environment = {"PYTHONPATH": str(ROOT), "HOME": str(tmp_path)}
     done = subprocess.run(
