@@ -30,7 +30,7 @@ class Journal:
         path: The file.
 
     Attributes:
-        records: The records that were there when it was opened.
+        records: The records that were there when it was opened; whoever has read them may drop them.
 
     Raises:
         RecordError: The file is no journal, or another process keeps it open.

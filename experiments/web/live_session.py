@@ -13,6 +13,7 @@ from experiments.replaying.logged_replanner import LoggedReplanner
 from experiments.replaying.replayer import catch_up
 from experiments.runs.recording import Recording
 from experiments.runs.records import EventLog
+from experiments.runs.trajectory import Trajectory
 from experiments.session.viewer import Viewer
 from experiments.trials.person_distribution import PersonDistribution
 from experiments.trials.setup import draw_person, prepare_session, trial_episode
@@ -39,6 +40,8 @@ from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.live import LiveReplanner
 from planner.solver import solver
+
+ROWS = 1000  # of the trajectory that are kept in memory
 
 
 class Human:
@@ -147,6 +150,7 @@ class LiveSession:
             observation = self.world.reset()
             self.session.assistant.begin(observation)
             self.session.start(observation)
+        journal.records = ()  # those of an hour take some 80 MB
 
     @property
     def end_reason(self) -> str | None:
@@ -197,13 +201,15 @@ class LiveSession:
 
     def _append_step(self, lines: list[str], number: int) -> None:
         arrays, recording = self.session.trajectory.arrays(), self.session.recording
-        state = recording.checkpoints.get(number)
+        state = recording.checkpoints.pop(number, None)
         checkpoint = None
         if state is not None:
             checkpoint = Checkpoint(state.physics.tobytes(), state.details_json(), state.hash)
         row = {name: column[-1].tobytes() for name, column in arrays.items() if name != "unknown_objects"}
         entry = Step(row, recording.last_hash, lines, self._human.controls, self.input, checkpoint)
         self._journal.append(encode(entry))
+        if len(self.session.trajectory) >= ROWS:  # the journal has them
+            self.session.trajectory = Trajectory(self.scene.index.names)
 
     def _resume(self, steps: Sequence[Step]) -> None:
         """Go from the last checkpoint to where the journal ends, with the plan that was shown there."""
