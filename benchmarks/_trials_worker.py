@@ -7,6 +7,7 @@ object. Run with `python -P`, as this folder has modules named like packages.
 import json
 import sys
 import tempfile
+import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -26,7 +27,11 @@ from mjsim.world import World
 
 # Part -> callables. Time in a callable of one part that is called by another part belongs to the caller.
 PARTS = {
-    "planning": ("planner.replanner.Replanner.update",),
+    "planning": (  # what the session waits for; the rest of it goes on in a thread
+        "planner.replanner.Replanner.update",
+        "concurrent.futures._base.Future.result",
+        "concurrent.futures.thread.ThreadPoolExecutor.shutdown",
+    ),
     "shortest paths": ("planner.geodesics.Geodesics.shortest_path",),
     "looking": ("experiments.session.perception.visible_objects",),
     "world": tuple(f"mjsim.world.World.{n}" for n in ("reset", "step", "walk", "finish", "state", "restore")),
@@ -53,7 +58,7 @@ REST = "participant and the rest"
 
 
 class Timers:
-    """Wall time in the callables of `PARTS`; use as a context manager, which patches them meanwhile.
+    """Wall time of the main thread in the callables of `PARTS`; use as a context manager, which patches them meanwhile.
 
     Attributes:
         seconds: Part -> s.
@@ -75,7 +80,7 @@ class Timers:
 
     def _timed(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
         def timed(*arguments: Any, **keywords: Any) -> Any:
-            if self._is_inside:
+            if self._is_inside or threading.current_thread() is not threading.main_thread():
                 return function(*arguments, **keywords)
             self._is_inside, started = True, time.perf_counter()
             try:

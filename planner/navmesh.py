@@ -154,8 +154,14 @@ class NavMesh:
         """Points drawn uniformly from the largest island, m: (2,), or (count, 2) as `count` calls would draw."""
         island = self.islands[0]
         x_min, y_min, x_max, y_max = island.bounds
+        if count is None:  # without arrays: ten times as quick
+            while True:
+                x, y = rng.uniform(x_min, x_max), rng.uniform(y_min, y_max)
+                cell = self._cell(x, y)
+                if cell == 0 or (cell == MIXED and shapely.contains_xy(island, x, y)):
+                    return np.array([x, y])
         drawn = [np.empty((0, 2))]
-        missing = 1 if count is None else count
+        missing = count
         while missing:  # rejection: ends, as the island has an area
             points = rng.uniform((x_min, y_min), (x_max, y_max), (missing, 2))
             columns, rows = self.frame.columns_rows(points)
@@ -164,8 +170,7 @@ class NavMesh:
             inside[mixed] = shapely.contains_xy(island, points[mixed])
             drawn.append(points[inside])
             missing -= len(drawn[-1])
-        points = np.concatenate(drawn)
-        return points[0] if count is None else points
+        return np.concatenate(drawn)
 
     @cached_property
     def outline(self) -> NDArray[np.float64]:

@@ -183,8 +183,11 @@ class Recorded:
 def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
     """`hash64` of each row of actions (T, 6), shape (T,)."""
     rows, size = actions.tobytes(), actions.itemsize * 6
-    digests = (hashlib.sha1(rows[i : i + size], usedforsecurity=False) for i in range(0, len(rows), size))
-    return np.frombuffer(b"".join(digest.digest()[:8] for digest in digests), "<u8").astype(np.uint64)
+    sha1 = hashlib.sha1
+    digests = [
+        sha1(rows[i : i + size], usedforsecurity=False).digest()[:8] for i in range(0, len(rows), size)
+    ]
+    return np.frombuffer(b"".join(digests), "<u8").astype(np.uint64)
 
 
 def provenance(world: World) -> dict[str, Any]:
