@@ -91,7 +91,7 @@ def _design(arguments: argparse.Namespace) -> Design:
 def run(arguments: argparse.Namespace) -> int:
     """Run the batch with a progress bar; 1 if a trial failed."""
     design = _design(arguments)
-    rows, failed = run_with_progress(design, arguments.out, arguments.workers)
+    rows, failed = run_with_progress(design, arguments.out, arguments.workers, arguments.executor)
     error_console().print(
         f"{counted(len(rows), 'trial')} in {arguments.out}/trials.parquet and .csv; {failed} failed"
     )

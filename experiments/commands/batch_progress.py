@@ -15,30 +15,38 @@ from rich.progress import (
 )
 
 from experiments.commands.terminal import error_console, progress_bars
-from experiments.trials.batch import BatchProgress, run_batch
+from experiments.trials.batch import EXECUTORS, PROCESSES, BatchProgress, run_batch
 from experiments.trials.design import Design
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add `--workers`."""
+    """Add `--workers` and `--executor`."""
     parser.add_argument(
         "--workers",
         type=int,
         default=os.cpu_count(),
         metavar="N",
-        help="processes (default: one per core, %(default)s here)",
+        help="trials at a time (default: one per core, %(default)s here)",
+    )
+    parser.add_argument(
+        "--executor",
+        choices=EXECUTORS,
+        default=PROCESSES,
+        help="processes of this machine, or the Ray cluster at RAY_ADDRESS whose machines share OUT "
+        "(default: %(default)s)",
     )
 
 
 def run_with_progress(
-    design: Design, out: Path, workers: int, what: str = "trials"
+    design: Design, out: Path, workers: int, executor: str, what: str = "trials"
 ) -> tuple[list[Mapping[str, Any]], int]:
     """Run what is missing of a design; all rows of the folder, and how many trials failed.
 
     Args:
         design: Which trials.
         out: Folder of the batch.
-        workers: Processes.
+        workers: How many trials at a time.
+        executor: Who runs them, as in `run_batch`.
         what: Stands before the bar.
 
     Raises:
@@ -66,5 +74,5 @@ def run_with_progress(
         def note(line: str) -> None:
             bars.console.print(line, style="yellow", soft_wrap=True)
 
-        rows = run_batch(design, out, workers=workers, on_progress=show, on_note=note)
+        rows = run_batch(design, out, workers=workers, executor=executor, on_progress=show, on_note=note)
     return rows, failed

@@ -14,6 +14,7 @@ what people do.
 
 import argparse
 import csv
+import dataclasses
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -34,7 +35,7 @@ from experiments.runs.topdown import mark_origin
 from experiments.trials.batch import BatchProgress, run_batch
 from experiments.trials.batch_folder import read_trials
 from experiments.trials.design import Design
-from experiments.trials.trial_config import TrialConfig
+from experiments.trials.study import read_study, study_path
 from mjsim.files import replacing, write_text_atomically
 from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
@@ -96,21 +97,24 @@ class Slack:
 def design(people: int, objects: Sequence[int], first_seed: int = FIRST_SEED) -> Design:
     """The same people with every planner, in their cell; the cheap trials first."""
     cells = [(n, assistance) for n in sorted(objects) for assistance in CONDITIONS]
-    trials = [
-        TrialConfig(
-            n,
-            assistance,
-            first_seed + 1000 * k + person,
-            "guest",
-            fidelity="event",
-            planner=planner,
-            house_seed=0,
+    somebody = read_study(study_path("paper"), 1).trials[0]  # the population of the published design
+    return Design(
+        tuple(
+            dataclasses.replace(
+                somebody,
+                objects=n,
+                assistance=assistance,
+                planner=planner,
+                regret=True,
+                seed=None,
+                person_seed=first_seed + 1000 * k + person,
+                order_seed=first_seed + 1000 * k + person,
+            )
+            for k, (n, assistance) in enumerate(cells)
+            for planner in PLANNERS
+            for person in range(people)
         )
-        for k, (n, assistance) in enumerate(cells)
-        for planner in PLANNERS
-        for person in range(people)
-    ]
-    return Design(tuple(trials))
+    )
 
 
 def slacks(folder: Path) -> list[Slack]:

@@ -5,10 +5,11 @@ import functools
 import gc
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from experiments.errors import ConfigError
 from experiments.house import House
@@ -18,6 +19,7 @@ from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import folder_notes, read_trials, trial_key
 from experiments.trials.batch_plan import BatchPlan, plan_batch
 from experiments.trials.design import Design, confounded
+from experiments.trials.ray_workers import ray_cluster
 from experiments.trials.table import write_tables
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import SEEDS, TrialConfig
@@ -25,6 +27,18 @@ from experiments.trials.workers import worker_pool
 from mjsim.files import remove_leftovers
 
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
+PROCESSES, RAY = "processes", "ray"
+
+
+class _Pool(Protocol):
+    def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
+
+
+# Who runs trials: name -> context of so many workers.
+EXECUTORS: Mapping[str, Callable[[int], AbstractContextManager[_Pool]]] = {
+    PROCESSES: worker_pool,
+    RAY: ray_cluster,
+}
 
 
 @dataclass(frozen=True)
@@ -51,6 +65,7 @@ def run_batch(
     out: Path,
     *,
     workers: int,
+    executor: str = PROCESSES,
     on_progress: Callable[[BatchProgress], None] = lambda _: None,
     on_note: Callable[[str], None] = lambda _: None,
 ) -> list[Mapping[str, Any]]:
@@ -59,7 +74,8 @@ def run_batch(
     Args:
         design: Which trials.
         out: Folder of the batch; an earlier batch there is added to.
-        workers: Processes.
+        workers: How many trials at a time.
+        executor: Who runs them: `processes` of this machine, or a `ray` cluster whose machines share the folder.
         on_progress: Called at the start and after every trial.
         on_note: Called with lines that a user should read: what is run again, what the tables leave out.
 
@@ -67,12 +83,15 @@ def run_batch(
         A row for every trial of the folder, those of the design first, in the design's order.
 
     Raises:
-        ConfigError: `workers` is below 1.
+        ConfigError: `workers` is below 1, or there is no such executor, or it cannot be had.
         ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run; nothing was run.
         OSError: A table cannot be written, or a worker was killed.
     """
     if workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
+    if executor not in EXECUTORS:
+        raise ConfigError(f"no executor {executor!r}; there are {', '.join(EXECUTORS)}")
+    out = out.absolute() if executor == RAY else out  # other machines have other current folders
     check_batch_folder(out)
     inputs = check_trials(design.trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
@@ -80,7 +99,7 @@ def run_batch(
     for note in filter(None, (*plan.notes, confounded(design.trials))):
         on_note(note)
     try:
-        _run_missing(plan, workers, on_progress)
+        _run_missing(plan, workers, executor, on_progress)
     finally:
         with signals_postponed() as signals:
             signals.save()
@@ -89,14 +108,16 @@ def run_batch(
     return rows
 
 
-def _run_missing(plan: BatchPlan, workers: int, on_progress: Callable[[BatchProgress], None]) -> None:
+def _run_missing(
+    plan: BatchPlan, workers: int, executor: str, on_progress: Callable[[BatchProgress], None]
+) -> None:
     done = len(plan.done)
     progress = BatchProgress(done=0, resumed=done, failed=0, total=done + len(plan.missing))
     on_progress(progress)
     if not plan.missing:
         return
     workers = min(workers, len(plan.missing))
-    with worker_pool(workers) as pool:
+    with EXECUTORS[executor](workers) as pool:
         for failure in _results(pool, iter(plan.missing.items()), workers):
             field = "done" if failure is None else "failed"
             count = getattr(progress, field) + 1
@@ -126,21 +147,21 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
     return [settings[name] for name in ("objects", "assistance", "user", "house", *SEEDS)]
 
 
-def _results(
-    pool: ProcessPoolExecutor, jobs: Iterator[tuple[Path, TrialConfig]], workers: int
-) -> Iterator[str | None]:
+def _results(pool: _Pool, jobs: Iterator[tuple[Path, TrialConfig]], workers: int) -> Iterator[str | None]:
     """Submit a few trials at a time; yield None for each one that succeeds, else what went wrong."""
-    running: dict[Future[str | None], str] = {}
+    running: dict[Future[str | None], Path] = {}
     while True:
         for path, config in itertools.islice(jobs, workers * QUEUED_PER_WORKER - len(running)):
-            running[pool.submit(_run, config, path)] = path.name
+            running[pool.submit(_run, config, path)] = path
         if not running:
             return
         finished, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in finished:
-            name, error = running.pop(future), future.exception()
+            path, error = running.pop(future), future.exception()
             failure = future.result() if error is None else _failure(error)
-            yield None if failure is None else f"{name}: {failure}"
+            if failure is None and not path.exists():
+                failure = "its run directory is not here; all machines must share the folder of the batch"
+            yield None if failure is None else f"{path.name}: {failure}"
 
 
 @functools.cache

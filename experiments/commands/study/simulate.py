@@ -41,7 +41,9 @@ def add_study(parser: argparse.ArgumentParser, **settings: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate who is missing; 1 if somebody's trial failed."""
     design = read_study(study_path(arguments.study), arguments.people)
-    rows, failed = run_with_progress(design, arguments.out, arguments.workers, "simulated people")
+    rows, failed = run_with_progress(
+        design, arguments.out, arguments.workers, arguments.executor, "simulated people"
+    )
     error_console().print(
         f"{counted(len(rows), 'row')} of simulated people in {arguments.out}/trials.parquet and .csv; {failed} failed"
     )

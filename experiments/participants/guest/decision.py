@@ -13,9 +13,9 @@ from experiments.participants.behaviour import varies
 class Decision:
     """How a person chooses.
 
-    People look two to four moves ahead in planning tasks (van Opheusden et al., Nature 618, 2023, find a few), judge
-    walking distances with an error in proportion to them, and prefer to finish a region before the next (Wiener and
-    Mallot, Spatial Cognition and Computation 3, 2003). The numbers are starting values.
+    People plan several moves ahead, the more the better they know a task (van Opheusden et al., Nature 618, 2023),
+    and regions of a building enter their routes (Wiener and Mallot, Spatial Cognition and Computation 3, 2003). How
+    many moves, how wrong distances are judged and what a region costs are assumptions.
 
     Attributes:
         temperature: Of the choice: an option that costs c metres more is taken with odds exp(-c / temperature), m.

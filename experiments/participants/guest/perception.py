@@ -13,9 +13,9 @@ from experiments.participants.behaviour import chance, varies
 class Perception:
     """How well a person notices things.
 
-    Finding an everyday object falls with its visual angle along a logistic curve (Toet et al., Perception 27, 1998, for
-    targets in natural scenes); where half of them are found is a starting value, not a measurement. Field of view and
-    sight range are those of the body (docs/people.md), and what stands in between is the scene's own geometry.
+    How conspicuous a thing is predicts how soon it is found (Toet et al., Optical Engineering 37, 1998). That the
+    probability is logistic in the distance, and where half of the objects are found, are assumptions. Field of view
+    and sight range are those of the body (docs/people.md), and what stands in between is the scene's own geometry.
 
     Attributes:
         half_distance: Distance at which half of the objects in full view are noticed, m.

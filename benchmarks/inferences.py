@@ -1,0 +1,127 @@
+"""The same simulated people in `event` and in `full`: does every test of the study decide the same?"""
+
+import dataclasses
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.analysis.measures import read_measures
+from experiments.analysis.published import Published, read_published
+from experiments.analysis.score_rules import points, published_cells, tests_of
+from experiments.analysis.study_table import StudyTable, read_study
+from experiments.errors import StatisticsError
+from experiments.trials import study
+from experiments.trials.batch import run_batch
+from experiments.trials.design import Design
+from experiments.trials.trial_config import TrialConfig
+
+PEOPLE = 40  # of each cell
+QUICK_PEOPLE = 2
+QUICK_OBJECTS = (6,)
+TIERS = ("full", "event")
+
+
+def measure(
+    *, count: int = 0, objects: Sequence[int] = (), workers: int = 0, quick: bool = False
+) -> dict[str, Any]:
+    """Run the benchmark; everything in it can be written as JSON.
+
+    Args:
+        count: People of each cell of the published study; 0 for 40 (or as many as there are), 2 when `quick`.
+        objects: Numbers of objects; all, or 6 when `quick`.
+        workers: Processes; 0 for one per core.
+        quick: Few people.
+    """
+    levels = tuple(objects) or (QUICK_OBJECTS if quick else (6, 12, 18, 24))
+    chosen = people(count or (QUICK_PEOPLE if quick else PEOPLE), levels)
+    tables = {tier: _simulated(chosen, tier, workers or os.cpu_count() or 1) for tier in TIERS}
+    published = read_published()
+    rows = [
+        {"what": what, **{tier: found[tier] for tier in TIERS}}
+        for what, found in _decisions(tables, published).items()
+    ]
+    return {"people": len(chosen), "objects": list(levels), "decisions": rows, "same_person": _gaps(tables)}
+
+
+def people(count: int, objects: Sequence[int]) -> list[TrialConfig]:
+    """The first so many people of every cell of the published design with these numbers of objects."""
+    taken: Counter[Any] = Counter()
+    chosen = []
+    for trial in study.read_study(study.study_path("paper")).trials:
+        cell = trial.assistance, trial.objects
+        if trial.objects in objects and taken[cell] < count:
+            taken[cell] += 1
+            chosen.append(trial)
+    return chosen
+
+
+def _simulated(trials: Sequence[TrialConfig], tier: str, workers: int) -> StudyTable:
+    design = Design(tuple(dataclasses.replace(trial, fidelity=tier) for trial in trials))
+    with tempfile.TemporaryDirectory() as folder:
+        run_batch(design, Path(folder) / tier, workers=workers)
+        return published_cells(read_study(Path(folder) / tier, read_measures()), read_published())
+
+
+def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[str, dict[str, str]]:
+    """What each tier decides, by what is decided; what cannot be computed with so few people is left out."""
+    found: dict[str, dict[str, str]] = {}
+    for tier, table in tables.items():
+        for test in published.tests:
+            where = f"{test.objects} objects" if test.objects else "all objects"
+            try:
+                one = tests_of(table, test.measure, test.objects)[test.effect]
+            except StatisticsError:
+                continue
+            words = f"{'p < .05' if one.significant else 'n.s.'} (F = {one.statistic:.2f})"
+            found.setdefault(f"{test.measure}: {test.effect}, {where}", {})[tier] = words
+        for direction in published.directions:
+            try:
+                holds = points(table, direction)
+            except StatisticsError:
+                continue
+            found.setdefault(f"{direction.measure}: {direction.label()}", {})[tier] = "yes" if holds else "no"
+    return {what: tiers for what, tiers in found.items() if len(tiers) == len(TIERS)}
+
+
+def _gaps(tables: dict[str, StudyTable]) -> dict[str, dict[str, float]]:
+    """By how much a person's measures differ between tiers, over the standard deviation between people in `full`."""
+    full, event = (tables[tier] for tier in TIERS)
+    there = {_person(row): k for k, row in enumerate(full.rows)}
+    order = [there[_person(row)] for row in event.rows]
+    gaps = {}
+    for name in read_measures().objective:
+        if name in full.columns:
+            difference = (event.columns[name] - full.columns[name][order]) / full.columns[name].std(ddof=1)
+            gaps[name] = {"mean": float(np.mean(difference)), "largest": float(np.abs(difference).max())}
+    return gaps
+
+
+def _person(row: Any) -> tuple[Any, ...]:
+    return row["assistance"], row["objects"], row["person_seed"]
+
+
+def same(row: dict[str, str]) -> bool:
+    """Whether both tiers decide the same."""
+    return row["full"].split(" (")[0] == row["event"].split(" (")[0]
+
+
+def lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result as text: a table of decisions in Markdown, and how far apart the same person is."""
+    yield f"{result['people']} simulated people in each tier"
+    yield ""
+    yield "| what is decided | full | event | same |"
+    yield "|---|---|---|---|"
+    for row in result["decisions"]:
+        yield f"| {row['what']} | {row['full']} | {row['event']} | {'yes' if same(row) else 'NO'} |"
+    yield ""
+    for name, gap in result["same_person"].items():
+        yield (
+            f"{name}: event - full is {gap['mean']:+.3f} standard deviations on average, {gap['largest']:.3f} at most"
+        )
+    agree, of = sum(map(same, result["decisions"])), len(result["decisions"])
+    yield f"decisions that agree: {agree} of {of} ({'pass' if agree == of else 'FAIL'})"
