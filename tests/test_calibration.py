@@ -207,7 +207,7 @@ def pool(count=250, seed=0):
 
 def test_what_counts_is_identified_and_what_does_not_is_not(monkeypatch):
     monkeypatch.setattr(inference, "KEPT", 0.05)
-    found = calibrate(table_of(pool()), FREE, read_published(), draws=800, seed=0)
+    found = calibrate([table_of(pool())], FREE, read_published(), draws=800, seed=0)
     contraction = dict(zip(TRUTH, found.fit.contraction().tolist(), strict=True))
     assert contraction["share"] > 0.5 > 0.4 > abs(contraction["idle"])
     sensitivity = found.fit.sensitivity()
@@ -215,7 +215,7 @@ def test_what_counts_is_identified_and_what_does_not_is_not(monkeypatch):
         abs(sensitivity[0, 0]) > 0.9 > 0.4 > abs(sensitivity[1, :3]).max()
     )  # nothing of either is in the times
     assert len(found.fit.kept) == 40
-    again = calibrate(table_of(pool()), FREE, read_published(), draws=800, seed=0)
+    again = calibrate([table_of(pool())], FREE, read_published(), draws=800, seed=0)
     assert np.array_equal(again.fit.distance, found.fit.distance)
 
 

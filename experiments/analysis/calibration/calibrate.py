@@ -9,10 +9,11 @@ import numpy as np
 
 from experiments.analysis.calibration.inference import OBJECTS, Cells, Fit, Rows, fit
 from experiments.analysis.calibration.population import FreeParameters
-from experiments.analysis.calibration.surrogate import Surrogate, learn
+from experiments.analysis.calibration.surrogate import Surrogate, Values, learn
 from experiments.analysis.published import Published
 from experiments.analysis.study_table import StudyTable
 from experiments.errors import RecordError, StatisticsError
+from experiments.origin import origin_of
 from experiments.participants.behaviour import BehaviourDistribution
 
 IDENTIFIED, WEAKLY = 0.7, 0.3  # contraction from which a parameter counts as identified, or as weakly so
@@ -64,7 +65,7 @@ class Calibration:
 
 
 def calibrate(
-    pool: StudyTable,
+    pools: Sequence[StudyTable],
     free: FreeParameters,
     published: Published,
     *,
@@ -75,7 +76,8 @@ def calibrate(
     """Learn surrogates from a pool and fit the free parameters to the published rows at 6 objects.
 
     Args:
-        pool: People in the cells of 6 objects, with parameters drawn widely; others are left out.
+        pools: People in the cells of 6 objects, of one or more tables, with parameters drawn widely; people in other
+            cells are left out.
         free: What is fitted.
         published: The published numbers.
         draws: How many populations are tried.
@@ -87,22 +89,34 @@ def calibrate(
         StatisticsError: A cell of the pool cannot be learnt from; the message names it.
     """
     rows = Rows.of(published)
-    cells = {name: _surrogate(pool, rows.measures(), name, free.inputs()) for name in rows.sizes}
+    cells = {name: _surrogate(pools, rows.measures(), name, free.inputs()) for name in rows.sizes}
+    origin = origin_of(row["user"] for pool in pools for row in pool.rows)
     found = fit(free, cells, rows, draws=draws, seed=seed, on_progress=on_progress)
-    return Calibration(pool.origin, free, rows, cells, found, seed)
+    return Calibration(origin, free, rows, cells, found, seed)
 
 
-def _surrogate(pool: StudyTable, measures: Sequence[str], condition: str, inputs: Sequence[str]) -> Surrogate:
+def _surrogate(
+    pools: Sequence[StudyTable], measures: Sequence[str], condition: str, inputs: Sequence[str]
+) -> Surrogate:
+    parts = [_people(pool, measures, condition, inputs) for pool in pools]
+    people, outcomes = (np.concatenate(part) for part in zip(*parts, strict=True))
+    try:
+        return learn(people, outcomes)
+    except StatisticsError as error:
+        raise StatisticsError(f"{condition}, {OBJECTS} objects: {error}") from error
+
+
+def _people(
+    pool: StudyTable, measures: Sequence[str], condition: str, inputs: Sequence[str]
+) -> tuple[Values, Values]:
+    """Values (n, inputs) and measures (n, measures) of the people of a cell."""
     unknown = [name for name in measures if name not in pool.columns]
     if unknown:
         raise StatisticsError(f"{unknown[0]} is not known of the pool")
-    values = np.column_stack([pool.columns[name] for name in measures])
-    here = (pool.assistance == condition) & (pool.objects == OBJECTS) & ~np.isnan(values).any(axis=1)
+    outcomes = np.column_stack([pool.columns[name] for name in measures])
+    here = (pool.assistance == condition) & (pool.objects == OBJECTS) & ~np.isnan(outcomes).any(axis=1)
     people = [[_value(pool.rows[k], name) for name in inputs] for k in np.flatnonzero(here).tolist()]
-    try:
-        return learn(np.array(people).reshape(-1, len(inputs)), values[here])
-    except StatisticsError as error:
-        raise StatisticsError(f"{condition}, {OBJECTS} objects: {error}") from error
+    return np.array(people, float).reshape(-1, len(inputs)), outcomes[here]
 
 
 def _value(row: Any, name: str) -> float:

@@ -42,7 +42,7 @@ def write_calibration(folder: Path, found: Calibration, study: Path) -> None:
     """
     about = (
         f"by `mjsim study calibrate` to the rows at 6 objects: {len(found.fit.draws)} draws, seed {found.seed}, from "
-        f"{sum(s.people for s in found.surrogates.values())} people of pool.toml."
+        f"{sum(s.people for s in found.surrogates.values())} simulated people."
     )
     text = fitted_study(study, found.behaviour(), about)
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,8 @@
 """A surrogate of trials: what a person's values make of the measures, learnt from simulated people of one cell.
 
-The expectation is a quadratic function of the values, each as the share of the pool that lies below it; squares of
-what is left follow a log-linear one. Coefficients are shrunk (ridge regression) as generalised cross-validation says.
+The expectation is a quadratic function of the values, each as the share of the pool that lies below it; the logarithm
+of the variance around it is a linear one. Slopes are shrunk (ridge regression), those of the expectation as generalised
+cross-validation says.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,8 @@ from experiments.errors import StatisticsError
 Values = NDArray[np.float64]
 PENALTIES = np.logspace(-3, 4, 29)
 FEWEST = 30  # people from whom anything can be learnt
+ITERATIONS, STEP = 200, 0.2  # of the fit of variances
+SLOPE_PENALTY = 2.0
 SMALLEST = 1e-4  # of the variance of the pool: nobody's outcome is surer than that
 
 
@@ -68,11 +71,28 @@ def learn(people: Values, outcomes: Values) -> Surrogate:
 
 def _learn_one(shares: Values, outcome: Values) -> tuple[Values, Values, float]:
     mean, left_out = ridge(_quadratic(shares), outcome)
-    squares = np.log(np.maximum(left_out**2, SMALLEST * outcome.var()))
-    log_variance, _ = ridge(_linear(shares), squares)
-    # The mean of logarithms is less than the logarithm of the mean.
-    log_variance[0] += np.log(np.mean(left_out**2 / np.exp(_linear(shares) @ log_variance)))
-    return mean, log_variance, float(1.0 - np.mean(left_out**2) / outcome.var())
+    squares = np.maximum(left_out**2, SMALLEST * outcome.var())
+    return mean, log_linear(_linear(shares), squares), float(1.0 - np.mean(left_out**2) / outcome.var())
+
+
+def log_linear(terms: Values, squares: Values) -> Values:
+    """Coefficients of the logarithm of the expectation of squares, by gamma regression with shrunk slopes.
+
+    The likelihood is that of a normal distribution whose variance differs from person to person.
+
+    Args:
+        terms: The first one is 1, (n, terms).
+        squares: All positive, (n,).
+
+    Source: McCullagh and Nelder 1989, Generalized Linear Models, chapter 8.
+    """
+    penalty = np.diag([0.0] + [SLOPE_PENALTY] * (terms.shape[1] - 1))
+    normal, found = terms.T @ terms + penalty, np.zeros(terms.shape[1])
+    found[0] = np.log(squares.mean())
+    for _ in range(ITERATIONS):
+        surprise = squares / np.exp(terms @ found) - 1.0
+        found = found + STEP * np.linalg.solve(normal, terms.T @ surprise - penalty @ found)
+    return found
 
 
 def ridge(terms: Values, outcome: Values) -> tuple[Values, Values]:

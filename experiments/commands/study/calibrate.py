@@ -25,6 +25,9 @@ are nearest to the published one (approximate Bayesian computation). Writes
   kept.csv            the parameters that are kept
   study.toml          the study with the best population, for `mjsim study simulate` to confirm
 
+Where a study with that population does not come out as the surrogate has it, calibrate again with the folder of that
+study named as well: its people at 6 objects are learnt from, too, and nothing else of it is looked at.
+
 What fits is not therefore true; docs/study.md says what may be concluded."""
 
 
@@ -37,7 +40,9 @@ def add_parser(commands: Any) -> None:
         summary="fit the guest to the published rows at 6 objects",
         description=DESCRIPTION,
     )
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the pool")
+    parser.add_argument(
+        "folders", type=Path, nargs="+", metavar="DIR", help="folder of a pool; results go to the first"
+    )
     parser.add_argument(
         "--study", default="paper", metavar="STUDY.toml", help="study to write for (default: %(default)s)"
     )
@@ -72,15 +77,15 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(
             f"--draws {arguments.draws} must be 100 or more, and --seed {arguments.seed} 0 or more"
         )
-    out = arguments.folder / "calibration" if arguments.out is None else arguments.out
+    out = arguments.folders[0] / "calibration" if arguments.out is None else arguments.out
     for name in FILES:
         check_file(out / name, replace=arguments.force)
-    pool = read_study(arguments.folder, read_measures())
+    pools = [read_study(folder, read_measures()) for folder in arguments.folders]
     columns = TextColumn("populations"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with progress_bars(error_console(), *columns) as bars:
         bar = bars.add_task("populations", total=arguments.draws)
         found = calibrate(
-            pool,
+            pools,
             read_free_parameters(),
             read_published(),
             draws=arguments.draws,
