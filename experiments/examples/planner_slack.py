@@ -170,14 +170,15 @@ def draw(path: Path, found: Sequence[Slack]) -> None:
         for cell in (cell for cell in found if cell.assistance == assistance):
             k = names.index(cell.planner)
             place = levels.index(cell.objects) + 0.2 * (k - (len(names) - 1) / 2)
-            label = cell.planner if cell.objects == levels[0] else None
+            first = cell.objects == levels[0] and assistance == CONDITIONS[0]
+            label = cell.planner if first else None
             axes.bar(place, cell.deviations, 0.18, color=COLOURS[k], label=label)
             axes.bar(place, cell.better, 0.18, color="none", edgecolor="white", hatch="////", lw=0)
         axes.set_xticks(range(len(levels)), [f"{n} objects" for n in levels])
         axes.set_title(f"assistance: {assistance}", fontsize=10)
         axes.spines[["top", "right"]].set_visible(False)
     figure.axes[0].set_ylabel("share of choices that deviate\n(hatched: to a better visit)")
-    figure.axes[0].legend(fontsize=8, frameon=False, title="suggestions by", title_fontsize=8)
+    figure.legend(fontsize=8, frameon=False, ncols=len(names), loc="outside lower center")
     mark_origin(figure, found[0].origin)
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=120, metadata={"Software": "mjsim"})
