@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.model.receptacles import ReceptacleGeometry
-from mjsim.visibility import OFFSETS, FieldOfView, first_hit, in_field_of_view
+from mjsim.sight_lines import OFFSETS
+from mjsim.visibility import FieldOfView, first_hit, in_field_of_view
 
 WALL = 0.06  # m: what lies nearer to a volume is the receptacle's own wall
 

@@ -10,10 +10,11 @@ import pyarrow.parquet as pq
 import pytest
 from study_people import SIZES, made_up_people, table_of
 
+from experiments.analysis.expenses import Expenses
 from experiments.analysis.measures import read_measures
 from experiments.analysis.statistics.power import people_per_cell
 from experiments.analysis.study_analysis import analyse
-from experiments.analysis.study_power import Expenses, Wanted, plan_power
+from experiments.analysis.study_power import Wanted, plan_power
 from experiments.cli import main
 from experiments.errors import ConfigError, RecordError, StatisticsError
 from experiments.origin import RECORDED, SIMULATED

@@ -12,7 +12,8 @@ from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import Scene, compose
 from mjsim.person_parameters import PersonParameters
-from mjsim.visibility import OFFSETS, FieldOfView, visible_objects
+from mjsim.sight_lines import OFFSETS
+from mjsim.visibility import FieldOfView, visible_objects
 from planner.navmesh import NavMesh
 
 EYE_HEIGHT = 1.6

@@ -9,7 +9,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from experiments.web import messages, protocol
 from experiments.web.messages import Message
-from experiments.web.sessions import PlayedSession
+from experiments.web.played_session import PlayedSession
 
 HELLO_PATIENCE = 10.0  # s for the first message
 OLD_PATIENCE = 0.5  # s that the connection before has to end, as when a page is loaded again

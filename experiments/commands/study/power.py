@@ -58,8 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
         StatisticsError: The pool does not say it.
     """
     require_statsmodels()
+    from experiments.analysis.expenses import Expenses
     from experiments.analysis.measures import read_measures
-    from experiments.analysis.study_power import Expenses, Wanted, plan_power
+    from experiments.analysis.study_power import Wanted, plan_power
     from experiments.analysis.study_table import read_study
     from experiments.errors import ConfigError
     from experiments.files import write_json
