@@ -236,7 +236,7 @@ class Participant(Protocol):
 
     Attributes:
         needs: Roles of the world-locked markers it cannot do without (`breadcrumb`, `flagpole`); a session in a
-            condition that shows none of them is refused at the start.
+            condition that shows none of them is refused at the start. May be left out where there are none.
     """
 
     needs: frozenset[str]

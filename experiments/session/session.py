@@ -13,7 +13,7 @@ from experiments.session.assistant import Assistant
 from experiments.session.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
 from experiments.session.locomotion import LocomotionController
 from experiments.session.perception import SessionPercept
-from experiments.session.user_code import decide, describe
+from experiments.session.user_code import decide, describe, needs_of
 from experiments.session.viewer import OnProgress, Progress, Viewer
 from experiments.signals import signal_of
 from hud.state import HudState
@@ -107,10 +107,10 @@ class Session:
         """
         self._now = observation
         self._delivered = len(observation.names_with(ObjectStatus.DELIVERED))
-        shown = self.assistant.shown_roles
-        if not self._participant.needs <= shown:
+        shown, needs = self.assistant.shown_roles, needs_of(self._participant)
+        if not needs <= shown:
             raise SessionError(
-                f"this participant needs {sorted(self._participant.needs)} markers but the assistance condition shows "
+                f"this participant needs {sorted(needs)} markers but the assistance condition shows "
                 f"{sorted(shown) or 'none'}; choose another --user or --assistance"
             )
 

@@ -1,6 +1,6 @@
 """Calling code that is not ours: participants, conditions and planners that users plug in."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 
 import numpy as np
@@ -79,7 +79,23 @@ def make_participant(
         made = make(house, rng, behaviour) if behaviour else make(house, rng)  # type: ignore[call-arg]
     if not callable(getattr(made, "act", None)):
         raise UserCodeError(f"participant {name!r} is {made!r}, which has no method act(percept)")
+    needs_of(made)
     return made
+
+
+def needs_of(participant: Participant) -> frozenset[str]:
+    """Roles of the markers that a participant cannot do without; one that says nothing needs none.
+
+    Raises:
+        UserCodeError: What it says is no set of names.
+    """
+    needs = getattr(participant, "needs", frozenset())
+    if not isinstance(needs, Set) or not all(isinstance(role, str) for role in needs):
+        raise UserCodeError(
+            f"participant {type(participant).__qualname__} needs {needs!r}; "
+            'it must be a set of marker roles, such as frozenset({"flagpole"})'
+        )
+    return frozenset(needs)
 
 
 def decide(participant: Participant, percept: Percept) -> Decision:

@@ -126,3 +126,22 @@ def test_one_line_and_the_traceback_in_a_report(tmp_path, own_module, capsys, mo
     line = one_line(capsys.readouterr().err)
     report = Path(line.rpartition(" ")[2]).read_text()
     assert "ZeroDivisionError" in report and "own_code.py" in report
+
+
+def test_a_participant_that_says_nothing_of_markers_needs_none(house, tmp_path, monkeypatch):
+    (tmp_path / "own_code.py").write_text(
+        PARTICIPANT.format(after=5, fault="raise EOFError").replace("    needs = frozenset()\n", "")
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(UserCodeError, match="EOFError"):  # it acts until then
+        run(house, tmp_path / "run", user="own_code:build")
+    sys.modules.pop("own_code")
+
+
+def test_needs_that_are_no_set_of_roles_are_refused(house, tmp_path, monkeypatch):
+    text = PARTICIPANT.format(after=5, fault="pass").replace("needs = frozenset()", "needs = 'flagpole'")
+    (tmp_path / "own_code.py").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(UserCodeError, match="needs 'flagpole'; it must be a set of marker roles"):
+        run(house, tmp_path / "run", user="own_code:build")
+    sys.modules.pop("own_code")
