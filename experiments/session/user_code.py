@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -89,7 +90,7 @@ def needs_of(participant: Participant) -> frozenset[str]:
     Raises:
         UserCodeError: What it says is no set of names.
     """
-    needs = getattr(participant, "needs", frozenset())
+    needs: Any = getattr(participant, "needs", frozenset())
     if not isinstance(needs, Set) or not all(isinstance(role, str) for role in needs):
         raise UserCodeError(
             f"participant {type(participant).__qualname__} needs {needs!r}; "
