@@ -109,8 +109,9 @@ class Session:
         self._delivered = len(observation.names_with(ObjectStatus.DELIVERED))
         shown, needs = self.assistant.shown_roles, needs_of(self._participant)
         if not needs <= shown:
+            name = type(self._participant).__qualname__
             raise SessionError(
-                f"this participant needs {sorted(needs)} markers but the assistance condition shows "
+                f"participant {name} needs {sorted(needs)} markers but the assistance condition shows "
                 f"{sorted(shown) or 'none'}; choose another --user or --assistance"
             )
 
