@@ -90,7 +90,8 @@ def test_an_optimal_plan_stays_optimal_while_it_is_followed():
         route = guide.update(state)
         anew = solver("exact").solve(guide.problems.problem(state))
         assert anew.status is Status.OPTIMAL
-        assert route.cost == pytest.approx(anew.cost, abs=5e-3)
+        left = guide.problems.length(state, route.visits)
+        assert left == pytest.approx(anew.cost, abs=5e-3)
         kind, name = route.next
         if kind is VisitKind.PICK:
             position = loose.pop(name)
