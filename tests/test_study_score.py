@@ -20,6 +20,7 @@ from experiments.analysis.score import (
 )
 from experiments.analysis.score_population import population_eta_squared
 from experiments.cli import main
+from experiments.errors import StatisticsError
 from experiments.trials.table import write_tables
 
 PUBLISHED = read_published()
@@ -128,6 +129,12 @@ def test_missing_cells_and_measures_say_so():
     assert found[INFERENCE, "ipl", "assistance", 6].remark == "ipl is not known"
     assert "nobody is in the cell optimal" in found[INFERENCE, "deviations", "assistance", None].remark
     assert found[DIRECTION, "deviations", "optimal < none", 6].agrees is None
+
+
+def test_people_of_no_published_cell_are_refused():
+    table = table_of(made_up_people({("none", 2): 3, ("optimal", 2): 3}))
+    with pytest.raises(StatisticsError, match=r"nobody is in a cell .*\[6, 12, 18, 24\] objects"):
+        score(table, PUBLISHED)
 
 
 def test_studies_are_drawn_from_the_same_cells(pool):

@@ -104,9 +104,17 @@ def score(table: StudyTable, published: Published, *, seed: int = 0) -> Score:
         table: Its people; those in other cells than the published ones are left out.
         published: The published numbers.
         seed: Of the studies that are drawn from a pool.
+
+    Raises:
+        StatisticsError: Nobody is in a cell of the published study.
     """
     inside = published_cells(table, published)
     sizes = published.people.sizes()
+    if not inside.rows:
+        conditions, numbers = (list(dict.fromkeys(cell[k] for cell in sizes)) for k in range(2))
+        raise StatisticsError(
+            f"nobody is in a cell of the published study: {conditions} with {numbers} objects"
+        )
     known = Counter(zip(inside.assistance.tolist(), inside.objects.tolist(), strict=True))
     is_pool = all(known[cell] >= POOL for cell in sizes)
     judge = _Judge(inside, published, tuple(draw(inside, published, seed)) if is_pool else ())
