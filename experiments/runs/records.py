@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.files import write_text_atomically
 
-# 6: the participant. 5: distances between places, ties, gaps of suggestions. 4: typed checkpoints. 3: untyped ones.
-# 2: no health of the physics. 1: neither state hashes nor checkpoints.
+# 7: groups of a person's values. 6: the participant. 5: distances between places, ties, gaps of suggestions.
+# 4: typed checkpoints. 3: untyped ones. 2: no health of the physics. 1: neither state hashes nor checkpoints.
 LOG_FORMAT = 7
 FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
