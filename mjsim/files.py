@@ -127,3 +127,11 @@ def _remove_abandoned(path: Path) -> None:
             path.unlink()
     finally:
         os.close(handle)
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; not where no file can have such a name (too long, a null character)."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False

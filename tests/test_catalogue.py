@@ -128,3 +128,11 @@ def test_a_package_without_models_says_where_it_looked(
     with pytest.raises(AssetError) as caught:
         models_root()
     assert str(tmp_path.resolve() / "models") in str(caught.value)
+
+
+def test_a_name_that_no_file_can_have_is_refused_as_any_other(copy: Path) -> None:
+    spoiled = copy.read_text(encoding="utf-8").replace('"house.xml"', f'"{"x" * 5000}"', 1)
+    copy.write_text(spoiled, encoding="utf-8")
+    with pytest.raises(AssetError, match="which is neither in") as refused:
+        Catalogue.load(str(copy))
+    assert len(str(refused.value)) < 1000

@@ -8,6 +8,7 @@ from typing import Annotated, Any, TypeVar
 import msgspec
 
 from mjsim.errors import AssetError, brief
+from mjsim.files import is_file
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue_files import catalogue_path, read_tables
 from mjsim.model.model_files import content_hash
@@ -202,11 +203,11 @@ class _Reader:
     def _file(self, entry: _ModelEntry, where: str) -> Path:
         """The model's file, relative to the catalogue, else to the models that come with the package."""
         for folder in (self._path.parent, models_root()):
-            if (folder / entry.model).is_file():
+            if is_file(folder / entry.model):
                 return folder / entry.model
         raise self._error(
             where,
-            f"names the model {entry.model}, which is neither in {self._path.parent} nor in {models_root()}",
+            f"names the model {entry.model:.200}, which is neither in {self._path.parent} nor in {models_root()}",
         )
 
     def _checked_categories(self) -> dict[str, Category]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from mjsim.errors import AssetError, brief
+from mjsim.files import is_file
 from mjsim.model.assets import models_root
 
 
@@ -16,13 +17,13 @@ def catalogue_path(house: str, folder: Path = Path()) -> Path:
     """
     if house.endswith(".toml"):
         path = folder / house
-        if not path.is_file():
+        if not is_file(path):
             raise AssetError(f"no catalogue at {path}; give a house name or the path of a catalogue.toml")
         return path.resolve()
     houses = models_root() / "houses"
     path = houses / house / "catalogue.toml"
     # A name with a separator would leave the folder of houses: that is a path, and paths end in .toml.
-    if Path(house).name != house or not path.is_file():
+    if Path(house).name != house or not is_file(path):
         known = sorted(p.parent.name for p in houses.glob("*/catalogue.toml"))
         raise AssetError(f"no house {house!r}; there are {known}, or give the path of a catalogue.toml")
     return path
@@ -70,5 +71,5 @@ def _name_models(tables: dict[str, Any], folder: Path) -> None:
     for entry in entries:
         if isinstance(entry, dict) and isinstance(entry.get("model"), str):
             beside = folder / entry["model"]
-            if beside.is_file():
+            if is_file(beside):
                 entry["model"] = str(beside)
