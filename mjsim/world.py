@@ -67,6 +67,12 @@ class World:
         """The state, for rendering and rays; read-only. Get it anew after every step."""
         return self._tier.data
 
+    def copy_data(self, into: mujoco.MjData | None = None) -> mujoco.MjData:
+        """A copy of `data`, to draw while the world goes on; in one made before, where it is given."""
+        copied = mujoco.MjData(self.model) if into is None else into
+        mujoco.mj_copyData(copied, self.model, self.data)
+        return copied
+
     @property
     def control_timestep(self) -> float:
         """Simulated time of one `step`, s."""

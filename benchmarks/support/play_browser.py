@@ -64,6 +64,7 @@ class SimulatedBrowser:
         codec: `jpeg`, `h264` or `none`.
         state: Whether to ask for states.
         link: What the network does.
+        size: Of the view, px.
         seed: Of the network's chance.
 
     Attributes:
@@ -81,11 +82,12 @@ class SimulatedBrowser:
         codec: str = "none",
         state: bool = False,
         link: Link | None = None,
+        size: tuple[int, int] = (640, 480),
         seed: int = 0,
     ) -> None:
         self.address = address
         self._tab = secrets.token_hex(8)
-        self._view = {"type": "view", "width": 640, "height": 480, "codec": codec, "state": state}
+        self._view = {"type": "view", "width": size[0], "height": size[1], "codec": codec, "state": state}
         self._link, self._rng = link or Link(), np.random.default_rng(seed)
         self._changed = asyncio.Condition()
         self._tasks: list[asyncio.Task[None]] = []
@@ -128,6 +130,11 @@ class SimulatedBrowser:
         """Forget all that a page forgets when it is loaded again."""
         self._waiting, self._tab = [], secrets.token_hex(8)
 
+    def forget(self) -> None:
+        """Forget the frames and inputs so far."""
+        self.frames.clear()
+        self.sent_at.clear()
+
     def say(self, **message: Any) -> None:
         """Send a message."""
         due = time.perf_counter() + self._link.delay(self._rng)
@@ -147,16 +154,21 @@ class SimulatedBrowser:
 
         Raises:
             TimeoutError: It does not.
+            ConnectionError: The server has closed the connection.
         """
 
         async def wait() -> None:
             async with self._changed:
-                await self._changed.wait_for(holds)
+                await self._changed.wait_for(lambda: holds() or "closed" in self.last)
 
         try:
             await asyncio.wait_for(wait(), seconds)
         except TimeoutError as error:
-            raise TimeoutError(f"the server did not answer within {seconds:.0f} s: {self.last}") from error
+            raise TimeoutError(
+                f"the server did not answer within {seconds:.0f} s; it said {sorted(self.last)}"
+            ) from error
+        if not holds():
+            raise ConnectionError(f"the server closed the connection; it said {sorted(self.last)}")
 
     async def ready(self) -> dict[str, Any]:
         """Wait until the session is ready and runs; what was not acknowledged is sent again."""
@@ -190,16 +202,24 @@ class SimulatedBrowser:
                 await self._socket.send(text)
 
     async def _receive_all(self) -> None:
+        arriving: asyncio.Queue[tuple[float, str | bytes]] = asyncio.Queue()
+        self._tasks.append(asyncio.create_task(self._take_all(arriving)))
         with suppress(ConnectionClosed):
             while self._socket is not None:
                 message = await self._socket.recv()
-                delay = self._link.delay(self._rng)
-                if delay:
-                    await asyncio.sleep(delay)
-                self._take(message)
-                async with self._changed:
-                    self._changed.notify_all()
+                arriving.put_nowait((time.perf_counter() + self._link.delay(self._rng), message))
         self.last["closed"] = {}
+        await self._notify()
+
+    async def _take_all(self, arriving: asyncio.Queue[tuple[float, str | bytes]]) -> None:
+        """Take each message when it is due, and none before those sent earlier, as TCP has it."""
+        while True:
+            due, message = await arriving.get()
+            await asyncio.sleep(max(0.0, due - time.perf_counter()))
+            self._take(message)
+            await self._notify()
+
+    async def _notify(self) -> None:
         async with self._changed:
             self._changed.notify_all()
 

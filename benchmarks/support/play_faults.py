@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support.play_browser import SimulatedBrowser, begin_task
-from benchmarks.support.play_server import PlayProcess, fill_disk, worker_of
+from benchmarks.support.play_server import PlayProcess, Say, fill_disk, worker_of
 from experiments.errors import ExperimentError
 from experiments.replaying.replay import replay
 from experiments.web.journal import read_journal
@@ -172,13 +172,14 @@ FAULTS: dict[str, Callable[[FaultyVisit], Awaitable[float]]] = {
 }
 
 
-def measure_faults(folder: Path, count: int, seed: int, *words: str) -> dict[str, Any]:
+def measure_faults(folder: Path, count: int, seed: int, say: Say, *words: str) -> dict[str, Any]:
     """Disturb visits so many times, every kind about as often as another.
 
     Args:
         folder: Of the visits.
         count: Of faults.
         seed: Of everything that chance decides.
+        say: Takes a line about what is under way.
         words: Further words of the server's command line.
     """
     rng = np.random.default_rng(seed)
@@ -187,6 +188,7 @@ def measure_faults(folder: Path, count: int, seed: int, *words: str) -> dict[str
     problems: list[str] = []
     with PlayProcess(folder, *words) as server:
         for first in range(0, count, FAULTS_OF_A_VISIT):
+            say(f"fault {first} of {count}")
             visit = FaultyVisit(server, seed + first)
             asyncio.run(visit.play(names[first : first + FAULTS_OF_A_VISIT]))
             problems += visit.problems

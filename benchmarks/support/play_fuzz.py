@@ -181,7 +181,7 @@ async def _fuzz(
 async def _rounds(browser: SimulatedBrowser, count: int | None) -> list[float]:
     """Times from an input to its acknowledgement, s; until cancelled where there is no count."""
     times: list[float] = []
-    with suppress(asyncio.CancelledError):
+    with suppress(asyncio.CancelledError, ConnectionError):
         while count is None or len(times) < count:
             began = time.perf_counter()
             browser.press(turn=float(len(times) % 3 - 1))

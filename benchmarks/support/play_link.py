@@ -1,4 +1,4 @@
-"""A slow link between a browser and a server: a relay that delays, limits and counts what passes."""
+"""A slow link between a browser and a server: a proxy that delays, limits and counts what passes."""
 
 import asyncio
 import socket
@@ -18,7 +18,7 @@ def free_port() -> int:
 
 
 class SlowLink:
-    """Relays connections to a port of this machine. Use as a context manager.
+    """Forwards connections to a port of this machine. Use as a context manager.
 
     Args:
         bits: Bits a second, each way, for all connections together.
@@ -59,9 +59,9 @@ class SlowLink:
     async def _connect(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await asyncio.sleep(2.0 * self._delay)  # the handshake
         there, back = await asyncio.open_connection("127.0.0.1", self.target)
-        await asyncio.gather(self._relay(reader, back, 0), self._relay(there, writer, 1))
+        await asyncio.gather(self._forward(reader, back, 0), self._forward(there, writer, 1))
 
-    async def _relay(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, way: int) -> None:
+    async def _forward(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, way: int) -> None:
         passing: asyncio.Queue[tuple[float, bytes]] = asyncio.Queue()
         arriving = asyncio.create_task(self._arrive(passing, writer))
         with suppress(OSError):

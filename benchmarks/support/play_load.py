@@ -1,4 +1,4 @@
-"""How fast `mjsim play` answers, what a session costs, and whether hours of play leave anything behind."""
+"""How fast `mjsim play` answers, what a session costs, and how many sessions a machine holds."""
 
 import asyncio
 import math
@@ -9,27 +9,38 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.support.play_browser import Link, SimulatedBrowser, begin_task
-from benchmarks.support.play_server import PATIENCE, PlayProcess, memory, processor_time, worker_of
+from benchmarks.support.play_browser import Link, SimulatedBrowser
+from benchmarks.support.play_server import TASK_ALONE, PlayProcess, Say, memory, processor_time, worker_of
+from experiments.runs.phases import TASK
 
 PERIOD = 0.25  # s between two inputs
 MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
-SAMPLES = 12  # of the memory
-WARMING_UP = 0.25  # share of the masher's time whose memory does not count
+SETTLING = 3.0  # s in which a session finds the size of its frames
+LEAST_FPS, MOST_MS = 15.0, 150.0  # what a session that holds has: frames a second, 95 % from input to frame
+CASES = {  # codec, states, link
+    "jpeg": ("jpeg", False, Link()),
+    "h264": ("h264", False, Link()),
+    "state": ("none", True, Link()),
+    "jpeg, slow link": ("jpeg", False, MOBILE),
+    "h264, slow link": ("h264", False, MOBILE),
+}
 
 
-def measure_latency(folder: Path, seconds: float, *words: str) -> dict[str, Any]:
-    """From an input to the frame that shows it, frames a second and bandwidth, for codecs and links."""
-    cases = {
-        "jpeg": ("jpeg", False, Link()),
-        "h264": ("h264", False, Link()),
-        "state": ("none", True, Link()),
-        "h264, slow link": ("h264", False, MOBILE),
-    }
+def measure_latency(folder: Path, seconds: float, say: Say, *words: str) -> dict[str, Any]:
+    """From an input to the frame that shows it, frames a second and bandwidth, for codecs and links.
+
+    Args:
+        folder: Of the visits.
+        seconds: How long for each.
+        say: Takes a line about what is under way.
+        words: Further words of the server's command line.
+    """
     found = {}
-    with PlayProcess(folder, "--sessions", "2", *words) as server:
-        for name, (codec, state, link) in cases.items():
-            found[name] = asyncio.run(_latency(server, seconds, codec, state, link))
+    with PlayProcess(folder, *TASK_ALONE, "--sessions", "2", *words) as server:
+        server.wait_until_warm()
+        for name, case in CASES.items():
+            say(f"{name}, {seconds:.0f} s")
+            found[name] = asyncio.run(_latency(server, seconds, *case))
     return found
 
 
@@ -39,7 +50,7 @@ async def _latency(
     address = server.begin()
     browser = SimulatedBrowser(address, codec=codec, state=state, link=link)
     await _show_something(browser)
-    worker = worker_of(server.journal(address, "task"))
+    worker = worker_of(server.journal(address, TASK))
     before = [processor_time(pid) for pid in (worker, server.process.pid)]
     browser.bytes, began = 0, time.perf_counter()
     trips = await _turn(browser, seconds)
@@ -53,46 +64,67 @@ async def _latency(
         "cores": (busy[0] - before[0]) / passed,
         "server_cores": (busy[1] - before[1]) / passed,
     }
-    await browser.leave()
+    await browser.close()
     return result
 
 
-def measure_crowd(folder: Path, seconds: float, codec: str, a_core: int, *words: str) -> dict[str, float]:
-    """So many sessions for each core at once: frames a second of the slowest, and the answers of all.
+def measure_capacity(
+    folder: Path, seconds: float, codec: str, most: int, say: Say, *words: str
+) -> dict[str, Any]:
+    """How many sessions at once hold 15 frames a second and 150 ms: so many, or fewer until they do.
 
     Args:
-        folder: Of the visits.
-        seconds: How long.
+        folder: Gets a folder of visits for each number of sessions.
+        seconds: How long for each number.
         codec: Of their frames; `none` for states.
-        a_core: Sessions for each core.
+        most: Sessions to begin with.
+        say: Takes a line about what is under way.
         words: Further words of the server's command line.
     """
-    count = a_core * (os.cpu_count() or 1)
-    with PlayProcess(folder, "--sessions", str(count), *words) as server:
-        return asyncio.run(_crowd(server, seconds, codec, count))
+    tried = []
+    for count in range(most, 0, -max(1, most // 6)):
+        say(f"{count} sessions at once, {codec}, {seconds:.0f} s")
+        with PlayProcess(
+            folder / f"{codec}-{count}", *TASK_ALONE, "--sessions", str(count), *words
+        ) as server:
+            server.wait_until_warm()
+            tried.append(asyncio.run(_sessions_at_once(server, seconds, codec, count)))
+        if tried[-1]["holds"]:
+            break
+    held = tried[-1]["sessions"] if tried[-1]["holds"] else 0
+    return {"tried": tried, "a_core": held / (os.cpu_count() or 1)}
 
 
-async def _crowd(server: PlayProcess, seconds: float, codec: str, count: int) -> dict[str, float]:
+async def _sessions_at_once(server: PlayProcess, seconds: float, codec: str, count: int) -> dict[str, float]:
     browsers = [SimulatedBrowser(server.begin(), codec=codec, state=codec == "none") for _ in range(count)]
     await asyncio.gather(*(_show_something(browser) for browser in browsers))
+    workers = [worker_of(server.journal(browser.address, TASK)) for browser in browsers]
+    processes = [*workers, server.process.pid, os.getpid()]
+    before = [processor_time(pid) for pid in processes]
     trips = await asyncio.gather(*(_turn(browser, seconds) for browser in browsers))
     rates = [len(browser.frames) / seconds for browser in browsers]
-    workers = [worker_of(server.journal(browser.address, "task")) for browser in browsers]
+    busy = np.subtract([processor_time(pid) for pid in processes], before) / seconds
+    answers = _answers([trip for times in trips for trip in times], rates)
     result = {
-        **_answers([trip for times in trips for trip in times], rates),
+        **answers,
+        "holds": int(answers["fps"] >= LEAST_FPS and answers["p95_ms"] <= MOST_MS),
         "sessions": count,
         "memory_mb": float(np.mean([memory(worker) for worker in workers])),
         "width": float(np.median([browser.frames[-1].width for browser in browsers])),
+        "cores": float(np.mean(busy[:count])),
+        "server_cores": float(busy[-2]),
+        "browser_cores": float(busy[-1]),
     }
-    await asyncio.gather(*(browser.leave() for browser in browsers))
+    await asyncio.gather(*(browser.close() for browser in browsers))
     return result
 
 
 async def _show_something(browser: SimulatedBrowser) -> None:
-    """Start the task of a visit, and wait for frames."""
-    await begin_task(browser)
+    """Start the task of a visit that has no other phase, and turn until the size of its frames is found."""
+    await browser.open(TASK)
+    await browser.ready()
     await browser.until(lambda: bool(browser.frames))
-    await asyncio.sleep(1.0)
+    await _turn(browser, SETTLING)
 
 
 async def _turn(browser: SimulatedBrowser, seconds: float) -> list[float]:
@@ -119,55 +151,6 @@ def _answers(trips: list[float], rates: list[float]) -> dict[str, float]:
         "p95_ms": float(np.percentile(trips, 95)) if trips else math.inf,
         "median_ms": float(np.median(trips)) if trips else math.inf,
     }
-
-
-def measure_masher(folder: Path, minutes: float, seed: int, *words: str) -> dict[str, Any]:
-    """Press keys at random for so long: memory over time, and whether anything is stuck."""
-    with PlayProcess(folder, *words) as server:
-        return asyncio.run(_mash(server, 60.0 * minutes, np.random.default_rng(seed)))
-
-
-async def _mash(server: PlayProcess, seconds: float, rng: np.random.Generator) -> dict[str, Any]:
-    address = server.begin()
-    browser = SimulatedBrowser(address, codec="jpeg", state=True)
-    await browser.open("training")  # it has no limit of time
-    await browser.ready()
-    worker = worker_of(server.journal(address, "training"))
-    memories, began, longest = list[tuple[float, float]](), time.perf_counter(), 0.0
-    while (passed := time.perf_counter() - began) < seconds:
-        if passed >= len(memories) * seconds / SAMPLES:
-            memories.append((memory(worker), memory(server.process.pid)))
-        for _ in range(20):
-            _mash_once(browser, rng)
-            await asyncio.sleep(float(rng.exponential(0.04)))
-        sent = time.perf_counter()
-        await browser.taken()
-        longest = max(longest, time.perf_counter() - sent)
-        if "over" in browser.last:
-            break
-    steady = np.array(memories[max(1, int(WARMING_UP * len(memories))) :])
-    return {
-        "minutes": (time.perf_counter() - began) / 60.0,
-        "inputs": browser.acknowledged,
-        "longest_wait_s": longest,
-        "worker_mb": [round(first, 1) for first, _ in memories],
-        "server_mb": [round(second, 1) for _, second in memories],
-        "growth": [float(g) for g in (steady[-1] - steady[0]) / steady[0]] if len(steady) else [0.0, 0.0],
-        "frames": len(browser.frames),
-        "patience_s": PATIENCE,
-    }
-
-
-def _mash_once(browser: SimulatedBrowser, rng: np.random.Generator) -> None:
-    axes = {name: float(rng.choice([-1.0, 0.0, 1.0])) for name in ("forward", "left", "turn", "look")}
-    more: dict[str, Any] = {}
-    if rng.random() < 0.3:
-        more["yaw"] = float(rng.normal(0.0, 1.0))
-    if rng.random() < 0.2:
-        more["press"] = str(rng.choice(["left hand", "right hand", "act"]))
-    if rng.random() < 0.1:
-        more["scroll"] = int(rng.integers(-3, 4))
-    browser.press(**axes, **more)
 
 
 def load() -> float:

@@ -10,7 +10,7 @@ import msgspec
 
 from benchmarks.support.play_keys import CHROMIUM, play_by_keys
 from benchmarks.support.play_link import SlowLink
-from benchmarks.support.play_server import PATIENCE, PlayProcess
+from benchmarks.support.play_server import PATIENCE, PlayProcess, Say
 from experiments.errors import ExperimentError
 from experiments.house import House
 from experiments.replaying.replay import replay
@@ -25,16 +25,21 @@ NOT_EMPTY = (
 )
 
 
-def measure_pages(folder: Path, objects: int, *words: str) -> dict[str, Any]:
+def measure_pages(folder: Path, objects: int, say: Say, *words: str) -> dict[str, Any]:
     """Do a task in every condition by key events, and load the first frame over a slow link.
 
     Args:
         folder: Gets a folder of visits for each server.
         objects: Of a task.
+        say: Takes a line about what is under way.
         words: Further words of the server's command line.
     """
     with _chromium() as browser:
-        tasks = {name: _task(browser, folder / name, objects, name, *words) for name in ASSISTANCE}
+        tasks = {}
+        for name in ASSISTANCE:
+            say(f"{objects} objects under {name}")
+            tasks[name] = _task(browser, folder / name, objects, name, *words)
+        say("a slow link")
         seconds, megabytes = _first_frame(browser, folder / "link", *words)
     return {
         "tasks": tasks,

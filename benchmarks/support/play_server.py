@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -16,9 +17,12 @@ import httpx
 from experiments.web.journal import JOURNAL
 from experiments.web.visits import JOURNALS, token_hash
 
-PATIENCE = 300.0  # s; a loaded machine may be slow
+PATIENCE = 120.0  # s; a loaded machine may be slow
+TASK_ALONE = ("--phases", "task")  # words of a server whose visits consist of the task
 IDLE = 0.5  # s without work after which the process that forks workers is taken for warm
 _TICKS = os.sysconf("SC_CLK_TCK")
+
+Say = Callable[[str], None]  # takes a line about what a benchmark does at the moment
 
 
 class PlayProcess:
@@ -108,6 +112,12 @@ def memory(pid: int) -> float:
     """Memory of a process, MB; what it shares with others counts in part."""
     lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1024.0
+
+
+def resident_memory(pid: int) -> float:
+    """Memory of a process, MB, with all that it shares with others."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:")) / 1024.0
 
 
 def processor_time(pid: int | str) -> float:

@@ -19,7 +19,7 @@ DESCRIPTION = """\
 Run a benchmark of the source checkout and print what it measured, as ratios where possible, so that the figures hold on
 other machines as well. A benchmark is a module in benchmarks/ that defines measure() -> dict of JSON values, and
 lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, kills, first, faults,
-messages, minutes, hours, workers, only, seeds and objects; the options of the same name set them.
+messages, minutes, hours, workers, only, parts, seeds and objects; the options of the same name set them.
 picture(result, path) may draw the result."""
 
 
@@ -126,6 +126,7 @@ OPTIONS = (
     ("hours", positive_number, "H", "simulated hours"),
     ("workers", positive, "N", "processes"),
     ("only", natural, "N", "run only the session with this number"),
+    ("parts", lambda text: text.split(","), "NAME,..", "run only the parts of these names"),
     ("seeds", positive, "N", "houses for each number of objects"),
     ("objects", int_list, "N,..", "numbers of objects"),
 )

@@ -1,31 +1,29 @@
 """Draws what the person sees in a thread of its own: the newest state, as large and as often as possible."""
 
-import copy
 import dataclasses
 import math
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from experiments.house import House
 from experiments.session.film_config import FilmConfig
 from experiments.session.first_person import FirstPersonRenderer
+from experiments.session.user_code import describe
 from experiments.web.encoders import Encoder, H264Encoder, Image, JpegEncoder
-from experiments.web.messages import Frame, View
+from experiments.web.frame_size import FIRST_SIZE, SIZES, FrameSize, pause_after
+from experiments.web.messages import Failed, Frame, Message, View
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.model.avatar import EYE
 from mjsim.model.scene import Scene
 from mjsim.render.cameras import camera_pose
+from mjsim.world import World
 
-SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))
-FIRST_SIZE = 2
 ASPECT = 4 / 3  # of all sizes
 MAX_IN_FLIGHT = 3  # frames sent that the browser has not yet shown
-SLOW, QUICK = 45.0, 14.0  # ms a frame may take before the size goes down, and may take to go up
-PATIENCE = 20  # frames between two changes of the size
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +36,15 @@ class Snapshot:
     input: int
 
 
+class _Job(NamedTuple):
+    """A frame to draw: of what, for whom, whether it has to be a key frame, how long it waited for the link, s."""
+
+    snapshot: Snapshot
+    view: View
+    key: bool
+    waited: float
+
+
 class Drawer:
     """Draws snapshots and hands frames on. Use as a context manager.
 
@@ -45,7 +52,7 @@ class Drawer:
         scene: The scene.
         house: The house, for pictures.
         pictures: Gives what `render_pictures` made of the house's catalogue; called from the drawing thread.
-        send: Takes the frames; called from the drawing thread.
+        send: Takes the frames, and why there are none; called from the drawing thread.
     """
 
     def __init__(
@@ -53,7 +60,7 @@ class Drawer:
         scene: Scene,
         house: House,
         pictures: Callable[[], dict[str, Image]],
-        send: Callable[[Frame], None],
+        send: Callable[[Message], None],
     ) -> None:
         self._scene, self._house, self._pictures, self._send = scene, house, pictures, send
         self._changed = threading.Condition()
@@ -62,6 +69,7 @@ class Drawer:
         self._drawn: object = None
         self._sent = self._seen = 0
         self._key = self._closed = False
+        self._spare: list[Any] = []  # copies of states that are not needed any more
         self._renderers: dict[int, FirstPersonRenderer] = {}
         self._thread = threading.Thread(target=self._run, name="drawing", daemon=True)
         self._thread.start()
@@ -70,6 +78,9 @@ class Drawer:
         """Draw for a browser that has just connected; its first frame is a key frame."""
         with self._changed:
             self._view, self._key, self._drawn = view, True, None
+            if view.codec == "none":
+                self._drop(self._snapshot)
+                self._snapshot = None
             self._sent = self._seen = 0
             self._changed.notify()
 
@@ -84,12 +95,14 @@ class Drawer:
             self._seen = max(self._seen, min(frame, self._sent))
             self._changed.notify()
 
-    def offer(self, data: Any, state: HudState, step: int, number: int) -> None:
-        """Take what is to be drawn next, unless nothing of it has changed; what was not drawn yet is dropped."""
+    def offer(self, world: World, state: HudState, step: int, number: int) -> None:
+        """Take what is to be drawn next; what was not drawn yet is dropped."""
         if self._view is None or self._view.codec == "none":
             return
         with self._changed:
-            self._snapshot = Snapshot(copy.copy(data), state, step, number)
+            self._drop(self._snapshot)
+            data = world.copy_data(self._spare.pop() if self._spare else None)
+            self._snapshot = Snapshot(data, state, step, number)
             self._changed.notify()
 
     def close(self) -> None:
@@ -106,53 +119,63 @@ class Drawer:
         self.close()
 
     def _run(self) -> None:
-        size, encoder, encoded_for, since = FIRST_SIZE, None, None, 0
-        while (job := self._next()) is not None:
-            snapshot, view, key = job
-            began = time.perf_counter()
-            size = min(size, largest_size(view))
-            if encoded_for != (view, size):
-                encoder, encoded_for, since, key = _encoder(view, size), (view, size), 0, True
-            image = self._renderer(size).frame(snapshot.data, snapshot.state)
-            data, is_key = encoder.encode(image, key=key) if encoder else (b"", False)
-            took = 1000.0 * (time.perf_counter() - began)
-            with self._changed:
-                if self._view is not view:
-                    continue
-                self._sent += 1
-                number = self._sent
-            width, height = SIZES[size]
-            self._send(
-                Frame(
-                    number,
-                    snapshot.step,
-                    snapshot.input,
-                    view.codec,
-                    is_key,
-                    width,
-                    height,
-                    round(took, 2),
-                    data,
-                )
-            )
-            since += 1
-            if since >= PATIENCE:
-                size, since = fitting_size(size, took), 0 if fitting_size(size, took) != size else since
+        try:
+            self._draw_all()
+        except Exception as error:  # no driver, or it failed: nobody can play without frames
+            self._send(Failed(describe(error)))
         for renderer in self._renderers.values():
             renderer.close()
 
-    def _next(self) -> tuple[Snapshot, View, bool] | None:
+    def _draw_all(self) -> None:
+        size = FrameSize()
+        encoder: Encoder = JpegEncoder()
+        encoded_for: tuple[View, int] | None = None
+        while (job := self._next()) is not None:
+            began = time.perf_counter()
+            size.limit(job.view.width, job.view.height)
+            if encoded_for != (job.view, size.index):
+                encoder, encoded_for = _encoder(job.view, size.index), (job.view, size.index)
+                job = job._replace(key=True)
+            image = self._renderer(size.index).frame(job.snapshot.data, job.snapshot.state)
+            data, is_key = encoder.encode(image, key=job.key)
+            took = time.perf_counter() - began
+            self._send_frame(job, SIZES[size.index], data, is_key, took)
+            size.note(took, job.waited)
+            time.sleep(pause_after(took))
+
+    def _send_frame(self, job: _Job, size: tuple[int, int], data: bytes, key: bool, took: float) -> None:
+        with self._changed:
+            self._drop(job.snapshot)
+            if self._view is not job.view:
+                return
+            self._sent += 1
+            number = self._sent
+        step, count = job.snapshot.step, job.snapshot.input
+        self._send(Frame(number, step, count, job.view.codec, key, *size, round(1000.0 * took, 2), data))
+
+    def _drop(self, snapshot: Snapshot | None) -> None:
+        """Keep the memory of a snapshot for the next one."""
+        if snapshot is not None:
+            self._spare.append(snapshot.data)
+
+    def _next(self) -> _Job | None:
         """Wait for something new to draw, and for the browser to keep up; None once closed."""
+        ready: float | None = None  # since when there is something to draw that the link has no room for
         with self._changed:
             while not self._closed:
                 snapshot, view = self._snapshot, self._view
-                if snapshot is not None and view is not None and self._sent - self._seen < MAX_IN_FLIGHT:
-                    self._snapshot, content = None, _content(snapshot)
-                    if content != self._drawn:
-                        self._drawn, key, self._key = content, self._key, False
-                        return snapshot, view, key
-                else:
+                if snapshot is None or view is None:
                     self._changed.wait()
+                elif (content := _content(snapshot)) == self._drawn:
+                    self._snapshot = None
+                    self._drop(snapshot)
+                elif self._sent - self._seen >= MAX_IN_FLIGHT:
+                    ready = ready or time.perf_counter()
+                    self._changed.wait()
+                else:
+                    self._snapshot, self._drawn, key, self._key = None, content, self._key, False
+                    waited = 0.0 if ready is None else time.perf_counter() - ready
+                    return _Job(snapshot, view, key, waited)
         return None
 
     def _renderer(self, size: int) -> FirstPersonRenderer:
@@ -161,19 +184,6 @@ class Drawer:
             film = FilmConfig(width, height)
             self._renderers[size] = FirstPersonRenderer(self._scene, self._house, film, self._pictures())
         return self._renderers[size]
-
-
-def largest_size(view: View) -> int:
-    """Index of the largest size that is not larger than a view."""
-    fitting = [i for i, (width, height) in enumerate(SIZES) if width <= view.width and height <= view.height]
-    return max(fitting, default=0)
-
-
-def fitting_size(size: int, milliseconds: float) -> int:
-    """The size to go on with after a frame that took so long."""
-    if milliseconds > SLOW:
-        return max(0, size - 1)
-    return min(len(SIZES) - 1, size + 1) if milliseconds < QUICK else size
 
 
 def _encoder(view: View, size: int) -> Encoder:

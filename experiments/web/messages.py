@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from experiments.web.controls import Input
+from hud.state import HudState
 
 Codec = Literal["jpeg", "h264", "none"]
 LENGTH = struct.Struct("<I")
@@ -164,7 +165,7 @@ class State(Message, frozen=True):
         time: Simulated time, s.
         eye: Eye position, m, then heading and pitch, rad.
         objects: Instance name -> position (3), m, and orientation wxyz (4).
-        hud: The HUD state as its schema has it.
+        hud: The HUD state.
     """
 
     step: int
@@ -172,7 +173,7 @@ class State(Message, frozen=True):
     time: float
     eye: list[float]
     objects: dict[str, list[float]]
-    hud: dict[str, Any]
+    hud: HudState
 
 
 class Text(Message, frozen=True):

@@ -216,7 +216,7 @@ class PlayedSession:
                     visit.before(phase),
                 )
             )
-            over = await self._relay(self._worker)
+            over = await self._forward_until_over(self._worker)
             self._ready = None
             if over is not None:
                 done = over.metrics or {}
@@ -234,7 +234,7 @@ class PlayedSession:
                 raise OSError("its workers die again and again")
             self._tell(protocol.Recovering())
 
-    async def _relay(self, worker: WorkerProcess) -> messages.Over | None:
+    async def _forward_until_over(self, worker: WorkerProcess) -> messages.Over | None:
         """Pass on what a worker says, until the trial is over; None if it died.
 
         Raises:

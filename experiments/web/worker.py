@@ -30,7 +30,6 @@ from experiments.web.inbox import Inbox
 from experiments.web.journal import JOURNAL, read_journal
 from experiments.web.live_session import LiveSession, config_of, is_over, open_journal, result_of
 from experiments.web.rejoining import wait_for_server
-from hud import schema
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.observation import Observation
@@ -48,22 +47,28 @@ class Window(Viewer):
         self.drawer = drawer
         self.live: LiveSession | None = None
         self.states = False
+        self._shown: HudState | None = None
         self._text: messages.Text | None = None
         self._busy: bool | None = None
-        self._stated: int | None = None
+        self._browsers = self._told = 0  # that have connected, and that were told everything
 
     def camera(self, world: World) -> CameraView | None:
         """The eye camera, for a pointer to what is out of view."""
         return None if self.drawer is None else self.drawer.camera_view(world.data)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Hand on what changed."""
+        """Hand on what changed; a session shows every state twice, before a control step and after the one before."""
+        browsers = self._browsers
         if self.live is None or self.drawer is None:
             return
+        if browsers != self._told:
+            self._told, self._shown, self._text, self._busy = browsers, None, None, None
+        if hud_state is self._shown:
+            return
+        self._shown = hud_state
         step, number = self.live.session.recording.step, self.live.input
-        self.drawer.offer(world.data, hud_state, step, number)
-        if self.states and step != self._stated:
-            self._stated = step
+        self.drawer.offer(world, hud_state, step, number)
+        if self.states:
             self._connection.send(_state(observation, hud_state, step, number))
         text = _text(hud_state)
         if text != self._text:
@@ -75,7 +80,7 @@ class Window(Viewer):
 
     def repeat(self) -> None:
         """Say everything again, to a browser that has just connected."""
-        self._text = self._busy = self._stated = None
+        self._browsers += 1
 
 
 class Worker:
@@ -192,8 +197,8 @@ class Worker:
     def _apply_view(self) -> None:
         if self._view is not None and self._window.drawer is not None:
             self._window.states = self._view.state
-            self._window.repeat()
             self._window.drawer.show_to(self._view)
+            self._window.repeat()
 
     def _serve(self, opened: messages.Open) -> None:
         folder = Path(opened.folder)
@@ -263,7 +268,7 @@ def _state(seen: Observation, state: HudState, step: int, number: int) -> messag
         seen.time,
         [*map(float, seen.eye), seen.heading, seen.pitch],
         {name: [*position, *quaternion] for name, position, quaternion in poses},
-        schema.to_dict(state),
+        state,
     )
 
 

@@ -1,5 +1,6 @@
 """World-locked digital objects: decorative geoms that are added to a scene for one frame, seen through walls or not."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -151,6 +152,6 @@ def geom_size(marker: MarkerLike) -> NDArray[np.float64]:
 
 def _numbers(marker: MarkerLike, field: str, count: int) -> list[float]:
     values = [float(value) for value in getattr(marker, field)]
-    if len(values) < count or not np.isfinite(values).all():
+    if len(values) < count or not all(map(math.isfinite, values)):
         raise RenderError(f"marker {field} needs {count} finite numbers, got {getattr(marker, field)!r}")
     return values[:count]

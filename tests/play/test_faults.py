@@ -6,7 +6,7 @@ from benchmarks.support.play_fuzz import measure_fuzz
 
 
 def test_faults_lose_and_double_no_acknowledged_input(tmp_path):
-    result = measure_faults(tmp_path / "visits", 10, 1, *play.FAST)
+    result = measure_faults(tmp_path / "visits", 10, 1, print, *play.FAST)
     assert not result["problems"] and result["tracebacks"] == 0
     assert set(result["resume_s"]) == set(FAULTS), "every kind of fault happened"
     text = "\n".join(play.lines({"load": 0.0, "faults": result}))
