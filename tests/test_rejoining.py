@@ -6,7 +6,7 @@ import stat
 import threading
 import time
 
-from experiments.web.rejoining import SOCKET, ask_worker, wait_for_server
+from experiments.web.rejoining import SOCKET, ask, wait_for_server
 
 
 def test_worker_and_server_meet_in_a_folder_with_a_long_name(tmp_path):
@@ -17,7 +17,7 @@ def test_worker_and_server_meet_in_a_folder_with_a_long_name(tmp_path):
     waiting = threading.Thread(target=lambda: found.append(wait_for_server(folder, lambda: True)))
     waiting.start()
     until = time.monotonic() + 20.0
-    while (server := ask_worker(folder)) is None:
+    while (server := ask(folder)) is None:
         assert time.monotonic() < until
         time.sleep(0.01)
     waiting.join()
@@ -46,8 +46,8 @@ def test_a_worker_waits_only_while_there_is_a_session(tmp_path):
 
 
 def test_nobody_is_found_where_nobody_waits(tmp_path):
-    assert ask_worker(tmp_path) is None
-    assert ask_worker(tmp_path / "missing") is None
+    assert ask(tmp_path) is None
+    assert ask(tmp_path / "missing") is None
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(tmp_path / SOCKET))
-    assert ask_worker(tmp_path) is None
+    assert ask(tmp_path) is None

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support.play_browser import SimulatedBrowser, begin_task
-from benchmarks.support.play_server import PlayProcess, Say, fill_disk, worker_of
+from benchmarks.support.play_server import PlayProcess, Say, fill_disk, parent_of, wait_until_idle, worker_of
 from experiments.errors import ExperimentError
 from experiments.replaying.replay import replay
 from experiments.web.journal import read_journal
@@ -21,7 +21,7 @@ from experiments.web.session_journal import decode, lines_of
 FAULTS_OF_A_VISIT = 12
 LARGEST_SCROLL = 100
 TASK = "task"
-COLD = "server and worker killed"  # all has to be loaded again
+ALL_KILLED = "all processes killed"  # as with the machine: everything has to be loaded again
 
 
 class FaultyVisit:
@@ -99,11 +99,19 @@ class FaultyVisit:
         await self._browser.cut()
         return await self._restart()
 
+    async def kill_both(self) -> float:
+        """Server and worker die, and the server is started again."""
+        return await self._kill_with_server([worker_of(self._journal)])
+
     async def kill_all(self) -> float:
-        """Server and worker die, as with the machine, and the server is started again."""
-        worker = worker_of(self._journal)
+        """All processes die, as with the machine, and the server is started again."""
+        forkserver = parent_of(worker := worker_of(self._journal))
+        return await self._kill_with_server([worker, forkserver])
+
+    async def _kill_with_server(self, others: list[int]) -> float:
         self._server.kill()
-        os.kill(worker, signal.SIGKILL)
+        for process in others:
+            os.kill(process, signal.SIGKILL)
         await self._browser.until(lambda: "closed" in self._browser.last)
         await self._browser.cut()
         return await self._restart()
@@ -124,7 +132,7 @@ class FaultyVisit:
 
     async def _hit_worker(self, hit: Callable[[int], None]) -> float:
         worker = worker_of(self._journal)
-        await asyncio.to_thread(self._server.wait_until_warm)
+        await asyncio.to_thread(wait_until_idle, parent_of(worker))
         began = time.perf_counter()
         hit(worker)
         return began
@@ -167,7 +175,8 @@ FAULTS: dict[str, Callable[[FaultyVisit], Awaitable[float]]] = {
     "second tab": FaultyVisit.second_tab,
     "worker killed": FaultyVisit.kill_worker,
     "server killed": FaultyVisit.kill_server,
-    COLD: FaultyVisit.kill_all,
+    "server and worker killed": FaultyVisit.kill_both,
+    ALL_KILLED: FaultyVisit.kill_all,
     "full disk": FaultyVisit.full_disk,
 }
 
@@ -194,12 +203,12 @@ def measure_faults(folder: Path, count: int, seed: int, say: Say, *words: str) -
             problems += visit.problems
             for name, taken in visit.times.items():
                 times[name] += taken
-    warm = [seconds for name, taken in times.items() if name != COLD for seconds in taken]
+    counted = [seconds for name, taken in times.items() if name != ALL_KILLED for seconds in taken]
     return {
         "faults": count,
         "wrong": len(problems),
         "problems": problems,
-        "resume_p95_s": float(np.percentile(warm, 95) if warm else 0.0),
+        "resume_p95_s": float(np.percentile(counted, 95) if counted else 0.0),
         "resume_s": {
             name: [float(np.percentile(taken, share)) for share in (50, 95, 100)]
             for name, taken in times.items()

@@ -79,14 +79,8 @@ class PlayProcess:
         Raises:
             TimeoutError: They are not.
         """
-        path = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
-        until = time.monotonic() + PATIENCE
-        while time.monotonic() < until:
-            before = {pid: processor_time(pid) for pid in path.read_text().split()}
-            time.sleep(IDLE)
-            if any(processor_time(pid) == spent for pid, spent in before.items()):
-                return
-        raise TimeoutError("workers cannot be forked yet")
+        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        wait_until_idle(int(children[0]))
 
     def __enter__(self) -> "PlayProcess":
         self.start()
@@ -100,6 +94,21 @@ class PlayProcess:
             self.process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             self.kill()
+
+
+def wait_until_idle(pid: int) -> None:
+    """Wait until a process has nothing to do for a while, as the one that forks workers once all is loaded.
+
+    Raises:
+        TimeoutError: It always has.
+    """
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
+        before = processor_time(pid)
+        time.sleep(IDLE)
+        if processor_time(pid) == before:
+            return
+    raise TimeoutError(f"process {pid} has something to do all the time")
 
 
 def fill_disk(worker: int, journal: Path, room: int) -> None:
@@ -124,6 +133,12 @@ def processor_time(pid: int | str) -> float:
     """Processor time of a process, s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS
+
+
+def parent_of(pid: int) -> int:
+    """The process that started a process; of a worker, the one that forks them."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return int(fields[1])
 
 
 def worker_of(journal: Path) -> int:

@@ -132,14 +132,19 @@ def _phases(arguments: argparse.Namespace) -> tuple[str, ...]:
 
 
 def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], listener: socket.socket) -> None:
-    import uvicorn  # imported late, so that other commands start fast
+    from experiments.web.pool import Pool  # imported late, so that other commands start fast
 
-    from experiments.web.guards import Addresses
-    from experiments.web.pool import Pool
-    from experiments.web.protocol import MAX_TEXT
+    pool = Pool(trials[TASK]["house"], arguments.out.absolute())
+    pool.warm_up()  # beside the imports that follow
+    try:
+        _listen(arguments, _server(arguments, trials, pool), listener)
+    finally:
+        pool.hang_up()
+
+
+def _server(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], pool: Any) -> Any:
     from experiments.web.server import PlayConfig, PlayServer
 
-    _log_to_stderr()
     phases = _phases(arguments)
     config = PlayConfig(
         phases=phases,
@@ -150,11 +155,20 @@ def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], lis
         film=arguments.film,
         story=story_text(arguments.story) if STORY in phases else "",
     )
+    return PlayServer(config, pool)
+
+
+def _listen(arguments: argparse.Namespace, play: Any, listener: socket.socket) -> None:
+    import uvicorn
+
+    from experiments.web.guards import Addresses
+    from experiments.web.protocol import MAX_TEXT
+
+    _log_to_stderr()
     host, port = listener.getsockname()[:2]
-    app = PlayServer(config, Pool(trials[TASK]["house"])).app(Addresses(port, arguments.public_url))
     server = uvicorn.Server(
         uvicorn.Config(
-            app,
+            play.app(Addresses(port, arguments.public_url)),
             log_config=None,
             access_log=False,  # paths hold tokens
             log_level="warning",

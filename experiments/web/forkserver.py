@@ -1,6 +1,7 @@
 """The process from which workers are forked: house and kernels are loaded once, and shared by all of them.
 
-It uses one thread and no OpenGL, neither of which survives a fork; pictures are drawn in a process of their own.
+It uses one thread and no OpenGL, neither of which survives a fork; pictures are drawn in a process of their own. A
+server that dies leaves it behind: it waits in the folder of the visits for the next one (`rejoining.py`).
 """
 
 import argparse
@@ -9,61 +10,97 @@ import os
 import signal
 import socket
 from contextlib import suppress
+from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection as Pipe
 from multiprocessing.connection import wait
+from pathlib import Path
 
 from experiments.house import House
 from experiments.trials import warmup
 from experiments.web.encoders import Image
+from experiments.web.messages import END, FORK
+from experiments.web.rejoining import let_go_of_stderr, wait_for_server
 from experiments.web.worker import Worker
 from mjsim.model.catalogue import Catalogue
 from mjsim.render import render_pictures
 
 
 class ForkServer:
-    """Forks a worker for each socket that it is sent, until the server is gone.
+    """Forks a worker for each socket that it is sent, until it is told to end, or no server is there any more.
 
     Args:
         control: Socket to the server.
         house: Name of the house that is played in.
+        rejoin: Where to wait for the next server: a folder, and the name of a socket in it.
     """
 
-    def __init__(self, control: socket.socket, house: str) -> None:
-        self._control, self._name = control, house
+    def __init__(self, control: socket.socket, house: str, rejoin: Path) -> None:
+        self._control, self._name, self._rejoin = control, house, rejoin
         self._pictures: dict[str, Image] = {}
+        self._drawing: Pipe | None = None
 
     def run(self) -> None:
-        """Serve until the server is gone."""
+        """Serve until told to end."""
         house = House.load(self._name)
-        self._drawing = drawing = _draw_pictures(house.catalogue)
-        warmup.plan()
-        warmup.act(house)
-        gc.freeze()  # collecting garbage would copy what is shared
-        sources: list[socket.socket | Pipe] = [self._control, drawing]
+        if not self._serve_waiting(house):
+            return
+        self._drawing = _draw_pictures(house.catalogue)
+        for warm_up in (warmup.plan, partial(warmup.act, house)):
+            warm_up()
+            if not self._serve_waiting(house):
+                return
         while True:
-            for ready in wait(sources):
-                if ready is drawing:
-                    sources.remove(drawing)
-                    self._take_pictures(drawing)
-                elif not self._fork(house):
-                    return
+            ready = wait([self._control] if self._drawing is None else [self._control, self._drawing])
+            if self._drawing in ready:
+                self._take_pictures()
+            elif not self._serve(house):
+                return
 
-    def _take_pictures(self, drawing: Pipe) -> None:
-        with suppress(EOFError), drawing:  # where they could not be drawn, workers try again and say why
-            self._pictures = drawing.recv()
+    def _serve_waiting(self, house: House) -> bool:
+        """Serve those who wait already: a worker gets on before all is warm. False if this is to end."""
+        gc.freeze()  # collecting garbage would copy what is shared
+        while wait([self._control], 0.0):
+            if not self._serve(house):
+                return False
+        return True
 
-    def _fork(self, house: House) -> bool:
-        """Fork a worker; False if the server is gone."""
-        _, descriptors, _, _ = socket.recv_fds(self._control, 1, 1)
-        if not descriptors:
+    def _take_pictures(self) -> None:
+        if (drawing := self._drawing) is not None:
+            self._drawing = None
+            with suppress(EOFError), drawing:  # where they could not be drawn, workers try again and say why
+                self._pictures = drawing.recv()
+
+    def _serve(self, house: House) -> bool:
+        """Do what the server says; False if this is to end, or no server came in the place of one that is gone."""
+        try:
+            word, descriptors, _, _ = socket.recv_fds(self._control, 1, 1)
+        except OSError:
+            word, descriptors = b"", []
+        if word == FORK and descriptors:
+            self._fork(house, descriptors[0])
+        elif word == END:
             return False
-        with socket.socket(fileno=descriptors[0]) as link:
+        elif not word:
+            return self._rejoined()
+        return True
+
+    def _fork(self, house: House, descriptor: int) -> None:
+        with socket.socket(fileno=descriptor) as link:
             if os.fork() == 0:
                 self._control.close()
-                self._drawing.close()
+                if self._drawing is not None:
+                    self._drawing.close()
                 signal.signal(signal.SIGCHLD, signal.SIG_DFL)
                 _exit_after(Worker(link, self._name, house, self._pictures))
+
+    def _rejoined(self) -> bool:
+        self._control.close()
+        let_go_of_stderr()
+        link = wait_for_server(self._rejoin.parent, name=self._rejoin.name)
+        if link is None:
+            return False
+        self._control = link
         return True
 
 
@@ -98,11 +135,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("descriptor", type=int)
     parser.add_argument("house")
+    parser.add_argument("rejoin", type=Path)
     arguments = parser.parse_args()
     os.environ.setdefault("LP_NUM_THREADS", "1")  # of software rendering; many workers share the machine
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody asks how a worker ended
-    with socket.socket(fileno=arguments.descriptor) as control:
-        ForkServer(control, arguments.house).run()
+    ForkServer(socket.socket(fileno=arguments.descriptor), arguments.house, arguments.rejoin).run()
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Worker processes, forked when a session needs one, and the places that sessions share."""
 
 import asyncio
+import hashlib
 import os
 import signal
 import socket
@@ -12,9 +13,22 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from experiments.web.messages import LENGTH, MAX_MESSAGE, Exit, Message, Started, decode_from_worker, packed
-from experiments.web.rejoining import ask_worker
+from experiments.web.messages import (
+    END,
+    FORK,
+    LENGTH,
+    MAX_MESSAGE,
+    Exit,
+    Message,
+    Started,
+    decode_from_worker,
+    packed,
+)
+from experiments.web.rejoining import ask
 
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("experiments", "hud", "mjsim", "planner", "models")
+KINDS = ("*.py", "*.toml", "*.xml")
 PATIENCE = 5.0  # s that a process has to end by itself
 STARTS = 3  # of the process that forks workers, after which none can be had
 
@@ -77,23 +91,36 @@ class Pool:
 
     Args:
         house: Name of the house that is played in; others are loaded when they are needed.
+        folder: Of the visits.
     """
 
-    def __init__(self, house: str) -> None:
+    def __init__(self, house: str, folder: Path) -> None:
         self._house = house
+        self._rejoin = folder / f"forkserver-{_loaded(house)}.sock"
         self._control: socket.socket | None = None
         self._forkserver: subprocess.Popen[bytes] | None = None
         self._closing: set[asyncio.Task[None]] = set()
 
     def warm_up(self) -> None:
-        """Start the process that forks workers, where it does not run."""
-        if self._forkserver is not None and self._forkserver.poll() is None:
+        """Start the process that forks workers, where it does not run; one that has lost its server goes on."""
+        if self._control is not None and (self._forkserver is None or self._forkserver.poll() is None):
             return
-        self._hang_up()
+        self.hang_up()
+        if (control := ask(self._rejoin.parent, self._rejoin.name)) is not None:
+            self._control, self._forkserver = control, None
+            return
         self._control, theirs = socket.socketpair()
         with theirs:
             self._forkserver = subprocess.Popen(
-                (sys.executable, "-P", "-m", "experiments.web.forkserver", str(theirs.fileno()), self._house),
+                (
+                    sys.executable,
+                    "-P",
+                    "-m",
+                    "experiments.web.forkserver",
+                    str(theirs.fileno()),
+                    self._house,
+                    str(self._rejoin),
+                ),
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -110,7 +137,7 @@ class Pool:
         Raises:
             OSError: No worker can be started.
         """
-        if (link := ask_worker(journal)) is not None and (worker := await WorkerProcess.at(link)) is not None:
+        if (link := ask(journal)) is not None and (worker := await WorkerProcess.at(link)) is not None:
             return worker
         for _ in range(STARTS):
             if (worker := await self._fork()) is not None:
@@ -125,7 +152,7 @@ class Pool:
 
     async def close(self) -> None:
         """End all workers, and wait for that."""
-        self._hang_up()
+        self.hang_up()
         if self._closing:
             await asyncio.wait(list(self._closing))
         if self._forkserver is not None:
@@ -137,13 +164,27 @@ class Pool:
         ours, theirs = socket.socketpair()
         with theirs, suppress(OSError):
             if self._control is not None:
-                socket.send_fds(self._control, [b"f"], [theirs.fileno()])
-        return await WorkerProcess.at(ours)
+                socket.send_fds(self._control, [FORK], [theirs.fileno()])
+        if (worker := await WorkerProcess.at(ours)) is None:
+            self.hang_up()
+        return worker
 
-    def _hang_up(self) -> None:
+    def hang_up(self) -> None:
+        """End the process that forks workers."""
         if self._control is not None:
+            with suppress(OSError):
+                self._control.send(END)
             self._control.close()
             self._control = None
+
+
+def _loaded(house: str) -> str:
+    """16 hex digits that change with the program and the house: what has loaded others is of no use."""
+    folders = [ROOT / name for name in PACKAGES] + ([Path(house).parent] if Path(house).is_file() else [])
+    digest = hashlib.sha256(f"{sys.executable} {house}".encode())
+    for path in sorted(path for folder in folders for kind in KINDS for path in folder.rglob(kind)):
+        digest.update(f"{path} {path.stat().st_mtime_ns}".encode())
+    return digest.hexdigest()[:16]
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -1,4 +1,7 @@
-"""How a worker outlives its server: it waits in the session's folder for one that is started again."""
+"""How processes outlive their server: they wait in a folder for one that is started again.
+
+A worker waits in the folder of its session, the process that forks workers in the folder of all visits.
+"""
 
 import os
 import socket
@@ -8,19 +11,22 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 SOCKET = "worker.sock"  # in the folder of a journal
-PATIENCE = 60.0  # s that a worker waits for a server
+PATIENCE = 60.0  # s that a process waits for a server
 PERIOD = 0.2  # s between two looks whether there is still something to wait for
 
 
-def wait_for_server(folder: Path, waiting: Callable[[], bool]) -> socket.socket | None:
-    """Wait for a server to ask for the session in a folder; the socket to it, or None if none came.
+def wait_for_server(
+    folder: Path, waiting: Callable[[], bool] = lambda: True, name: str = SOCKET
+) -> socket.socket | None:
+    """Wait for a server to ask in a folder; the socket to it, or None if none came.
 
     Args:
-        folder: Of the session's journal.
+        folder: Of the session's journal, or of all visits.
         waiting: Whether there is still something to wait for.
+        name: Of the socket.
     """
-    with suppress(OSError), _short(folder) as path, socket.socket(socket.AF_UNIX) as listener:
-        Path(path).unlink(missing_ok=True)  # of a worker that was killed
+    with suppress(OSError), _short(folder, name) as path, socket.socket(socket.AF_UNIX) as listener:
+        Path(path).unlink(missing_ok=True)  # of a process that was killed
         listener.bind(path)
         try:
             Path(path).chmod(0o600)  # nobody can connect before it listens
@@ -32,11 +38,11 @@ def wait_for_server(folder: Path, waiting: Callable[[], bool]) -> socket.socket 
     return None
 
 
-def ask_worker(folder: Path) -> socket.socket | None:
-    """The socket to the worker that waits in a folder, or None if there is none."""
+def ask(folder: Path, name: str = SOCKET) -> socket.socket | None:
+    """The socket to the process that waits in a folder, or None if there is none."""
     link = socket.socket(socket.AF_UNIX)
     try:
-        with _short(folder) as path:
+        with _short(folder, name) as path:
             link.connect(path)
     except OSError:
         link.close()
@@ -54,11 +60,17 @@ def _accept(listener: socket.socket, waiting: Callable[[], bool]) -> socket.sock
     return None
 
 
+def let_go_of_stderr() -> None:
+    """Whoever waits for the end of what the server says need not wait for this process."""
+    with Path(os.devnull).open("wb") as nothing:
+        os.dup2(nothing.fileno(), 2)
+
+
 @contextmanager
-def _short(folder: Path) -> Iterator[str]:
+def _short(folder: Path, name: str) -> Iterator[str]:
     """The path of the socket; a name of some hundred bytes is too long for one, so it goes through a descriptor."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        yield f"/proc/self/fd/{handle}/{SOCKET}"
+        yield f"/proc/self/fd/{handle}/{name}"
     finally:
         os.close(handle)

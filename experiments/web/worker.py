@@ -29,7 +29,7 @@ from experiments.web.encoders import Image
 from experiments.web.inbox import Inbox
 from experiments.web.journal import JOURNAL, read_journal
 from experiments.web.live_session import LiveSession, config_of, is_over, open_journal, result_of
-from experiments.web.rejoining import wait_for_server
+from experiments.web.rejoining import let_go_of_stderr, wait_for_server
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.observation import Observation
@@ -147,7 +147,7 @@ class Worker:
             if opened is None:
                 return False
             self._inbox.set(paused=self._inbox.paused or DISCONNECTED)
-        _let_go_of_stderr()
+        let_go_of_stderr()
         link = wait_for_server(Path(opened.folder), lambda: self._serving is not None)
         if link is None:
             return False
@@ -242,12 +242,6 @@ class Worker:
             _save(folder, run, house)
         metrics = msgspec.json.decode((run / records.METRICS).read_bytes())
         self._connection.send(messages.Over(metrics["ended"], metrics))
-
-
-def _let_go_of_stderr() -> None:
-    """Whoever waits for the end of what the server says need not wait for this process."""
-    with Path(os.devnull).open("wb") as nothing:
-        os.dup2(nothing.fileno(), 2)
 
 
 def _save(folder: Path, run: Path, house: House) -> None:
