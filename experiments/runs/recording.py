@@ -83,6 +83,11 @@ class Recording:
         self._log_entries.append(self.log.entries)
         self._state_hash.append(self._world.state_hash())
 
+    def forget(self) -> None:
+        """Keep the last state alone: somebody else has those before."""
+        self._first += len(self._state_hash[:-1])
+        self._state_hash, self._log_entries = self._state_hash[-1:], self._log_entries[-1:]
+
     def extend(self, state_hashes: NDArray[np.uint64]) -> None:
         """Record the states before actions during which nothing was logged, shape (n,)."""
         self._state_hash += state_hashes.tolist()

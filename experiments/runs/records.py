@@ -56,6 +56,7 @@ class EventLog:
         self._digest = LogDigest()
         self._waiting: deque[dict[str, Any] | _Promised] = deque()
         self._sizes, self._hashes = [0], [self._digest.hash]  # of the file after so many entries
+        self._given_away = 0  # entries that `take_lines` gave
         self.muted = False
 
     def append(self, time: float, event: str, **fields: Any) -> None:
@@ -75,7 +76,7 @@ class EventLog:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Everything logged so far."""
+        """Everything logged so far, or since `take_lines`."""
         self._settle(wait=True)
         return self._events
 
@@ -94,12 +95,13 @@ class EventLog:
     @property
     def entries(self) -> int:
         """How many events were logged so far, those included whose fields are being worked out."""
-        return len(self._sizes) - 1 + len(self._waiting)
+        return self._given_away + len(self._sizes) - 1 + len(self._waiting)
 
     def at(self, entries: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
-        """What size and hash were after so many `entries`, each of shape (n,)."""
+        """What size and hash were after so many `entries`, none given away, each of shape (n,)."""
         self._settle(wait=True)
-        return np.array(self._sizes, np.int64)[entries], np.array(self._hashes, np.uint64)[entries]
+        kept = np.subtract(entries, self._given_away)
+        return np.array(self._sizes, np.int64)[kept], np.array(self._hashes, np.uint64)[kept]
 
     def extend(self, lines: Sequence[str]) -> None:
         """Log again what `lines` gave of another log."""
@@ -107,9 +109,13 @@ class EventLog:
             self._waiting.append(json.loads(line))
         self._settle(wait=False)
 
-    def lines(self, first: int = 0) -> list[str]:
-        """The lines of the events from the `first` on, without their ends."""
-        return [json.dumps(event) for event in self.events[first:]]
+    def take_lines(self) -> list[str]:
+        """The lines of the events since the last call, without their ends. Whoever takes them keeps them: they are not
+        kept here any longer."""
+        lines = [json.dumps(event) for event in self.events]
+        self._given_away += len(self._sizes) - 1
+        self._events, self._sizes, self._hashes = [], self._sizes[-1:], self._hashes[-1:]
+        return lines
 
     def _settle(self, *, wait: bool) -> None:
         """Write what waits, up to the first event whose fields are not known unless it shall `wait` for them."""

@@ -1,5 +1,6 @@
 """A session with a person: stepped from outside, journalled step by step, and able to go on after a crash."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -108,29 +109,20 @@ class LiveSession:
         before: Sequence[dict[str, Any]] = (),
     ) -> None:
         self._journal = journal
-        opened, steps, closed = decode(journal.records) if journal.records else (None, [], None)
-        if closed is not None:
-            raise RecordError("this session is over")
-        if opened is not None:
-            config = config_of(opened.config)
-        if config is None:
-            raise RecordError("the journal is empty")
-        self.config, self.resumed = config, bool(steps)
-        person = draw_person(config)
+        self.config, steps = _begun(journal, config)
+        self.resumed = bool(steps)
+        config, person = self.config, draw_person(self.config)
         self.house = house.for_person(person)
         self.scene = compose(trial_episode(config, self.house), self.house.catalogue, person=person)
-        if opened is None:
+        if not journal.records:
             journal.append(encode(Opened(config.settings(), self.scene.episode.to_json())))
             journal.sync()
-        self._log = EventLog()
-        self._log.extend(lines_of(steps))
-        self._log.muted = bool(steps)
-        self._logged = len(self._log.events)
-        options = WorldOptions(fidelity=config.fidelity, capacity=config.capacity)
-        self.world = World(self.scene, options)
+        self._log = EventLog()  # without what the journal has
+        self._log.muted = self.resumed
+        self.world = World(self.scene, WorldOptions(fidelity=config.fidelity, capacity=config.capacity))
         self._human = Human(self.world)
         live = LiveReplanner(self.house.geodesics, solver(config.planner), capacity=config.capacity)
-        plans = [event for event in self._log.events if event["event"] == "plan"]
+        plans = [event for event in map(json.loads, lines_of(steps)) if event["event"] == "plan"]
         self._planner = ResumingPlanner(live, LoggedReplanner(plans, lambda: 0.0) if steps else None)
         self.session, _ = prepare_session(
             config,
@@ -168,7 +160,7 @@ class LiveSession:
             if new.scroll:
                 self.session.scroll(new.scroll)
         self._human.inputs = inputs
-        lines, number = self._new_lines(), self.session.recording.step
+        lines, number = self._log.take_lines(), self.session.recording.step
         self.session.advance()
         self.input = (
             inputs[-1].number if inputs else self.input
@@ -181,23 +173,18 @@ class LiveSession:
         Raises:
             OSError: The journal cannot be written.
         """
-        lines, number = self._new_lines(), self.session.recording.step
+        lines, number = self._log.take_lines(), self.session.recording.step
         self.session.end(reason)
         if self.session.recording.step > number:
             self._append_step(lines, number)
             lines = []
-        self._journal.append(encode(Closed([*lines, *self._new_lines()])))
+        self._journal.append(encode(Closed([*lines, *self._log.take_lines()])))
         self._journal.sync()
         self.close()
 
     def close(self) -> None:
         """Stop planning in the background."""
         self._planner.close()
-
-    def _new_lines(self) -> list[str]:
-        lines = self._log.lines(self._logged)
-        self._logged += len(lines)
-        return lines
 
     def _append_step(self, lines: list[str], number: int) -> None:
         arrays, recording = self.session.trajectory.arrays(), self.session.recording
@@ -210,6 +197,7 @@ class LiveSession:
         self._journal.append(encode(entry))
         if len(self.session.trajectory) >= ROWS:  # the journal has them
             self.session.trajectory = Trajectory(self.scene.index.names)
+            recording.forget()
 
     def _resume(self, steps: Sequence[Step]) -> None:
         """Go from the last checkpoint to where the journal ends, with the plan that was shown there."""
@@ -243,6 +231,22 @@ class LiveSession:
                     "version or on another machine"
                 )
         self._human.controls, self.input = steps[-1].controls, steps[-1].input
+
+
+def _begun(journal: Journal, config: TrialConfig | None) -> tuple[TrialConfig, list[Step]]:
+    """The trial of a journal, or the one given if it is empty, and its control steps.
+
+    Raises:
+        RecordError: There is no trial, or it is over.
+    """
+    if not journal.records:
+        if config is None:
+            raise RecordError("the journal is empty")
+        return config, []
+    opened, steps, closed = decode(journal.records)
+    if closed is not None:
+        raise RecordError("this session is over")
+    return config_of(opened.config), steps
 
 
 def config_of(settings: Mapping[str, Any]) -> TrialConfig:

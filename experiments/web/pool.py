@@ -28,6 +28,7 @@ from experiments.web.rejoining import ask
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("experiments", "hud", "mjsim", "planner", "models")
+ONE_HEAP = {"MALLOC_ARENA_MAX": "1"}  # one for each thread would keep what each once needed
 KINDS = ("*.py", "*.toml", "*.xml")
 PATIENCE = 5.0  # s that a process has to end by itself
 STARTS = 3  # of the process that forks workers, after which none can be had
@@ -125,7 +126,11 @@ class Pool:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 start_new_session=True,  # Ctrl-C in a terminal is for the server alone
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+                env={
+                    **os.environ,
+                    **ONE_HEAP,
+                    "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+                },
             )
 
     async def take(self, journal: Path) -> WorkerProcess:
