@@ -35,6 +35,14 @@ def kernel(function: F) -> F:
     return cast(F, _cached(functools.partial(numba.njit, **_OPTIONS), function))
 
 
+def inlined(function: F) -> F:
+    """Compile a function as a part of each kernel that calls it.
+
+    For small ones that are called often with many arrays: to hand these over takes as long as some hundred sums.
+    """
+    return cast(F, numba.njit(forceinline=True, **_OPTIONS)(function))
+
+
 def c_function(signature: str, function: Callable[..., Any]) -> Any:
     """Compile a function at once for callers in C; its `ctypes` is a pointer that lives as long as what is returned.
 

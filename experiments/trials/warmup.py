@@ -37,13 +37,15 @@ def plan() -> None:
     """Plan a tour by the full table and by the search, with regrets, and again from what is known of it."""
     places = np.random.default_rng(0).random((16, 2))
     distances = np.linalg.norm(places[:, None] - places[None], axis=2)
-    tour = RoutingProblem(distances, 0, tuple(Shipment(4 + k, 1 + k % 3) for k in range(12)), (), 2)
-    for table_bytes in (ExactSolver.table_bytes, 0):  # the full table, and the search
-        ExactSolver(table_bytes=table_bytes).solve(tour)
-        regrets(tour, ExactSolver(table_bytes=table_bytes))
-    searching = ExactSolver(table_bytes=0)
-    warm = NOTHING_KNOWN.updated(tour, searching.solve(tour))
-    next(searching.improve(tour, warm=warm))
+    for resolution in (1e-4, None):  # tables in 32 bits, and in 64
+        shipments = tuple(Shipment(4 + k, 1 + k % 3) for k in range(12))
+        tour = RoutingProblem(distances, 0, shipments, (), 2, resolution=resolution)
+        for table_bytes in (ExactSolver.table_bytes, 0):  # the full table, and the search
+            ExactSolver(table_bytes=table_bytes).solve(tour)
+            regrets(tour, ExactSolver(table_bytes=table_bytes))
+        searching = ExactSolver(table_bytes=0)
+        warm = NOTHING_KNOWN.updated(tour, searching.solve(tour))
+        next(searching.improve(tour, warm=warm))
 
 
 def act(house: House) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.kernels import inlined, kernel
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE
 from planner.exact.warm_start import Start
@@ -11,7 +11,7 @@ from planner.exact.warm_start import Start
 HOT, COLD = 0.5, 0.01  # temperature at both ends, in mean legs
 
 
-@kernel
+@inlined
 def uniform(state: NDArray[np.uint64]) -> float:
     """Next number in [0, 1) of SplitMix64 (Steele, Lea and Flood 2014); the state is (1,)."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
@@ -85,7 +85,7 @@ def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[
     return int(costs[n, m])
 
 
-@kernel
+@inlined
 def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: NDArray[np.int64]) -> None:
     """From pick i to pick x: row `after` from row `before`."""
     m = inst.bins.shape[0]
@@ -104,7 +104,7 @@ def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: N
     after[m] = nothing
 
 
-@kernel
+@inlined
 def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
     """Least length of a tour whose last pick is i."""
     m = inst.bins.shape[0]
@@ -156,7 +156,7 @@ def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
     return backwards[:count][::-1].copy()
 
 
-@kernel
+@inlined
 def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArray[np.uint64]) -> int:
     """Write a neighbour of an order: two objects swapped, some in a row reversed, or one moved.
 

@@ -1,7 +1,7 @@
 """Lagrangian multipliers that make the relaxed tour pick each object about once."""
 
 from dataclasses import dataclass
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from mjsim.kernels import kernel
 from planner.exact.deadline import NEVER, Deadline
 from planner.exact.groups import numbered, together, with_one_alone
 from planner.exact.instance import Instance
-from planner.exact.relaxation import fill, walk
+from planner.exact.relaxation import SLICE, fill, fill_rows, walk
 from planner.exact.table import Table, new_table, rows_of
 from planner.exact.warm_start import Start
 
@@ -19,6 +19,29 @@ MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
 STEP_ROWS = 60_000  # rows filled by one fit of a large table, about
+
+
+STEP, ROW, BEST = range(3)  # progress of an ascent
+
+
+class Ascent(NamedTuple):
+    """Subgradient ascent of multipliers, as far as it has got.
+
+    Attributes:
+        current: Multipliers, (n,).
+        direction: Their last change, (n,).
+        miscount: As in `Bound`, (n,).
+        best: The multipliers with the best bound, (n,) int64.
+        sizes: Length of each step, as a share of what would close the gap, (steps,).
+        progress: Steps taken, rows filled for the next one, and the best bound, units; (3,) int64.
+    """
+
+    current: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    miscount: NDArray[np.float64]
+    best: NDArray[np.int64]
+    sizes: NDArray[np.float64]
+    progress: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,30 +176,77 @@ def fit(
     Returns:
         The best bound; None if the deadline was over before.
     """
-    n = len(instance.home)
-    actions: NDArray[np.int64] = np.empty(2 * n + 2, np.int64)
-    current, direction = multipliers.copy(), np.zeros(n)
-    best, best_multipliers = -1, table.multipliers.copy()
-    miscount = np.zeros(n)
-    for k in range(steps):
-        table.multipliers[:] = np.rint(current)
-        if not fill(instance, table, deadline):
+    n, first_size, last_size = len(instance.home), *step_sizes
+    ascent = Ascent(
+        multipliers.copy(),
+        np.zeros(n),
+        np.zeros(n),
+        table.multipliers.copy(),
+        np.array([first_size * (last_size / first_size) ** (k / steps) for k in range(steps)]),
+        np.array([0, 0, -1]),
+    )
+    while not climb(instance, table, ascent, upper, SLICE):
+        if deadline.over():
             return None
-        total, count = walk(instance, table, len(table.bin) - 1, actions)
-        value = int(total) - int(table.multipliers.sum())
-        if value > best:
-            best = value
-            best_multipliers[:] = table.multipliers
-        if best >= upper - instance.tie or k == steps - 1:
-            break
-        step_size = step_sizes[0] * (step_sizes[1] / step_sizes[0]) ** (k / steps)
-        if not step(actions[:count], 1.002 * upper - value, step_size, current, direction, miscount):
-            break
-    if (table.multipliers != best_multipliers).any():
-        table.multipliers[:] = best_multipliers
-        if not fill(instance, table, deadline):
-            return None
-    return Bound(instance, table, best, miscount)
+    return Bound(instance, table, int(ascent.progress[BEST]), ascent.miscount)
+
+
+@kernel
+def climb(inst: Instance, table: Table, ascent: Ascent, upper: int, rows: int) -> bool:
+    """Go on with an ascent, in place, until so many rows were filled; whether it is finished.
+
+    All in one kernel: a thread that returns to Python after each table would wait for others there.
+
+    Args:
+        inst: The instance.
+        table: Holds the best multipliers, and is filled for them, when all is finished.
+        ascent: Where the ascent is.
+        upper: Length of a known tour, units.
+        rows: How many to fill before returning, 1 or more.
+    """
+    n, progress = inst.home.size, ascent.progress
+    actions = np.empty(2 * n + 2, np.int64)
+    while True:
+        if progress[STEP] < ascent.sizes.size and progress[ROW] == 0:
+            for j in range(n):
+                price = np.rint(ascent.current[j])
+                table.multipliers[j] = int(min(max(price, -table.dearest), table.dearest))
+        last = min(table.bin.shape[0], progress[ROW] + rows)
+        fill_rows(inst, table, progress[ROW], last)
+        rows -= last - progress[ROW]
+        progress[ROW] = last
+        if last < table.bin.shape[0]:
+            return False
+        if progress[STEP] == ascent.sizes.size or not _stepped(inst, table, ascent, upper, actions):
+            return True
+        progress[ROW] = 0
+
+
+@kernel
+def _stepped(inst: Instance, table: Table, ascent: Ascent, upper: int, actions: NDArray[np.int64]) -> bool:
+    """With a filled table, take a step, or go back to the best multipliers for good; False if they are in the table.
+
+    `actions`, shape (2 n + 2,), is room for those of a tour.
+    """
+    progress, k = ascent.progress, ascent.progress[STEP]
+    total, count = walk(inst, table, table.bin.shape[0] - 1, actions)
+    value = total - table.multipliers.sum()
+    if value > progress[BEST]:
+        progress[BEST] = value
+        ascent.best[:] = table.multipliers
+    progress[STEP] += 1
+    ended = progress[BEST] >= upper - inst.tie or progress[STEP] == ascent.sizes.size
+    if not ended:
+        gap = 1.002 * upper - value
+        ended = not step(
+            actions[:count], gap, ascent.sizes[k], ascent.current, ascent.direction, ascent.miscount
+        )
+    if ended:
+        progress[STEP] = ascent.sizes.size
+        if (table.multipliers == ascent.best).all():
+            return False
+        table.multipliers[:] = ascent.best
+    return True
 
 
 @kernel

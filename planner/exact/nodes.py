@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.kernels import inlined, kernel
 from planner.exact.table import INFINITE
 
 NO_PARENT = -1
@@ -44,7 +44,7 @@ def new_nodes(room: int) -> Nodes:
     )
 
 
-@kernel
+@inlined
 def slot_of(nodes: Nodes, key: int) -> int:
     """Slot that holds a key, or the empty one where it belongs."""
     mask = nodes.slots.size - 1
@@ -75,7 +75,7 @@ def with_room(nodes: Nodes, more: int) -> Nodes:
     return wider
 
 
-@kernel
+@inlined
 def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
     """Add a state, or a shorter path to it; there must be room."""
     slot = slot_of(nodes, key)

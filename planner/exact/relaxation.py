@@ -1,14 +1,18 @@
 """Compiled kernels that fill a table of `planner.exact.table`, and follow a best tour in it."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.kernels import inlined, kernel
 from planner.exact.deadline import NEVER, Deadline
-from planner.exact.instance import Instance
+from planner.exact.instance import FAR, Instance
+from planner.exact.lanes import LANES, copy, least, load, plus, repeat, store
 from planner.exact.table import INFINITE, Table
 
-SLICE = 1 << 13  # rows that are filled between looks at the clock: some 5 ms
+Entries = NDArray[np.integer[Any]]
+SLICE = 1 << 13  # rows that are filled between looks at the clock: some 3 ms
 
 
 @kernel
@@ -30,6 +34,7 @@ def after_pick(inst: Instance, table: Table, row: int, j: int, d: int) -> int:
 def fill(inst: Instance, table: Table, deadline: Deadline = NEVER) -> bool:
     """Compute all rows, smaller ones first; whether that was done before the deadline."""
     rows = table.bin.shape[0]
+    table.multipliers[:] = np.clip(table.multipliers, -table.dearest, table.dearest)
     for first in range(0, rows, SLICE):
         if first and deadline.over():
             return False
@@ -47,7 +52,7 @@ def left_of(table: Table, row: int) -> NDArray[np.int64]:
     return left
 
 
-@kernel
+@inlined
 def count_on(table: Table, left: NDArray[np.int64]) -> None:
     """Update the numbers left of each group, shape (groups,), from a row to the next."""
     for g in range(left.size):
@@ -57,83 +62,180 @@ def count_on(table: Table, left: NDArray[np.int64]) -> None:
         left[g] = 0
 
 
+class Legs(NamedTuple):
+    """Distances of an instance for `fill_rows`, flat. Those to bins stand in as many lanes as whole eights hold them.
+
+    Attributes:
+        to_bin: From each object to bins, (n lanes,).
+        from_bin: From bins to each object with its price, (n lanes,).
+        bins: Between bins, (m lanes,).
+        between: From each object to the bin of the object of each place; then to each object, with its price, from
+            the object of each place, (1 + n) places.
+        place: Of each object; those of one bin have eights of their own, (n,) int64.
+        bin_of: Bin of the objects of each eight of places, (places / 8,) int64.
+        down: How many entries further down V(., b, .) is, for bin b of an object, where that was picked, (n,) int64.
+        far: Longer than any tour, (1,).
+    """
+
+    to_bin: Entries
+    from_bin: Entries
+    bins: Entries
+    between: Entries
+    place: NDArray[np.int64]
+    bin_of: NDArray[np.int64]
+    down: NDArray[np.int64]
+    far: Entries
+
+
+@kernel
+def legs_of(inst: Instance, table: Table) -> Legs:
+    """The distances, of the type of the table's entries."""
+    n, m = inst.to_bin.shape
+    wide = lanes_for(m)
+    dtype = table.entries.dtype
+    kind, price = dtype.type, table.multipliers
+    far = np.full(1, 1 << 30 if table.entries.itemsize == 4 else FAR, dtype)
+    to_bin, from_bin = np.zeros(n * wide, dtype), np.zeros(n * wide, dtype)
+    bins = np.zeros(m * wide, dtype)
+    for b in range(m):
+        for j in range(n):
+            to_bin[j * wide + b] = kind(inst.to_bin[j, b])
+            from_bin[j * wide + b] = kind(inst.from_bin[b, j] + price[j])
+        for d in range(m):
+            bins[b * wide + d] = kind(inst.bins[b, d])
+    place, bin_of = np.empty(n, np.int64), np.empty(n, np.int64)
+    eights = 0
+    for b in range(m):
+        free = 0
+        for j in range(n):
+            if inst.home[j] == b:
+                if free == 0:
+                    bin_of[eights] = b
+                    eights, free = eights + 1, LANES
+                place[j] = eights * LANES - free
+                free -= 1
+    places = eights * LANES
+    between = np.zeros((1 + n) * places, dtype)
+    for i in range(n):
+        between[place[i]] = kind(inst.to_bin[i, inst.home[i]])
+        for j in range(n):
+            between[(1 + j) * places + place[i]] = kind(min(inst.between[i, j], far[0])) + kind(price[j])
+    down = table.stride * (2 * m * m + n) - 2 * m * inst.home
+    return Legs(to_bin, from_bin, bins, between, place, bin_of[:eights], down, far)
+
+
+class Row(NamedTuple):
+    """What is worked out for a row; of the objects that can be picked, in the order of `which`.
+
+    Attributes:
+        which: Numbers of those objects, (n,) int64.
+        second: W without the price of its pick, lanes of the bins of the other object, (n lanes,).
+        empty: E, (lanes,).
+        carrying: V, lanes, (m lanes,).
+        holding: Y, in the places of `Legs`, (places,).
+    """
+
+    which: NDArray[np.int64]
+    second: Entries
+    empty: Entries
+    carrying: Entries
+    holding: Entries
+
+
+@inlined
+def lanes_for(m: int) -> int:
+    """How many lanes whole eights for so many bins have."""
+    return (m + LANES - 1) // LANES * LANES
+
+
 @kernel
 def fill_rows(inst: Instance, table: Table, first: int, last: int) -> None:
     """Compute some rows; all before must have been.
 
-    Its parts index whole arrays: to make a view of a row takes numba longer than to add it up.
+    Bins and the objects of a bin are taken eight at a time. Of lanes without a bin or an object nothing is used.
     """
     n, m = inst.to_bin.shape
-    second = np.empty((m, n), np.int64)  # W with its pick, [d, j]; infinite where j cannot be picked
-    only = np.empty((1, n), np.int64)  # Y with its pick; the same
-    carrying, empty = np.empty((m, m), np.int64), np.empty((m, 1), np.int64)
+    legs = legs_of(inst, table)
+    wide, dtype = lanes_for(m), table.entries.dtype
+    here = Row(
+        np.empty(n, np.int64),
+        np.empty(n * wide, dtype),
+        np.empty(wide, dtype),
+        np.empty(m * wide, dtype),
+        np.empty(legs.bin_of.size * LANES, dtype),
+    )
     left = left_of(table, first)
     for row in range(first, last):
-        _picked(inst, table, left, row, second, only)
-        _least_sums(inst.from_bin, only, empty)
-        _least_sums(inst.from_bin, second, carrying)
-        for d in range(m):
-            e = empty[d, 0] if row else 0
-            for b in range(m):
-                table.bin[row, b, d] = min(inst.bins[b, d] + e, carrying[b, d])
-            table.bin[row, d, d] = e
-        _holding(inst, table, left, row, second)
+        count = _pick(inst, table, legs, left, row, here)
+        _carry(table, legs, row, count, here)
+        _hold(table, legs, row, count, here)
         count_on(table, left)
 
 
-@kernel
-def _picked(
-    inst: Instance,
-    table: Table,
-    left: NDArray[np.int64],
-    row: int,
-    second: NDArray[np.int64],
-    only: NDArray[np.int64],
-) -> None:
-    """W (second, [d, j]) and Y (only, [0, j]), with the pick, of every object j in a row."""
+@inlined
+def _pick(inst: Instance, table: Table, legs: Legs, left: NDArray[np.int64], row: int, here: Row) -> int:
+    """W of every object that can be picked in a row, and E; returns how many can."""
     n, m = inst.to_bin.shape
-    for j in range(n):
-        if left[table.group[j]] == 0:
-            only[0, j] = INFINITE
-            for d in range(m):
-                second[d, j] = INFINITE
-            continue
-        after, price, c = row - table.stride[j], table.multipliers[j], inst.home[j]
-        only[0, j] = table.object[after, j] + price
-        last = inst.to_bin[j, c] + price
+    wide, width, entries = lanes_for(m), 2 * m * m + n, table.entries
+    count = 0
+    for d in range(0, wide, LANES):
+        count = 0
+        empty = repeat(legs.far, 0)
+        for j in range(n):
+            if left[table.group[j]] == 0:
+                continue
+            at = row * width - legs.down[j] + d
+            own = plus(repeat(legs.to_bin, j * wide + inst.home[j]), load(entries, at))
+            other = plus(load(legs.to_bin, j * wide + d), load(entries, at + m))
+            store(here.second, count * wide + d, least(own, other))
+            only = repeat(entries, (row - table.stride[j]) * width + 2 * m * m + j)
+            empty = least(empty, plus(load(legs.from_bin, j * wide + d), only))
+            here.which[count] = j
+            count += 1
+        store(here.empty, d, empty)
+    if row == 0:
+        here.empty[:] = 0
+    return count
+
+
+@inlined
+def _carry(table: Table, legs: Legs, row: int, count: int, here: Row) -> None:
+    """V of a row, into the table, and E too."""
+    m, entries = table.bin.shape[1], table.entries
+    wide, start = lanes_for(m), row * (2 * m * m + table.stride.size)
+    for b in range(m):
+        for d in range(0, wide, LANES):
+            carrying = plus(load(legs.bins, b * wide + d), load(here.empty, d))
+            for k in range(count):
+                leg = repeat(legs.from_bin, here.which[k] * wide + b)
+                carrying = least(carrying, plus(leg, load(here.second, k * wide + d)))
+            store(here.carrying, b * wide + d, carrying)
+            store(entries, start + 2 * m * b + d, carrying)
+        copy(entries, start + (2 * m + 1) * b, here.empty, b)
+    for b in range(m):
         for d in range(m):
-            other_first = inst.to_bin[j, d] + price + table.bin[after, d, c]
-            second[d, j] = min(other_first, last + table.bin[after, c, d])
+            copy(entries, start + (2 * b + 1) * m + d, here.carrying, d * wide + b)
+        copy(entries, start + (2 * b + 1) * m + b, here.empty, b)
 
 
-@kernel
-def _least_sums(a: NDArray[np.int64], b: NDArray[np.int64], sums: NDArray[np.int64]) -> None:
-    """Least sum of each row of `a` (p, n) and each row of `b` (q, n), entry by entry, into `sums` (p, q)."""
-    for q in range(b.shape[0]):
-        for p in range(a.shape[0]):
-            best = INFINITE
-            for k in range(a.shape[1]):
-                best = min(best, a[p, k] + b[q, k])
-            sums[p, q] = best
-
-
-@kernel
-def _holding(
-    inst: Instance, table: Table, left: NDArray[np.int64], row: int, second: NDArray[np.int64]
-) -> None:
-    """Y of the objects of which some of the group were picked."""
-    n = inst.to_bin.shape[0]
+@inlined
+def _hold(table: Table, legs: Legs, row: int, count: int, here: Row) -> None:
+    """Y of a row, into the table; it means something for objects of which some of the group were picked."""
+    m, entries = table.bin.shape[1], table.entries
+    n, wide, places = table.stride.size, lanes_for(m), here.holding.size
+    for eight in range(legs.bin_of.size):
+        b = legs.bin_of[eight]
+        holding = plus(load(legs.between, LANES * eight), repeat(here.empty, b))
+        for k in range(count):
+            leg = load(legs.between, (1 + here.which[k]) * places + LANES * eight)
+            holding = least(holding, plus(leg, repeat(here.second, k * wide + b)))
+        store(here.holding, LANES * eight, holding)
+    start = row * (2 * m * m + n) + 2 * m * m
     for i in range(n):
-        if left[table.group[i]] == table.size[table.group[i]]:
-            continue
-        c = inst.home[i]
-        best = inst.to_bin[i, c] + table.bin[row, c, c]
-        for k in range(n):  # no object follows itself, as `between` is infinite there
-            best = min(best, inst.between[i, k] + second[c, k])
-        table.object[row, i] = best
+        copy(entries, start + i, here.holding, legs.place[i])
 
 
-@kernel
+@inlined
 def choose(
     inst: Instance,
     table: Table,

@@ -8,14 +8,20 @@ is no state of its own: the next stop is one of two bins.
 
 from typing import NamedTuple
 
-from mjsim.kernels import kernel
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.kernels import inlined, kernel
 from planner.exact.deadline import Deadline
 from planner.exact.instance import Instance
+from planner.exact.lanes import lowest
 from planner.exact.nodes import NO_PARENT, Nodes, offer, with_room, with_room_among
 from planner.exact.table import INFINITE, Table
 
 PLACE_BITS = 12
 SLICE = 1 << 12  # states that are expanded between looks at the clock: some 5 ms
+CARRYING, EMPTY = range(2)  # stages of a layer: states that carry something, states that do not
+STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # progress in a layer
 
 
 class Expanded(NamedTuple):
@@ -40,9 +46,9 @@ class Expanded(NamedTuple):
 def row_of(table: Table, left: int) -> int:
     """Row of the bound's table for the set of objects left."""
     row = 0
-    for j in range(table.stride.size):
-        if (left >> j) & 1:
-            row += table.stride[j]
+    while left:
+        row += table.stride[lowest(left)]
+        left &= left - 1
     return row
 
 
@@ -62,7 +68,7 @@ class Arrival(NamedTuple):
     parent: int
 
 
-@kernel
+@inlined
 def offer_bin(
     inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, b: int, d: int, limit: int
 ) -> None:
@@ -73,7 +79,7 @@ def offer_bin(
         offer(nodes, (arrival.left << PLACE_BITS) | place, arrival.cost, total, arrival.parent)
 
 
-@kernel
+@inlined
 def offer_second(
     inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, j: int, d: int, limit: int
 ) -> None:
@@ -88,7 +94,7 @@ def offer_second(
         offer_bin(inst, table, nodes, second, c, d, limit)
 
 
-@kernel
+@inlined
 def offer_only(inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, i: int, limit: int) -> None:
     """Pick i with empty hands, and offer the state there; the arrival is at i, before the pick."""
     cost = arrival.cost + table.multipliers[i]
@@ -123,24 +129,59 @@ def expand(
     inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
 ) -> Expanded | None:
     """Offer all successors of a layer's states; None if the deadline was over before that was done."""
-    size, smallest, expanded, end = int(here.size[0]), INFINITE, 0, -1
-    here = with_room(here, size)
-    for first in range(0, size, SLICE):
+    progress = np.array([0, 0, 0, INFINITE, 0, -1])
+    while True:
+        here, after = expand_some(inst, table, here, after, limit, width, progress)
+        if progress[STAGE] > EMPTY:
+            return Expanded(here, after, *progress[SMALLEST:].tolist())
         if deadline.over():
             return None
-        last = min(size, first + SLICE)
-        after, dropped, count = expand_carrying(inst, table, here, after, limit, width, first, last)
-        smallest, expanded = min(smallest, dropped), expanded + count
-    size = int(here.size[0])
-    for first in range(0, size, SLICE):
-        if deadline.over():
-            return None
-        last = min(size, first + SLICE)
-        after, dropped, count, ending = expand_empty(inst, table, here, after, limit, width, first, last)
-        if ending >= 0 and (end < 0 or here.cost[ending] < here.cost[end]):
-            end = ending
-        smallest, expanded = min(smallest, dropped), expanded + count
-    return Expanded(here, after, smallest, expanded, end)
+
+
+@kernel
+def expand_some(
+    inst: Instance,
+    table: Table,
+    here: Nodes,
+    after: Nodes,
+    limit: int,
+    width: int,
+    progress: NDArray[np.int64],
+) -> tuple[Nodes, Nodes]:
+    """Go on with a layer, first with states that carry something, then with those that do not, for one slice.
+
+    Args:
+        inst: The instance.
+        table: Bound of the cost-to-go.
+        here: The layer.
+        after: The next one.
+        limit: Totals to offer are below it, units.
+        width: States of the next layer that will be kept.
+        progress: Stage, states of the stage done, all of the stage, and the last three of `Expanded`; (6,).
+
+    Returns:
+        Both layers.
+    """
+    if progress[STAGE] == CARRYING and progress[DONE] == 0:
+        progress[OF] = here.size[0]
+        here = with_room(here, here.size[0])
+    slice_left = SLICE
+    while slice_left > 0 and progress[STAGE] <= EMPTY:
+        first, last = progress[DONE], min(progress[OF], progress[DONE] + slice_left)
+        if progress[STAGE] == CARRYING:
+            after, smallest, count = expand_carrying(inst, table, here, after, limit, width, first, last)
+        else:
+            after, smallest, count, end = expand_empty(inst, table, here, after, limit, width, first, last)
+            if end >= 0 and (progress[END] < 0 or here.cost[end] < here.cost[progress[END]]):
+                progress[END] = end
+        progress[SMALLEST] = min(progress[SMALLEST], smallest)
+        progress[STATES] += count
+        slice_left -= last - first
+        progress[DONE] = last
+        if last == progress[OF]:
+            progress[STAGE] += 1
+            progress[DONE], progress[OF] = 0, here.size[0]
+    return here, after
 
 
 @kernel
@@ -172,11 +213,13 @@ def expand_carrying(
         if after.size[0] + 2 * n > after.key.size:
             after, dropped = with_room_among(after, 2 * n, width)
             smallest = min(smallest, dropped)
-        for j in range(n):
-            if (left >> j) & 1:
-                leg = inst.between[i, j] if i >= 0 else inst.from_bin[b, j]
-                arrival = Arrival(left, row, int(here.cost[k] + leg), 2 * k)
-                offer_second(inst, table, after, arrival, j, d, limit)
+        rest = left
+        while rest:
+            j = lowest(rest)
+            rest &= rest - 1
+            leg = inst.between[i, j] if i >= 0 else inst.from_bin[b, j]
+            arrival = Arrival(left, row, int(here.cost[k] + leg), 2 * k)
+            offer_second(inst, table, after, arrival, j, d, limit)
     return after, smallest, expanded
 
 
@@ -204,8 +247,10 @@ def expand_empty(
         if after.size[0] + n > after.key.size:
             after, dropped = with_room_among(after, n, width)
             smallest = min(smallest, dropped)
-        for i in range(n):
-            if (left >> i) & 1:
-                arrival = Arrival(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
-                offer_only(inst, table, after, arrival, i, limit)
+        rest = left
+        while rest:
+            i = lowest(rest)
+            rest &= rest - 1
+            arrival = Arrival(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
+            offer_only(inst, table, after, arrival, i, limit)
     return after, smallest, expanded, end
