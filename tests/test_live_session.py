@@ -8,12 +8,14 @@ import pytest
 
 from experiments.house import House
 from experiments.replaying.replay import replay
+from experiments.runs.records import TOPDOWN
 from experiments.runs.run_directory import run_directory
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_record import save_record
 from experiments.web.controls import Input
 from experiments.web.journal import read_journal
-from experiments.web.live_session import LiveSession, open_journal, result_of
+from experiments.web.journalled_run import journal_of, result_of, save_run
+from experiments.web.live_session import LiveSession, open_journal
 
 CONFIG = TrialConfig(objects=6, assistance="guided", seed=3, user="human", live=True, fidelity="event")
 
@@ -115,8 +117,10 @@ def test_the_run_directory_of_a_session_replays(house, tmp_path, crashes):
 
 def test_an_unfinished_session_leaves_a_run_that_replays(house, tmp_path):
     session = play(tmp_path / "session", house, wandering(8, 120), config=CONFIG)
-    _, scene, result = result_of(read_journal(tmp_path / "session" / "journal.bin"), house)
+    save_run(tmp_path / "session", tmp_path / "run", house)
     session.close()
-    with run_directory(tmp_path / "run") as folder:
-        save_record(folder, tmp_path / "run", scene, result, 1.0)
     assert replay(tmp_path / "run", house=house).steps == 120
+    (tmp_path / "run" / TOPDOWN).unlink()  # as a kill in between leaves it
+    save_run(tmp_path / "session", tmp_path / "run", house)
+    assert (tmp_path / "run" / TOPDOWN).is_file()
+    assert journal_of(tmp_path / "session") == tmp_path / "session" and journal_of(tmp_path) is None

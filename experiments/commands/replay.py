@@ -1,6 +1,9 @@
 """`mjsim replay`: simulate a recorded run again, verify it, film it in another view."""
 
 import argparse
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +19,16 @@ from experiments.commands.options import (
 )
 from experiments.commands.terminal import error_console, progress_bars
 from experiments.errors import ConfigError, ReplayError
+from experiments.house import House
 from experiments.replaying.external_view import CAMERAS, FIRST_PERSON
 from experiments.replaying.replay import ReplayFilm, ReplayReport, replay
-from experiments.runs.run_directory import check_file
+from experiments.runs.run_directory import check_file, is_run
 
 DESCRIPTION = """\
 Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one
 bit for bit. DIR is a run directory, however the run ended. Prints for every file of it what was checked, and exits with
-0, or names the first step that differs and exits with 1.
+0, or names the first step that differs and exits with 1. Of a session of `mjsim play` that is not over, the run is made
+from its journal, as far as it goes, and replayed.
 
 With --video, the replay is filmed: as it was, or in another size, from another camera, with another HUD."""
 
@@ -108,10 +113,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError("a camera needs a film; name the file with --video FILE.mp4")
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("steps"), TimeElapsedColumn())
     try:
-        with progress_bars(error_console(), "replay", *columns) as bars:
+        with ExitStack() as stack, progress_bars(error_console(), "replay", *columns) as bars:
             bar = bars.add_task("replay", total=None)
             report = replay(
-                arguments.directory,
+                stack.enter_context(_run_of(arguments)),
                 start=arguments.start,
                 film=film,
                 assistance=arguments.assistance,
@@ -127,6 +132,28 @@ def run(arguments: argparse.Namespace) -> int:
         as_run = "; its frames are those of the run's own video" if report.as_filmed else ""
         print(f"{arguments.video}{as_run}")
     return 0
+
+
+@contextmanager
+def _run_of(arguments: argparse.Namespace) -> Iterator[Path]:
+    """The run directory; that of a session which is not over is made for as long as it is needed.
+
+    Raises:
+        RecordError: Nothing was played.
+    """
+    from experiments.web.journalled_run import (  # imported late: most runs have no journal
+        journal_of,
+        save_run,
+    )
+
+    journal = None if is_run(arguments.directory) else journal_of(arguments.directory)
+    if journal is None:
+        yield arguments.directory
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder) / "unfinished"
+        save_run(journal, run, None if arguments.house is None else House.load(arguments.house))
+        yield run
 
 
 def _summary(report: ReplayReport) -> str:

@@ -7,10 +7,10 @@ from collections.abc import Callable
 SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # px
 FIRST_SIZE = 2
 FRAMES = 20  # between two changes of the size
-SLOW, QUICK = 0.036, 0.020  # s a frame may take before the size goes down, and may take to go up
+SLOW, QUICK = 0.045, 0.028  # s a frame may take before the size goes down, and may take to go up
 HELD_UP = 0.06  # s a frame may wait for the link before the size goes down
 SHARE = 0.72  # of the time that may be spent on drawing; the rest is left to other sessions
-RETRY = 30.0  # s after which a size that was too large for the link is tried again
+RETRY = 30.0  # s after which a size that was too large is tried again
 
 
 class FrameSize:
@@ -27,7 +27,7 @@ class FrameSize:
         self.index, self._largest = FIRST_SIZE, len(SIZES) - 1
         self._clock = clock
         self._frames: list[tuple[float, float]] = []
-        self._held_up_at = len(SIZES)
+        self._too_large = len(SIZES)
         self._retry_at = 0.0
 
     def limit(self, width: int, height: int) -> None:
@@ -43,14 +43,11 @@ class FrameSize:
             return
         took, waited = (statistics.median(times) for times in zip(*self._frames, strict=True))
         del self._frames[0]
-        if waited > HELD_UP and self.index:
-            self._held_up_at, self._retry_at = self.index, self._clock() + RETRY
-            self._set(self.index - 1)
-        elif took > SLOW:
+        if waited > HELD_UP or took > SLOW:
+            self._too_large, self._retry_at = self.index, self._clock() + RETRY
             self._set(max(0, self.index - 1))
-        elif took < QUICK:
-            held_up = self.index + 1 >= self._held_up_at and self._clock() < self._retry_at
-            self._set(self.index if held_up else min(self._largest, self.index + 1))
+        elif took < QUICK and (self.index + 1 < self._too_large or self._clock() > self._retry_at):
+            self._set(min(self._largest, self.index + 1))
 
     def _set(self, index: int) -> None:
         if index != self.index:

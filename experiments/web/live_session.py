@@ -19,7 +19,6 @@ from experiments.session.viewer import Viewer
 from experiments.trials.person_distribution import PersonDistribution
 from experiments.trials.setup import draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
-from experiments.trials.trial_record import SessionResult
 from experiments.web.controls import Controls, Input, control_step
 from experiments.web.journal import JOURNAL, Journal
 from experiments.web.resuming_planner import ResumingPlanner
@@ -33,10 +32,9 @@ from experiments.web.session_journal import (
     encode,
     lines_of,
     record_of,
-    recorded_of,
 )
 from mjsim.actions import Action
-from mjsim.model.scene import Scene, compose
+from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.live import LiveReplanner
@@ -261,26 +259,6 @@ def config_of(settings: Mapping[str, Any]) -> TrialConfig:
 def is_over(journal: Sequence[bytes]) -> bool:
     """Whether the session of a journal is over."""
     return bool(journal) and decode(journal)[2] is not None
-
-
-def result_of(journal: Sequence[bytes], house: House) -> tuple[TrialConfig, Scene, SessionResult]:
-    """What the session of a journal left behind, for its run directory; also that of an unfinished one.
-
-    Raises:
-        RecordError: It is no journal of a session, or holds no control step.
-    """
-    opened, steps, closed = decode(journal)
-    if not steps:
-        raise RecordError("nothing was played")
-    config = config_of(opened.config)
-    person = draw_person(config)
-    house = house.for_person(person)
-    scene = compose(trial_episode(config, house), house.catalogue, person=person)
-    tail = closed.log if closed is not None else []
-    log = EventLog()
-    log.extend(lines_of(steps, tail))
-    arrays = arrays_of(scene.episode, steps)
-    return config, scene, SessionResult(arrays, recorded_of(steps, arrays, tail), log, None)
 
 
 def open_journal(folder: Path) -> Journal:

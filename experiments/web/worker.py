@@ -16,19 +16,18 @@ import msgspec
 
 from experiments.house import House
 from experiments.runs import records
-from experiments.runs.run_directory import is_run, run_directory
+from experiments.runs.run_directory import is_run
 from experiments.session.user_code import describe
 from experiments.session.viewer import Viewer
 from experiments.trials.trial_config import TrialConfig
-from experiments.trials.trial_record import draw_floor_plan, save_record
 from experiments.web import messages
 from experiments.web.clock import Clock
 from experiments.web.connection import Connection
 from experiments.web.drawing import Drawer
 from experiments.web.encoders import Image
 from experiments.web.inbox import Inbox
-from experiments.web.journal import JOURNAL, read_journal
-from experiments.web.live_session import LiveSession, config_of, is_over, open_journal, result_of
+from experiments.web.journalled_run import save_run
+from experiments.web.live_session import LiveSession, config_of, is_over, open_journal
 from experiments.web.rejoining import let_go_of_stderr, wait_for_server
 from hud.projection import CameraView
 from hud.state import HudState
@@ -237,19 +236,11 @@ class Worker:
         return self._pictures[id(house)]
 
     def _finish(self, folder: Path, run: Path, house: House) -> None:
-        """Make the run directory of a session that is over, where it is not there yet."""
-        if not is_run(run):
-            _save(folder, run, house)
+        """Make the run directory of a session that is over, or what of it a kill prevented."""
+        if not (is_run(run) and (run / records.TOPDOWN).is_file()):
+            save_run(folder, run, house)
         metrics = msgspec.json.decode((run / records.METRICS).read_bytes())
         self._connection.send(messages.Over(metrics["ended"], metrics))
-
-
-def _save(folder: Path, run: Path, house: House) -> None:
-    """Make the run directory from the journal alone."""
-    _, scene, result = result_of(read_journal(folder / JOURNAL), house)
-    with run_directory(run) as work:
-        save_record(work, run, scene, result, float(result.arrays["time"][-1]))
-    draw_floor_plan(run, house, scene, result)
 
 
 def _state(seen: Observation, state: HudState, step: int, number: int) -> messages.State:

@@ -45,6 +45,7 @@ def visit(browser, server, look):
     page.keyboard.press("Enter")
     page.locator("#list li").first.wait_for(state="attached")
     check()
+    found.extend(elsewhere(browser, server, page, look))
     page.keyboard.press("h")
     page.get_by_role("heading", name="Keys").wait_for()
     check()
@@ -64,6 +65,36 @@ def visit(browser, server, look):
     page.goto(f"{server.url}nothing-here")
     check()
     page.context.close()
+    return found
+
+
+def elsewhere(browser, server, page, look):
+    """What axe-core finds where all places are taken, and where a second page takes a session over, by keys."""
+    found = []
+    with browser.new_context(**look) as other:
+        waiting = other.new_page()
+        waiting.goto(server.url)
+        waiting.keyboard.press("Enter")
+        waiting.get_by_role("heading", name="The apartment").wait_for()
+        waiting.get_by_role("button", name="Go on").press("Enter")
+        waiting.get_by_role("heading", name="All places are taken").wait_for()
+        found += violations(waiting)
+        assert "You are next." in waiting.locator("#panel-text").inner_text()
+    second = page.context.new_page()
+    second.goto(page.url)
+    second.get_by_role("heading", name="This session is open elsewhere").wait_for()
+    found += violations(second)
+    second.keyboard.press("Enter")
+    page.get_by_role("heading", name="This session goes on in another page").wait_for()
+    found += violations(page)
+    second.get_by_role("heading", name="Paused").wait_for()
+    page.keyboard.press("Enter")  # this one is loaded again, and asks in its turn
+    page.get_by_role("heading", name="This session is open elsewhere").wait_for()
+    second.close()
+    page.keyboard.press("Enter")
+    page.get_by_role("heading", name="Paused").wait_for()
+    page.keyboard.press("Enter")
+    page.locator("#panel").wait_for(state="hidden")
     return found
 
 

@@ -25,6 +25,7 @@ export function connectGamepad(actions, inputs, commands, listens) {
     for (const action of actions) {
       if (action.button === undefined || !pressed[action.button] || before[action.button]) continue;
       if (!action.press && !action.rows) commands[action.name]();
+      else if (!listens() && action.name === "act") commands.confirm();
       else if (listens() && action.press) inputs.press(action.press);
       else if (listens()) inputs.scroll(action.rows);
     }

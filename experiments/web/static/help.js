@@ -39,6 +39,10 @@ export class Help {
     this.#dialog.scrollTop = 0;
   }
 
+  hide() {
+    this.#dialog.close();
+  }
+
   #fill() {
     this.#dialog.querySelector("#keys").replaceChildren(...ACTIONS.map((action) => this.#row(action)));
   }
@@ -57,7 +61,9 @@ export class Help {
     });
     const cell = document.createElement("td");
     cell.append(change);
-    row.append(what, made("td", this.#bindings.label(action)), made("td", action.pad), cell);
+    const pad = made("td", action.pad);
+    pad.className = "pads";
+    row.append(what, made("td", this.#bindings.label(action)), pad, cell);
     return row;
   }
 
@@ -66,7 +72,7 @@ export class Help {
     if (!action) {
       if (this.#bindings.action(event.code)?.name !== "help") return;
       event.stopPropagation(); // else the view, which listens again, opens the table anew
-      this.#dialog.close();
+      this.hide();
       return;
     }
     if (event.code === "Tab") return;

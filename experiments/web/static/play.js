@@ -42,7 +42,11 @@ const connection = new Connection(() => ({ type: "hello", tab, phase, view: view
 const inputs = new Inputs((input) => debug.sent(connection.input(input)));
 const bindings = new Bindings();
 const help = new Help(byId("help"), bindings, () => canvas.focus());
-const commands = { help: () => openHelp(), pause: () => (state.paused ? resume() : pause("asked")) };
+const commands = {
+  help: () => (help.open ? help.hide() : openHelp()),
+  pause: () => (state.paused ? resume() : pause("asked")),
+  confirm: () => document.querySelector("dialog[open] .button")?.click(),
+};
 const listens = () => state.begun && !state.paused && !state.over && !panel.open && !help.open;
 const keyboard = new Keyboard(bindings, inputs, commands, listens);
 
@@ -126,6 +130,9 @@ function showInstructions() {
 }
 
 function keysText() {
+  if (matchMedia("(pointer: coarse)").matches) {
+    return "Walk and turn with the buttons at the lower left; drag over the view to look around. Pick or place picks up and puts into the bin. Help shows all controls.";
+  }
   const key = (name) => bindings.label(ACTIONS.find((action) => action.name === name));
   return `Walk with ${key("forward")}, ${key("left")}, ${key("back")}, ${key("right")}; turn with the mouse, or with ${key("turnLeft")} and ${key("turnRight")}. ${key("act")} picks up and puts into the bin. ${key("help")} shows all keys.`;
 }
