@@ -15,7 +15,7 @@ from experiments.runs.phases import TASK
 
 PERIOD = 0.25  # s between two inputs
 MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
-SETTLING = 3.0  # s in which a session finds the size of its frames
+SETTLING = 8.0  # s in which a session finds the size of its frames
 LEAST_FPS, MOST_MS = 15.0, 150.0  # what a session that holds has: frames a second, 95 % from input to frame
 CASES = {  # codec, states, link
     "jpeg": ("jpeg", False, Link()),

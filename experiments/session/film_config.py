@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from experiments.errors import ConfigError
-from mjsim.render import PROFILES
+from mjsim.render import PROFILES, RenderProfile
 
 
 @dataclass(frozen=True)
@@ -16,8 +16,8 @@ class FilmConfig:
 
     width: int = 640
     height: int = 480
-    profile: str = "fast"
+    profile: str | RenderProfile = "fast"
 
     def __post_init__(self) -> None:
-        if self.profile not in PROFILES:
+        if isinstance(self.profile, str) and self.profile not in PROFILES:
             raise ConfigError(f"no render profile {self.profile!r}; there are {', '.join(PROFILES)}")

@@ -19,10 +19,12 @@ from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.model.avatar import EYE
 from mjsim.model.scene import Scene
+from mjsim.render import FAST
 from mjsim.render.cameras import camera_pose
 from mjsim.world import World
 
 ASPECT = 4 / 3  # of all sizes
+COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # of the smallest size
 MAX_IN_FLIGHT = 3  # frames sent that the browser has not yet shown
 
 
@@ -181,7 +183,7 @@ class Drawer:
     def _renderer(self, size: int) -> FirstPersonRenderer:
         if size not in self._renderers:
             width, height = SIZES[size]
-            film = FilmConfig(width, height)
+            film = FilmConfig(width, height, FAST if size else COARSE)
             self._renderers[size] = FirstPersonRenderer(self._scene, self._house, film, self._pictures())
         return self._renderers[size]
 
