@@ -158,13 +158,9 @@ class Session:
         """
         self._now = self.recording.pass_checkpoint(self._now)
         self.show()
+        blocked = self._controller.blocked
         percept = SessionPercept(
-            self._now,
-            self._answer,
-            self._world,
-            self.assistant,
-            self._hud_state,
-            blocked=self._controller.blocked,
+            self._now, self._answer, self._world, self.assistant, self._hud_state, blocked=blocked
         )
         decision = decide(self._participant, percept)
         if not (self.rollouts and self._roll_out(decision)):

@@ -7,8 +7,8 @@ from typing import Any
 from experiments.session.endings import INTERRUPTED
 from experiments.web import messages
 from experiments.web.connection import Connection
-from experiments.web.inbox import Inbox
 from experiments.web.live_session import LiveSession
+from experiments.web.mailbox import Mailbox
 
 LATE = 0.02  # s after its time at which a control step counts as late
 ASLEEP = 1.0  # s behind at which the process must have been stopped, and the clock goes on from now
@@ -17,8 +17,8 @@ ASLEEP = 1.0  # s behind at which the process must have been stopped, and the cl
 class Clock:
     """Steps a session in real time until it is over, left, or the server is gone."""
 
-    def __init__(self, live: LiveSession, inbox: Inbox, sync: Any, connection: Connection) -> None:
-        self._live, self._inbox, self._connection = live, inbox, connection
+    def __init__(self, live: LiveSession, mailbox: Mailbox, sync: Any, connection: Connection) -> None:
+        self._live, self._mailbox, self._connection = live, mailbox, connection
         self._sync = _Sync(sync, connection)
 
     def run(self) -> str | None:
@@ -28,21 +28,21 @@ class Clock:
             PhysicsError: The physics failed.
             OSError: The journal cannot be written.
         """
-        live, inbox = self._live, self._inbox
+        live, mailbox = self._live, self._mailbox
         deadline, paused = time.monotonic(), False
         try:
             while (reason := live.end_reason) is None:
-                if inbox.begun:
+                if mailbox.begun:
                     self._note_blurs()
-                if not inbox.runs:
-                    if inbox.closed:
+                if not mailbox.runs:
+                    if mailbox.closed:
                         return None
-                    if inbox.leave:
+                    if mailbox.leave:
                         return INTERRUPTED
-                    if inbox.begun and not paused:
-                        paused = self._pause(inbox.paused or "")
+                    if mailbox.begun and not paused:
+                        paused = self._pause(mailbox.paused or "")
                     live.session.show()
-                    inbox.wait_until_running(0.1)
+                    mailbox.wait_until_running(0.1)
                     deadline = time.monotonic()
                     continue
                 if paused:
@@ -64,14 +64,14 @@ class Clock:
         elif late > LATE:
             self._live.session.note("overrun", seconds=round(late, 3), skipped=False)
         self._sync.check()
-        self._live.step(self._inbox.take())
+        self._live.step(self._mailbox.take())
         if self._live.end_reason is None:
             self._live.session.show()  # what the inputs led to is on its way a control step earlier
         self._sync.request(self._live.input, self._live.session.recording.step)
         return deadline + self._live.world.control_timestep
 
     def _note_blurs(self) -> None:
-        for away, wall in self._inbox.take_blurs():
+        for away, wall in self._mailbox.take_blurs():
             self._live.session.note("blur", away=away, wall=round(wall, 3))
 
     def _pause(self, reason: str) -> bool:

@@ -119,9 +119,7 @@ class LiveSession:
         self._log.muted = self.resumed
         self.world = World(self.scene, WorldOptions(fidelity=config.fidelity, capacity=config.capacity))
         self._human = Human(self.world)
-        live = LiveReplanner(self.house.geodesics, solver(config.planner), capacity=config.capacity)
-        plans = [event for event in map(json.loads, lines_of(steps)) if event["event"] == "plan"]
-        self._planner = ResumingPlanner(live, LoggedReplanner(plans, lambda: 0.0) if steps else None)
+        self._planner = self._planner_after(steps)
         self.session, _ = prepare_session(
             config,
             self.house,
@@ -183,6 +181,12 @@ class LiveSession:
     def close(self) -> None:
         """Stop planning in the background."""
         self._planner.close()
+
+    def _planner_after(self, steps: Sequence[Step]) -> ResumingPlanner:
+        config = self.config
+        live = LiveReplanner(self.house.geodesics, solver(config.planner), capacity=config.capacity)
+        plans = [event for event in map(json.loads, lines_of(steps)) if event["event"] == "plan"]
+        return ResumingPlanner(live, LoggedReplanner(plans, lambda: 0.0) if steps else None)
 
     def _append_step(self, lines: list[str], number: int) -> None:
         arrays, recording = self.session.trajectory.arrays(), self.session.recording

@@ -25,9 +25,9 @@ from experiments.web.clock import Clock
 from experiments.web.connection import Connection
 from experiments.web.drawing import Drawer
 from experiments.web.encoders import Image
-from experiments.web.inbox import Inbox
 from experiments.web.journalled_run import save_run
 from experiments.web.live_session import LiveSession, config_of, is_over, open_journal
+from experiments.web.mailbox import Mailbox
 from experiments.web.rejoining import let_go_of_stderr, wait_for_server
 from hud.projection import CameraView
 from hud.state import HudState
@@ -94,7 +94,7 @@ class Worker:
 
     def __init__(self, link: socket.socket, name: str, house: House, pictures: dict[str, Image]) -> None:
         self._connection = Connection(link)
-        self._inbox = Inbox()
+        self._mailbox = Mailbox()
         self._opened: list[messages.Open] = []
         self._serving: messages.Open | None = None
         self._arrived = threading.Condition()
@@ -117,18 +117,18 @@ class Worker:
 
     def _next_session(self) -> messages.Open | None:
         with self._arrived:
-            self._arrived.wait_for(lambda: self._opened or self._inbox.closed)
+            self._arrived.wait_for(lambda: self._opened or self._mailbox.closed)
             if not self._opened:
                 return None
             self._serving = opened = self._opened.pop(0)
-            self._inbox = Inbox(closed=self._inbox.closed, paused=opened.paused)
+            self._mailbox = Mailbox(closed=self._mailbox.closed, paused=opened.paused)
             return opened
 
     def _receive(self) -> None:
         while self._receive_from_server() and self._rejoined():
             pass
         with self._arrived:
-            self._inbox.set(closed=True)
+            self._mailbox.set(closed=True)
             self._arrived.notify()
 
     def _receive_from_server(self) -> bool:
@@ -145,7 +145,7 @@ class Worker:
             opened = self._serving
             if opened is None:
                 return False
-            self._inbox.set(paused=self._inbox.paused or DISCONNECTED)
+            self._mailbox.set(paused=self._mailbox.paused or DISCONNECTED)
         let_go_of_stderr()
         link = wait_for_server(Path(opened.folder), lambda: self._serving is not None)
         if link is None:
@@ -159,7 +159,7 @@ class Worker:
         with self._arrived:
             serving = self._serving is not None and self._serving.folder == message.folder
             if serving:
-                self._inbox.set(paused=message.paused)
+                self._mailbox.set(paused=message.paused)
             else:
                 self._opened.append(message)
                 self._arrived.notify()
@@ -167,26 +167,26 @@ class Worker:
                 self._say_ready(self._window.live)
 
     def _say_ready(self, live: LiveSession) -> None:
-        inbox = self._inbox
+        mailbox = self._mailbox
         self._connection.send(
-            messages.Ready(live.session.recording.step, inbox.last, live.resumed, inbox.begun)
+            messages.Ready(live.session.recording.step, mailbox.last, live.resumed, mailbox.begun)
         )
 
     def _take(self, message: Any) -> None:
         if isinstance(message, messages.Open):
             self._open(message)
         elif isinstance(message, messages.Inputs):
-            self._inbox.add(message.inputs)
+            self._mailbox.add(message.inputs)
         elif isinstance(message, messages.Begin):
-            self._inbox.set(begun=True)
+            self._mailbox.set(begun=True)
         elif isinstance(message, messages.Pause):
-            self._inbox.set(paused=message.reason)
+            self._mailbox.set(paused=message.reason)
         elif isinstance(message, messages.Resume):
-            self._inbox.set(paused=None)
+            self._mailbox.set(paused=None)
         elif isinstance(message, messages.Blur):
-            self._inbox.add_blur(message.away)
+            self._mailbox.add_blur(message.away)
         elif isinstance(message, messages.Leave):
-            self._inbox.set(leave=True)
+            self._mailbox.set(leave=True)
         elif isinstance(message, messages.View):
             self._view = message
             self._apply_view()
@@ -208,14 +208,14 @@ class Worker:
                 self._finish(folder, Path(opened.run), house)
                 return
             live = LiveSession(journal, house, config, self._window, before=opened.before)
-            inbox = self._inbox
+            mailbox = self._mailbox
             pictures = partial(self._pictures_of, house)
             with Drawer(live.scene, live.house, pictures, self._connection.send) as drawer:
                 self._window.live, self._window.drawer = live, drawer
-                inbox.set(last=live.input, begun=inbox.begun or live.resumed)
+                mailbox.set(last=live.input, begun=mailbox.begun or live.resumed)
                 self._say_ready(live)
                 self._apply_view()
-                reason = Clock(live, inbox, journal.sync, self._connection).run()
+                reason = Clock(live, mailbox, journal.sync, self._connection).run()
                 self._window.live = self._window.drawer = None
             if reason is None:
                 live.close()

@@ -8,7 +8,7 @@ from experiments.web.controls import Input
 
 
 @dataclass
-class Inbox:
+class Mailbox:
     """Inputs in order, each once, and what the clock should do.
 
     Attributes:
