@@ -25,6 +25,11 @@ export class Inputs {
     if (JSON.stringify(this.#axes()) !== before) this.#flush();
   }
 
+  /** Says what is held down, to a session that may know it from an earlier page. */
+  repeat() {
+    this.#flush();
+  }
+
   /** Lets everything go. */
   release() {
     const some = Object.keys(this.#axes()).length > 0;

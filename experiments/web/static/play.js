@@ -58,8 +58,12 @@ function take(message) {
 const handlers = {
   ready({ begun }) {
     state.begun = begun;
-    if (!begun) showInstructions();
-    else if (!state.paused) panel.hide();
+    if (!begun) {
+      showInstructions();
+      return;
+    }
+    inputs.repeat();
+    if (!state.paused) panel.hide();
   },
   frame: (frame) => screen.show(frame),
   text: showText,
