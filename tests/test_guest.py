@@ -18,13 +18,13 @@ from experiments.participants.guest.decision import Task, choose, first_step_cos
 from experiments.participants.guest.memory import Memory, Recollection
 from experiments.participants.guest.perception import Noticing, Perception
 from experiments.participants.guest.timing import Timing
-from experiments.participants.guest.walking import Walking, Wandering, free_length
+from experiments.participants.guest.walking import Walking, Wandering
 from experiments.runs.records import EventLog
 from experiments.trials.setup import draw_behaviour, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 
-FULL_COMPLIANCE = {"compliance.follows": 1.0}
+FULL_COMPLIANCE = {"compliance.follows": 1.0, "compliance.quits": 0.0}
 metres = st.floats(0.0, 30.0)
 shares = st.floats(0.01, 1.0)
 
@@ -39,7 +39,7 @@ def house() -> House:
 
 @given(metres, metres, shares, shares)
 def test_what_is_nearer_and_less_hidden_is_noticed_more_probably(a, b, one, other):
-    perception = Perception(7.0, 1.0, 0.8)
+    perception = Perception(7.0, 1.0, 0.8, 4.0)
     near, far = sorted((a, b))
     hidden, open_ = sorted((one, other))
     assert perception.probability(near, one) >= perception.probability(far, one)
@@ -47,8 +47,8 @@ def test_what_is_nearer_and_less_hidden_is_noticed_more_probably(a, b, one, othe
 
 
 def test_half_of_what_lies_at_the_half_distance_is_noticed_and_nothing_behind_a_wall():
-    assert Perception(6.5, 1.0, 0.8).probability(6.5, 1.0) == pytest.approx(0.5)
-    assert Perception(6.5, 1.0, 0.8).probability(0.5, 0.0) == 0.0
+    assert Perception(6.5, 1.0, 0.8, 4.0).probability(6.5, 1.0) == pytest.approx(0.5)
+    assert Perception(6.5, 1.0, 0.8, 4.0).probability(0.5, 0.0) == 0.0
 
 
 class Seen:
@@ -65,7 +65,7 @@ class Seen:
 
 @pytest.mark.parametrize("distance", [5.0, 7.0, 8.5])
 def test_as_many_objects_are_noticed_as_the_law_says_however_often_one_looks(distance):
-    perception = Perception(7.0, 1.0, 0.8)
+    perception = Perception(7.0, 1.0, 0.8, 4.0)
     noticing = Noticing(perception, np.random.default_rng(0))
     seen = Seen(distance)
     first, again = noticing.notice(seen), noticing.notice(seen)
@@ -132,13 +132,13 @@ def test_full_hands_can_only_place():
 
 
 def test_who_always_follows_neither_gives_up_nor_picks_up_anything_else():
-    always = Adherence(Compliance(1.0, 1.0, 1.0, 9.0), np.random.default_rng(0))
+    always = Adherence(Compliance(1.0, 1.0, 1.0, 9.0, quits=0.0), np.random.default_rng(0))
     assert all(always.takes_up() and always.gives_up_after(5.0) is None for _ in range(100))
     assert not any(always.picks_up(0.1) for _ in range(100))
 
 
 def test_others_do_as_often_as_they_are_said_to():
-    person = Adherence(Compliance(0.3, 0.2, 0.4, 2.0), np.random.default_rng(0))
+    person = Adherence(Compliance(0.3, 0.2, 0.4, 2.0, quits=0.0), np.random.default_rng(0))
     times = range(8000)
     assert np.mean([person.takes_up() for _ in times]) == pytest.approx(0.3, abs=0.02)
     given_up = [person.gives_up_after(5.0) for _ in times]
@@ -148,14 +148,16 @@ def test_others_do_as_often_as_they_are_said_to():
     assert not any(person.picks_up(2.1) for _ in range(100))
 
 
+def test_whoever_quits_follows_nothing_more_and_sooner_or_later_everybody_does():
+    people = [
+        Adherence(Compliance(1.0, 0.0, 0.0, 2.0, quits=0.1), np.random.default_rng(k)) for k in range(2000)
+    ]
+    followed = np.array([[person.takes_up() for _ in range(20)] for person in people])
+    assert np.all(np.diff(followed.astype(int), axis=1) <= 0)
+    assert followed.mean(axis=0) == pytest.approx(0.9 ** np.arange(1, 21), abs=0.04)
+
+
 # Walking
-
-
-def test_a_straight_line_ends_at_the_first_wall():
-    walls = np.array([[2.0, -1.0, 2.0, 1.0], [1.0, -1.0, 1.0, 1.0], [-1.0, -1.0, -1.0, 1.0]])
-    assert free_length(walls, np.zeros(2), np.array([4.0, 0.0])) == pytest.approx(1.0)
-    assert free_length(walls, np.zeros(2), np.array([0.5, 0.0])) == pytest.approx(0.5)
-    assert free_length(walls, np.zeros(2), np.array([0.0, 7.0])) == pytest.approx(7.0)
 
 
 def test_without_lapses_and_pull_a_walk_has_no_stops(house):
@@ -166,6 +168,24 @@ def test_without_lapses_and_pull_a_walk_has_no_stops(house):
     stops = [stop for a, b in ends for stop in pulled.stops(a, b, pole=True)]
     assert stops and all(np.linalg.norm(stop - house.navmesh.snap(stop)) < 0.01 for stop in stops)
     assert not any(pulled.stops(a, b, pole=False) for a, b in ends)
+
+
+@pytest.mark.parametrize("astray", [2.5, 6.0])
+def test_lapses_lead_to_places_of_the_house_that_are_not_too_far(house, astray):
+    starts = house.navmesh.sample(np.random.default_rng(2), 60)
+    absent = Wandering(Walking(1.0, astray, 0.0), house, np.random.default_rng(0))
+    walks = [
+        house.geodesics.shortest_path(start, stop).geodesic_distance
+        for start in starts
+        for stop in absent.stops(start, start, pole=False)
+    ]
+    assert len(walks) >= 55 and max(walks) <= astray and max(walks) > 0.8 * astray
+    assert (
+        Wandering(Walking(1.0, 0.1, 0.0), house, np.random.default_rng(0)).stops(
+            starts[0], starts[1], pole=False
+        )
+        == []
+    )
 
 
 # Time
@@ -258,7 +278,8 @@ def test_everything_is_delivered_with_what_each_condition_shows(house, assistanc
 
 def test_who_complies_never_deviates_and_who_does_not_does(house):
     def deviations(follows, seed):
-        config = trial({"compliance.follows": follows, "perception.half_distance": 50.0}, seed=seed)
+        people = {"compliance.follows": follows, "compliance.quits": 0.0, "perception.half_distance": 50.0}
+        config = trial(people, seed=seed)
         return sum(e["deviated"] for e in played(house, config)[1] if e["event"] == "visit")
 
     assert [deviations(1.0, seed) for seed in range(3)] == [0, 0, 0]

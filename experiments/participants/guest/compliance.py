@@ -13,19 +13,21 @@ class Compliance:
 
     The published variance of deviations is largest under `optimal` at every difficulty, as if there were kinds of
     people (PAPER section 8): some always follow, some sometimes, some hardly. The weights are starting values. Who
-    always follows neither gives up nor picks up anything else.
+    always follows neither gives up a step nor picks up anything else, but may have enough of it, too.
 
     Attributes:
         follows: Probability of taking up a suggested step.
         abandons: Probability of giving up a step on the way to it.
         picks_up: Probability of picking up an object that is noticed beside the way, with a hand free.
         beside: How far from the person that is at most, m.
+        quits: Probability, at each suggestion, of following none from then on: the longer a task, the more people.
     """
 
     follows: float = chance({"mixture": [[0.62, 1.0], [0.20, {"beta": [2, 2]}], [0.18, {"beta": [1, 9]}]]})
     abandons: float = chance({"beta": [1.0, 19.0]})
     picks_up: float = chance({"uniform": [0.15, 0.30]})
     beside: float = varies(2.0, 0.0, 20.0, "m")
+    quits: float = chance({"beta": [1.0, 99.0]})
 
 
 class Adherence:
@@ -37,11 +39,13 @@ class Adherence:
     """
 
     def __init__(self, compliance: Compliance, rng: np.random.Generator) -> None:
-        self.compliance, self._rng = compliance, rng
+        self.compliance, self._rng, self._has_quit = compliance, rng, False
 
     def takes_up(self) -> bool:
         """Whether a suggested step is followed."""
-        return float(self._rng.random()) < self.compliance.follows
+        quits, follows = self._rng.random(2).tolist()
+        self._has_quit |= quits < self.compliance.quits
+        return follows < self.compliance.follows and not self._has_quit
 
     def gives_up_after(self, duration: float) -> float | None:
         """After what time on the way of so many seconds the step is given up, s; None if it is not."""

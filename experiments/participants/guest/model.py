@@ -9,6 +9,7 @@ from experiments.house import House
 from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Guidance, Moves, Percept, Point
 from experiments.participants.guest.compliance import Adherence, Compliance
 from experiments.participants.guest.decision import Decision as DecisionParameters
+from experiments.participants.guest.intention import Intention
 from experiments.participants.guest.memory import Memory, Recollection
 from experiments.participants.guest.options import Chooser, Known
 from experiments.participants.guest.perception import Noticing, Perception
@@ -38,23 +39,6 @@ class Behaviour:
     compliance: Compliance
     walking: Walking
     timing: Timing
-
-
-@dataclass(frozen=True)
-class Intention:
-    """What a person is about to do.
-
-    Attributes:
-        aim: A visit, or a place to look around from.
-        suggested: Whether it is the suggested step.
-        strays: Whether it goes its own way there: it is not on the path that is shown, or came to a halt there.
-        gives_up_at: Simulated time at which the suggested step is given up, s.
-    """
-
-    aim: Visit | Place
-    suggested: bool = False
-    strays: bool = False
-    gives_up_at: float = math.inf
 
 
 class Guest:
@@ -136,7 +120,22 @@ class Guest:
         for key in sorted(set(self._house.receptacles) - self._known.bins):
             if math.dist(self._house.approaches[key], percept.position) < SEEN_BIN:
                 self._known.bins.add(key)
+        self._frontier.mark_seen(percept, room, self._behaviour.perception.covers)
+        self._look_around_if_there(percept)
         self._pick_up_in_passing(percept)
+
+    def _look_around_if_there(self, percept: Percept) -> None:
+        """Where a search led to is in view now, or reached: perhaps look all around; then choose what is next."""
+        aim = self._intention.aim if self._intention is not None else None
+        if not isinstance(aim, Place) or (
+            self._frontier.is_left(aim) and not self._is_at(percept, aim.point)
+        ):
+            return
+        self._frontier.mark_searched(aim)
+        self._intention = None
+        if float(self._rng.random()) < self._behaviour.perception.looks_around:
+            self._noticing.look_afresh()
+            self._turn = FullTurn(percept.heading)
 
     def _misses(self, percept: Percept) -> bool:
         """Whether objects are left of which it does not know where they are."""
@@ -262,7 +261,7 @@ class Guest:
             until = min(self._next_look, intention.gives_up_at)
             return self._executor.walk_to(percept, self._stops[0], ARRIVED, until=until)
         if isinstance(intention.aim, Place):
-            return self._search(percept, intention.aim)
+            return self._executor.walk_to(percept, intention.aim.point, ARRIVED, until=self._next_look)
         return self._visit(percept, intention, intention.aim)
 
     def _is_at(self, percept: Percept, point: Point) -> bool:
@@ -285,16 +284,6 @@ class Guest:
             self._turn = FullTurn(percept.heading)
             return self._turn_around(percept) or IDLE
         return self._executor.act(percept, visit, self._known.objects, until=self._next_look)
-
-    def _search(self, percept: Percept, place: Place) -> Decision:
-        if not self._is_at(percept, place.point):
-            return self._executor.walk_to(percept, place.point, ARRIVED, until=self._next_look)
-        self._frontier.mark_searched(place)
-        self._intention = None
-        if float(self._rng.random()) < self._behaviour.perception.looks_around:
-            self._noticing.look_afresh()
-            self._turn = FullTurn(percept.heading)
-        return self._turn_around(percept) or IDLE
 
 
 def _stand(seconds: float) -> Decision:

@@ -21,11 +21,14 @@ class Perception:
         half_distance: Distance at which half of the objects in full view are noticed, m.
         distance_spread: Scale of the logistic curve, m; nearly all are noticed three of these nearer.
         looks_around: Probability of looking all around where a search leads to.
+        covers: How far from the person floor in view counts as looked at, m; what is overlooked there is looked for
+            again, more closely, once all rooms have been searched.
     """
 
     half_distance: float = varies({"uniform": [6.0, 8.0]}, 0.1, 100.0, "m")
     distance_spread: float = varies(1.0, 0.01, 20.0, "m")
     looks_around: float = chance(0.8)
+    covers: float = varies({"uniform": [2.0, 6.0]}, 0.0, 100.0, "m")
 
     def probability(self, distance: float, share: float) -> float:
         """How probably an object is noticed on entering a scene.
