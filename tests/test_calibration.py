@@ -231,7 +231,7 @@ def test_a_fitted_study_is_read_back_with_its_population(tmp_path):
     for name, described in rounded.parameters:
         shares = [0.1, 0.5, 0.9]
         expected = [described.quantile(s, -np.inf, np.inf) for s in shares]
-        assert [found[name].quantile(s, -np.inf, np.inf) for s in shares] == pytest.approx(expected, rel=2e-3)
+        assert [found[name].quantile(s, -np.inf, np.inf) for s in shares] == pytest.approx(expected, rel=5e-3)
     path.write_text(fitted_study(path, rounded, "again"))
     assert path.read_text().count("# Fitted") == 1
     own = tmp_path / "own.toml"
@@ -271,7 +271,11 @@ def test_controls_change_what_they_name_and_leave_the_rest_of_the_population():
     )
     controls = {control.name: control.design.trials for control in read_controls(design)}
     (trial, *_) = controls["everyone-complies"]
-    assert trial.behaviour.as_dict() == {"compliance.follows": 1.0, "timing.guided_step": 9.0}
+    assert trial.behaviour.as_dict() == {
+        "compliance.follows": 1.0,
+        "compliance.quits": 0.0,
+        "timing.guided_step": 9.0,
+    }
     assert all(not t.behaviour.parameters for t in controls["follower"])
     assert {t.assistance for t in controls["nearest"]} == {"highlight"}
     assert all(len(trials) == 24 for name, trials in controls.items() if name != "nearest")

@@ -286,6 +286,14 @@ def test_who_complies_never_deviates_and_who_does_not_does(house):
     assert any(deviations(0.0, seed) for seed in range(3))
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_who_gives_up_the_only_object_it_knows_looks_for_others(house, seed):
+    fickle = {"compliance.follows": 0.5, "compliance.abandons": 1.0, "compliance.picks_up": 0.0}
+    slow_eyes = {"perception.half_distance": 3.0, "walking.lapses": 0.0, "timing.pace": 1.0}
+    _, events = played(house, trial(fickle | slow_eyes, seed=seed))
+    assert events[-1]["reason"] == "all delivered"
+
+
 def test_guidance_takes_its_time(house):
     quick, slow = (
         played(

@@ -164,7 +164,7 @@ class Guest:
         if intention is None:
             return False
         if isinstance(intention.aim, Place):
-            return percept.hands_full or not self._known.objects
+            return percept.hands_full or not self._options(percept, percept.guidance).objects
         if intention.suggested:
             is_shown = percept.guidance is not None and percept.guidance.visit == intention.aim
             if is_shown and percept.time >= intention.gives_up_at - TIME_TOLERANCE:
@@ -228,7 +228,7 @@ class Guest:
             else:
                 objects.pop(shown.visit.object, None)
         pull = self._behaviour.walking.pull if FLAGPOLE in percept.shown_roles else 0.0
-        return Known(objects, pull, search=True)
+        return Known(objects, pull, search=self._misses(percept))
 
     def _goal(self, percept: Percept, aim: Visit | Place, shown: Guidance | None) -> Point:
         """Where an aim is, m, shape (2,)."""
