@@ -12,6 +12,8 @@ from experiments.participants.visit_executor import VisitExecutor
 from experiments.replaying.replay import replay
 from experiments.runs import records
 from experiments.runs.records import EventLog, read_events
+from experiments.session import session as session_module
+from experiments.session.user_code import decide
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
@@ -85,12 +87,16 @@ def test_rollouts_are_what_stepping_gives(house, fidelity, assistance, user):
     assert singles < (0.6 if searches else 0.2) * steps
 
 
-def test_waiting_in_full_physics_is_what_stepping_gives(house):
-    config = TrialConfig(objects=2, assistance="optimal", seed=1)
+def test_waiting_and_walking_on_in_full_physics_are_what_stepping_gives(house, monkeypatch):
+    asked = []
+    monkeypatch.setattr(session_module, "decide", lambda *arguments: asked.append(1) or decide(*arguments))
+    config = TrialConfig(objects=8, assistance="optimal", seed=1)
     rolled_out, singles, steps = played(house, config, rollouts=True)
+    seldom = len(asked)
     stepped, *_ = played(house, config, rollouts=False)
     assert {name for name in stepped if stepped[name] != rolled_out[name]} == set()
     assert singles < 0.8 * steps
+    assert seldom < 0.2 * steps
 
 
 @pytest.mark.parametrize("start", [0.0, 15.0])

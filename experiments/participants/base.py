@@ -172,7 +172,8 @@ class WalkAlong:
     """Walk along a path, sidestep objects on the way, face the goal at its end, and pick or place there.
 
     The session walks. In the fidelity `full`, and while somebody films, it asks the participant again after every
-    control step, else at the end of the walk. So as long as nothing happens, the answer must stay the same.
+    control step, else at the end of the walk. So as long as nothing happens, the answer must stay the same. On a shown
+    path it is not asked in `full` either, unless somebody films, until something happens or an object has moved.
 
     Attributes:
         path: Floor points, m, shape (k, 2), k >= 1.

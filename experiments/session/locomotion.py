@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import ARRIVED_WITHIN
-from experiments.participants.base import TIME_TOLERANCE, WalkAlong
+from experiments.participants.base import TIME_TOLERANCE, Decision, Moves, Wait, WalkAlong
 from experiments.session.path_following import Obstacles, Pace, follow, turn_towards
 from mjsim.actions import IDLE, Action, Move, Pick, Place
 from mjsim.fidelity.body_state import HEADING, X, Y
@@ -162,6 +162,37 @@ class LocomotionController:
             return walk.then or IDLE
         return Move(forward, left, turn)
 
+    def action(self, decision: Decision, seen: Observation) -> Action:
+        """What a decision means for the next control step."""
+        if isinstance(decision, WalkAlong):
+            return self.step(decision, seen)
+        if isinstance(decision, Moves):
+            return Move(*decision.rows[0].tolist())
+        return IDLE if isinstance(decision, Wait) else decision
+
+    def keeps_on(self, walk: WalkAlong, asked: Observation, now: Observation) -> bool:
+        """Whether one who walks along a shown path has nothing to answer to but what there was in the state `asked`."""
+        if self.blocked or now.busy or (walk.until is not None and now.time >= walk.until - TIME_TOLERANCE):
+            return False
+        x, y = now.position.tolist()
+        if project(walk.path, x, y)[1] > walk.tolerance:
+            return False
+        return np.array_equal(_loose_positions(now), _loose_positions(asked))
+
+    def moves(
+        self, decision: Decision, seen: Observation, state: LocomotionState | None, limit: int
+    ) -> Floats:
+        """Moves that follow from a decision, at most `limit`, shape (n, 4); none where physics moves the person.
+
+        The other arguments are those of `roll_out`.
+        """
+        if limit >= 1 and state is not None:
+            if isinstance(decision, WalkAlong):
+                return self.roll_out(decision, seen, state, limit)
+            if isinstance(decision, Moves):
+                return decision.rows[:limit]
+        return np.zeros((0, 4))
+
     def roll_out(self, walk: WalkAlong, seen: Observation, state: LocomotionState, limit: int) -> Floats:
         """Moves that `step` would choose one after the other, as long as nothing else happens.
 
@@ -214,6 +245,11 @@ class LocomotionController:
             flags = [status is ObjectStatus.LOOSE and name != target for name, status in pairs]
             self._is_obstacle = np.array(flags, np.bool_)
         return Obstacles(np.ascontiguousarray(seen.object_positions), self._is_obstacle, self._walls)
+
+
+def _loose_positions(seen: Observation) -> Floats:
+    """Where the loose objects are, m, shape (loose objects, 3)."""
+    return seen.object_positions[[status is ObjectStatus.LOOSE for status in seen.object_status]]
 
 
 def _values(walk: WalkAlong) -> tuple[Floats, tuple[float, float], float, bool, bool, float]:

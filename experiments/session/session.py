@@ -6,18 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import SessionError, UserCodeError
-from experiments.participants.base import Decision, Moves, Participant, Wait, WalkAlong
+from experiments.participants.base import Decision, Participant, Wait, WalkAlong
 from experiments.runs.recording import Recording
 from experiments.runs.trajectory import Trajectory
 from experiments.session.assistant import Assistant
 from experiments.session.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
 from experiments.session.locomotion import LocomotionController
 from experiments.session.perception import SessionPercept
+from experiments.session.recorded_rollout import roll_out
 from experiments.session.user_code import decide, describe, needs_of
 from experiments.session.viewer import OnProgress, Progress, Viewer
 from experiments.signals import signal_of
 from hud.state import HudState
-from mjsim.actions import IDLE, Action, ActionResult, Move, WorldEvent
+from mjsim.actions import IDLE, Action, ActionResult, WorldEvent
 from mjsim.errors import PhysicsError
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.rollout import Rollout
@@ -69,6 +70,7 @@ class Session:
         self.rollouts = rollouts and viewer is None
         self._controller = LocomotionController(walls, world.scene.person)
         self._answer: ActionResult | None = None
+        self._on_progress: OnProgress = lambda _: None
         self._hud: tuple[Observation, HudState] | None = None
         self._recorded_until = 0.0
         self.trajectory = Trajectory(world.scene.index.names)
@@ -117,6 +119,7 @@ class Session:
 
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
         """Go on to the end, once started; returns and raises as `run` does. Whatever ends the session is logged."""
+        self._on_progress = on_progress
         try:
             while (reason := self.end_reason) is None:
                 self.advance()
@@ -163,8 +166,12 @@ class Session:
             self._now, self._answer, self._world, self.assistant, self._hud_state, blocked=blocked
         )
         decision = decide(self._participant, percept)
-        if not (self.rollouts and self._roll_out(decision)):
-            self._step(self._action(decision))
+        if self.rollouts and self._roll_out(decision):
+            return
+        if self.rollouts and isinstance(decision, WalkAlong) and decision.shown:
+            self._walk_on(decision)
+        else:
+            self._step(self._controller.action(decision, self._now))
 
     def note(self, event: str, **fields: Any) -> None:
         """Log something from outside of the simulation, in the present state."""
@@ -184,22 +191,32 @@ class Session:
             self.trajectory.append(self._now, IDLE, self._world.health_sample)
         self._log.append(time, "end", reason=reason, **details)
 
-    def _action(self, decision: Decision) -> Action:
-        """What a decision means for the next control step."""
-        if isinstance(decision, WalkAlong):
-            return self._controller.step(decision, self._now)
-        if isinstance(decision, Moves):
-            return Move(*decision.rows[0].tolist())
-        return IDLE if isinstance(decision, Wait) else decision
-
     def _step(self, action: Action) -> None:
         """One control step, observed by everybody."""
+        self._note_events(self._recorded_step(action))
+
+    def _recorded_step(self, action: Action) -> tuple[WorldEvent, ...]:
+        """One control step, and what happened in it."""
         self._record(action)
         step = self._world.step(action)
         self._now, self._answer = step.observation, step.result
         if step.result is not None:
             self._note_attempt(step.result)
-        self._note_events(step.events)
+        return step.events
+
+    def _walk_on(self, walk: WalkAlong) -> None:
+        """Go on along a shown path without asking again, for as long as the answer would stay the same."""
+        asked, positions = self._now, list[NDArray[np.float64]]()
+        while not (events := self._recorded_step(self._controller.step(walk, self._now))):
+            positions.append(self._now.position)
+            over = self._answer is not None or self.end_reason is not None or self.assistant.expecting
+            if over or not self._controller.keeps_on(walk, asked, self._now):
+                break
+            self._on_progress(self.progress)
+            self._now = self.recording.pass_checkpoint(self._now)
+        if positions:
+            self.assistant.observe_walk(np.array(positions), self._now)
+        self._note_events(events)
 
     def _roll_out(self, decision: Decision) -> bool:
         """Carry out many control steps at once, if all of them follow from the decision; whether that was so."""
@@ -211,44 +228,23 @@ class Session:
                 return False
             self._note_events(self._recorded(None).events)
             return True
-        moves = self._moves(decision, min(left, self.recording.steps_to_checkpoint))
+        limit = min(left, self.recording.steps_to_checkpoint)
+        moves = self._controller.moves(decision, self._now, self._world.locomotion, limit)
         if not len(moves):
             return False
         rollout = self._recorded(moves)
         if isinstance(decision, WalkAlong):
             self._controller.commit(len(rollout))
-        uneventful = len(rollout) - (1 if rollout.events else 0)
-        self.assistant.observe_walk(rollout.states.positions[:uneventful], self._now)
+        self.assistant.observe_walk(
+            rollout.states.positions[: len(rollout) - bool(rollout.events)], self._now
+        )
         if rollout.events:
             self._note_events(rollout.events)
         return True
 
-    def _moves(self, decision: Decision, limit: int) -> NDArray[np.float64]:
-        """Moves that follow from a decision, at most `limit`, shape (n, 4)."""
-        locomotion = self._world.locomotion
-        if limit >= 1 and locomotion is not None:
-            if isinstance(decision, WalkAlong):
-                return self._controller.roll_out(decision, self._now, locomotion, limit)
-            if isinstance(decision, Moves):
-                return decision.rows[:limit]
-        return np.zeros((0, 4))
-
     def _recorded(self, moves: NDArray[np.float64] | None) -> Rollout:
-        """Many control steps, recorded as if they had been observed one by one.
-
-        Args:
-            moves: Forward, left (m/s), turn and look (rad/s) of every step, shape (n, 4); None to wait for the pick or
-                place under way.
-        """
         self._recorded_until = self._now.time
-        self.recording.append()
-        health = self._world.health_sample
-        rollout = self._world.finish() if moves is None else self._world.walk(moves)
-        count = len(rollout)
-        self.recording.extend(rollout.states.state_hashes[:-1])
-        self.trajectory.extend(
-            self._now, health, rollout, np.zeros((count, 4)) if moves is None else moves[:count]
-        )
+        rollout = roll_out(self._world, self._now, moves, self.recording, self.trajectory)
         self._now, self._answer = rollout.observation, None
         return rollout
 
