@@ -34,6 +34,8 @@ class Size:
         messages: Odd messages; a tenth as many odd requests.
         minutes: Of keys pressed at random.
         objects: Put away by keys in each condition.
+        conditions: In which that is done.
+        tries: Numbers of sessions that are tried, each smaller than the one before.
         tier: Words of the server's command line that choose the fidelity.
     """
 
@@ -42,10 +44,12 @@ class Size:
     messages: int = 2000
     minutes: float = 1.0
     objects: int = 1
+    conditions: tuple[str, ...] = ("none", "highlight", "optimal")
+    tries: int = 3
     tier: tuple[str, ...] = ()
 
 
-QUICK = Size(seconds=4.0, faults=7, messages=200, minutes=0.1, tier=FAST)
+QUICK = Size(seconds=4.0, faults=7, messages=200, minutes=0.1, conditions=("optimal",), tries=1, tier=FAST)
 
 
 @dataclass(frozen=True)
@@ -145,8 +149,11 @@ def _latency_details(found: Mapping[str, Any]) -> Iterator[str]:
 
 def _capacity(folder: Path, size: Size, say: Say) -> dict[str, Any]:
     cores = os.cpu_count() or 1
-    frames = measure_capacity(folder, size.seconds, "jpeg", SESSIONS * cores, say, *size.tier)
-    states = measure_capacity(folder, size.seconds, "none", STATE_SESSIONS * cores, say, *size.tier)
+    found = []
+    for codec, most in (("jpeg", SESSIONS * cores), ("none", STATE_SESSIONS * cores)):
+        counts = range(most, 0, -max(1, most // 6))[: size.tries]
+        found.append(measure_capacity(folder, size.seconds, codec, counts, say, *size.tier))
+    frames, states = found
     return {
         "cases": {"JPEG": frames["tried"], "states": states["tried"]},
         "frame_sessions": frames["a_core"],
@@ -166,7 +173,7 @@ def _capacity_details(found: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _pages(folder: Path, size: Size, say: Say) -> dict[str, Any]:
-    return measure_pages(folder, size.objects, say, *size.tier)
+    return measure_pages(folder, size.objects, size.conditions, say, *size.tier)
 
 
 def _pages_details(found: Mapping[str, Any]) -> Iterator[str]:
@@ -275,6 +282,7 @@ PARTS = {
         (
             Requirement("growth of a worker's memory", "worker_growth", "<=", 0.05),
             Requirement("growth of the server's memory", "server_growth", "<=", 0.05),
+            Requirement("longest wait for an acknowledgement, s", "longest_wait_s", "<=", 2.0),
         ),
         _soak_details,
     ),

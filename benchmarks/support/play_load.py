@@ -4,6 +4,7 @@ import asyncio
 import math
 import os
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from experiments.runs.phases import TASK
 
 PERIOD = 0.25  # s between two inputs
 MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
-SETTLING = 8.0  # s in which a session finds the size of its frames
+SETTLING = 2.0  # s before a session is measured
+SETTLING_TOGETHER = 8.0  # s in which sessions find the size of their frames that leaves room for the others
 LEAST_FPS, MOST_MS = 15.0, 150.0  # what a session that holds has: frames a second, 95 % from input to frame
 CASES = {  # codec, states, link
     "jpeg": ("jpeg", False, Link()),
@@ -49,7 +51,7 @@ async def _latency(
 ) -> dict[str, float]:
     address = server.begin()
     browser = SimulatedBrowser(address, codec=codec, state=state, link=link)
-    await _show_something(browser)
+    await _show_something(browser, SETTLING)
     worker = worker_of(server.journal(address, TASK))
     before = [processor_time(pid) for pid in (worker, server.process.pid)]
     browser.bytes, began = 0, time.perf_counter()
@@ -69,20 +71,20 @@ async def _latency(
 
 
 def measure_capacity(
-    folder: Path, seconds: float, codec: str, most: int, say: Say, *words: str
+    folder: Path, seconds: float, codec: str, counts: Sequence[int], say: Say, *words: str
 ) -> dict[str, Any]:
-    """How many sessions at once hold 15 frames a second and 150 ms: so many, or fewer until they do.
+    """How many sessions at once hold 15 frames a second and 150 ms.
 
     Args:
         folder: Gets a folder of visits for each number of sessions.
         seconds: How long for each number.
         codec: Of their frames; `none` for states.
-        most: Sessions to begin with.
+        counts: Numbers of sessions to try, descending, until one holds.
         say: Takes a line about what is under way.
         words: Further words of the server's command line.
     """
     tried = []
-    for count in range(most, 0, -max(1, most // 6)):
+    for count in counts:
         say(f"{count} sessions at once, {codec}, {seconds:.0f} s")
         with PlayProcess(
             folder / f"{codec}-{count}", *TASK_ALONE, "--sessions", str(count), *words
@@ -97,7 +99,7 @@ def measure_capacity(
 
 async def _sessions_at_once(server: PlayProcess, seconds: float, codec: str, count: int) -> dict[str, float]:
     browsers = [SimulatedBrowser(server.begin(), codec=codec, state=codec == "none") for _ in range(count)]
-    await asyncio.gather(*(_show_something(browser) for browser in browsers))
+    await asyncio.gather(*(_show_something(browser, SETTLING_TOGETHER) for browser in browsers))
     workers = [worker_of(server.journal(browser.address, TASK)) for browser in browsers]
     processes = [*workers, server.process.pid, os.getpid()]
     before = [processor_time(pid) for pid in processes]
@@ -119,12 +121,12 @@ async def _sessions_at_once(server: PlayProcess, seconds: float, codec: str, cou
     return result
 
 
-async def _show_something(browser: SimulatedBrowser) -> None:
+async def _show_something(browser: SimulatedBrowser, settling: float) -> None:
     """Start the task of a visit that has no other phase, and turn until the size of its frames is found."""
     await browser.open(TASK)
     await browser.ready()
     await browser.until(lambda: bool(browser.frames))
-    await _turn(browser, SETTLING)
+    await _turn(browser, settling)
 
 
 async def _turn(browser: SimulatedBrowser, seconds: float) -> list[float]:

@@ -1,7 +1,7 @@
 """`mjsim play` in a real browser: tasks done by key events alone, and how soon one sees something on a slow link."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ from experiments.house import House
 from experiments.replaying.replay import replay
 from experiments.runs import records
 
-ASSISTANCE = ("none", "highlight", "optimal")
 BITS, DELAY = 10e6, 0.08  # of the slow link: bits a second; s each way
 TASK_LIMIT = 1800.0  # s of wall time
 DRAWN = "() => { const c = document.getElementById('screen'); return c && %s; }"
@@ -25,18 +24,21 @@ NOT_EMPTY = (
 )
 
 
-def measure_pages(folder: Path, objects: int, say: Say, *words: str) -> dict[str, Any]:
-    """Do a task in every condition by key events, and load the first frame over a slow link.
+def measure_pages(
+    folder: Path, objects: int, conditions: Sequence[str], say: Say, *words: str
+) -> dict[str, Any]:
+    """Do a task in each condition by key events, and load the first frame over a slow link.
 
     Args:
         folder: Gets a folder of visits for each server.
         objects: Of a task.
+        conditions: Of assistance.
         say: Takes a line about what is under way.
         words: Further words of the server's command line.
     """
     with _chromium() as browser:
         tasks = {}
-        for name in ASSISTANCE:
+        for name in conditions:
             say(f"{objects} objects under {name}")
             tasks[name] = _task(browser, folder / name, objects, name, *words)
         say("a slow link")

@@ -10,7 +10,6 @@ import os
 import signal
 import socket
 from contextlib import suppress
-from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection as Pipe
 from multiprocessing.connection import wait
@@ -43,27 +42,16 @@ class ForkServer:
     def run(self) -> None:
         """Serve until told to end."""
         house = House.load(self._name)
-        if not self._serve_waiting(house):
-            return
         self._drawing = _draw_pictures(house.catalogue)
-        for warm_up in (warmup.plan, partial(warmup.act, house)):
-            warm_up()
-            if not self._serve_waiting(house):
-                return
+        warmup.plan()
+        warmup.act(house)
+        gc.freeze()  # collecting garbage would copy what is shared
         while True:
             ready = wait([self._control] if self._drawing is None else [self._control, self._drawing])
             if self._drawing in ready:
                 self._take_pictures()
             elif not self._serve(house):
                 return
-
-    def _serve_waiting(self, house: House) -> bool:
-        """Serve those who wait already: a worker gets on before all is warm. False if this is to end."""
-        gc.freeze()  # collecting garbage would copy what is shared
-        while wait([self._control], 0.0):
-            if not self._serve(house):
-                return False
-        return True
 
     def _take_pictures(self) -> None:
         if (drawing := self._drawing) is not None:

@@ -23,7 +23,7 @@ const canvas = byId("screen");
 const { phase } = main.dataset;
 const tab = Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16)).join("-");
 
-const state = { begun: false, paused: null, over: false, stays: false, codec: "jpeg" };
+const state = { begun: false, waits: false, paused: null, over: false, codec: "jpeg" };
 const panel = new Panel(byId("panel"), () => canvas.focus());
 const debug = new Debug(byId("debug"), new URLSearchParams(location.search).has("debug"));
 const screen = new Screen(
@@ -58,14 +58,17 @@ function take(message) {
 const handlers = {
   ready({ begun }) {
     state.begun = begun;
-    if (!begun) {
-      showInstructions();
-      return;
-    }
+    state.waits = !begun; // nobody starts the clock before there is something to see
+    if (!begun) return;
     inputs.repeat();
     if (!state.paused) panel.hide();
   },
-  frame: (frame) => screen.show(frame),
+  frame(frame) {
+    screen.show(frame);
+    if (!state.waits) return;
+    state.waits = false;
+    showInstructions();
+  },
   text: showText,
   busy({ busy }) {
     byId("busy").hidden = !busy;
