@@ -15,7 +15,8 @@ from planner.exact.deadline import NEVER
 from planner.exact.groups import alone, numbered
 from planner.exact.instance import make_instance, to_visits
 from planner.exact.multipliers import counted_by_bin, first_bound, grown
-from planner.exact.relaxation import fill, walk
+from planner.exact.relaxation import fill
+from planner.exact.relaxed_tour import walk
 from planner.exact.search import row_of
 from planner.exact.solver import ExactSolver
 from planner.exact.table import new_table

@@ -11,7 +11,8 @@ from planner.exact import full_table
 from planner.exact.full_table import by_table, fill_layers, follow
 from planner.exact.groups import alone, numbered
 from planner.exact.instance import FAR, make_instance
-from planner.exact.relaxation import fill, walk
+from planner.exact.relaxation import fill
+from planner.exact.relaxed_tour import walk
 from planner.exact.table import new_table
 
 cases = given(

@@ -67,7 +67,7 @@ def follow_table(instance: Instance, table: Table, row: int) -> tuple[int, list[
     """
     if COMPILER not in sys.modules:
         return follow(instance, table, row)
-    from planner.exact.relaxation import walk  # loaded only where it is needed
+    from planner.exact.relaxed_tour import walk  # loaded only where it is needed
 
     actions: NDArray[np.int64] = np.empty(2 * len(instance.home) + 2, np.int64)
     length, count = walk(instance, table, row, actions)

@@ -10,7 +10,8 @@ from mjsim.kernels import kernel
 from planner.exact.deadline import NEVER, Deadline
 from planner.exact.groups import numbered, together, with_one_alone
 from planner.exact.instance import Instance
-from planner.exact.relaxation import SLICE, fill, fill_rows, walk
+from planner.exact.relaxation import SLICE, fill, fill_rows
+from planner.exact.relaxed_tour import walk
 from planner.exact.table import Table, new_table, rows_of
 from planner.exact.warm_start import Start
 
