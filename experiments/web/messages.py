@@ -14,10 +14,7 @@ from hud.state import HudState
 Codec = Literal["jpeg", "h264", "none"]
 LENGTH = struct.Struct("<I")
 MAX_MESSAGE = 16 * 1024 * 1024  # bytes
-FORK, END = (
-    b"f",
-    b"x",
-)  # what the process that forks workers is told: a worker for the socket that comes along; end
+FORK, END = b"f", b"x"  # what the process that forks workers is told: a worker for this socket; end
 
 
 class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
