@@ -1,7 +1,6 @@
 """What comes before the task: story, fly-through and training, and what simulated participants know afterwards."""
 
 import dataclasses
-import json
 import math
 from pathlib import Path
 
@@ -273,4 +272,4 @@ def _run(config: TrialConfig, known: House, *, rollouts: bool = True) -> tuple[s
     session.rollouts = rollouts
     reason = session.run()
     hashes = session.recording.state_hashes()
-    return reason, float(json.loads(log.lines()[-1])["t"]), int(np.bitwise_xor.reduce(hashes))
+    return reason, float(log.events[-1]["t"]), int(np.bitwise_xor.reduce(hashes))
