@@ -52,6 +52,21 @@ def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], fl
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
     """The result for people."""
+    yield from _table_lines(result)
+    for label in result["not_installed"]:
+        yield f"{label}: not installed (pip install 'mjsim[peers]')"
+    yield (
+        "gap: to the best tour found; best: how often it was; unproven: greatest gap to the planner's own bound; "
+        "MB: most that its process had had by then"
+    )
+    yield from _live_lines(result["live"])
+    for objects, first in result["first_call"].items():
+        yield (
+            f"first answer in a fresh process, {objects} objects: {first['wall']:.2f} s, CPU {first['cpu']:.2f} s"
+        )
+
+
+def _table_lines(result: dict[str, Any]) -> Iterator[str]:
     table = Table(title=f"{result['houses']} disorganized apartments; gaps in %, times in s")
     for heading in ("n", "state", "planner"):
         table.add_column(heading, no_wrap=True)
@@ -81,13 +96,9 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     text = io.StringIO()
     Console(file=text, width=140).print(table)
     yield from text.getvalue().splitlines()
-    for label in result["not_installed"]:
-        yield f"{label}: not installed (pip install 'mjsim[peers]')"
-    yield (
-        "gap: to the best tour found; best: how often it was; unproven: greatest gap to the planner's own bound; "
-        "MB: most that its process had had by then"
-    )
-    beside = result["live"]
+
+
+def _live_lines(beside: dict[str, Any]) -> Iterator[str]:
     yield f"live, {beside['objects']} objects, {beside['houses']} houses, every visit drawn at random:"
     for name, row in beside["groups"].items():
         yield (
@@ -95,10 +106,6 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
             f"95 % within {1000 * row['wall_p95']:.0f} ms (CPU {1000 * row['cpu_median']:.0f}, "
             f"{1000 * row['cpu_p95']:.0f} ms), gap {row['gap_mean']:.2f} %, at most {row['gap_max']:.1f} %; "
             f"{row['proven']} proven, after {row['proof_wall_median']:.2f} s, 95 % within {row['proof_wall_p95']:.2f} s"
-        )
-    for objects, first in result["first_call"].items():
-        yield (
-            f"first answer in a fresh process, {objects} objects: {first['wall']:.2f} s, CPU {first['cpu']:.2f} s"
         )
 
 

@@ -10,10 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 from study_people import SIZES, made_up_people, table_of
 
-from experiments.analysis.expenses import Expenses
 from experiments.analysis.measures import read_measures
 from experiments.analysis.statistics.power import people_per_cell
 from experiments.analysis.study_analysis import analyse
+from experiments.analysis.study_cost import StudyCost
 from experiments.analysis.study_power import Wanted, plan_power
 from experiments.cli import main
 from experiments.errors import ConfigError, RecordError, StatisticsError
@@ -201,7 +201,7 @@ def test_statsmodels_missing_is_one_line(monkeypatch, tmp_path, capsys):
 def test_power_of_a_difference_follows_from_the_variance():
     cells = [(name, 6) for name in ("none", "highlight", "optimal")]
     table = table_of(made_up_people(dict.fromkeys(cells, 100)))
-    plan = plan_power(cells, table, Wanted("ipl", difference=0.1), Expenses(fee=0.2, dropout=0.5))
+    plan = plan_power(cells, table, Wanted("ipl", difference=0.1), StudyCost(fee=0.2, dropout=0.5))
     variance = np.mean([v.var(ddof=1) for v in table.groups("ipl", 6).values()])
     ratio = 0.1**2 / (2 * 3 * variance)  # Cohen's f squared: one mean low, one high, one between
     assert plan.eta_squared == pytest.approx(ratio / (1 + ratio), rel=1e-12)
@@ -209,28 +209,28 @@ def test_power_of_a_difference_follows_from_the_variance():
     assert plan.interval[0] < plan.per_cell < plan.interval[1]
     assert plan.power == pytest.approx(0.8, abs=0.08)
     assert plan.people == 3 * plan.per_cell
-    assert plan.recruits == 2 * plan.people
+    assert plan.to_recruit == 2 * plan.people
     assert plan.cost == pytest.approx(plan.people * 7.5 * 1.2)
-    assert plan.hours == pytest.approx(plan.recruits * 25 / 60)
+    assert plan.hours == pytest.approx(plan.to_recruit * 25 / 60)
 
 
 def test_power_of_the_pools_own_effect():
     cells = list(SMALL)
     table = table_of(made_up_people(dict.fromkeys(cells, 60)))
-    plan = plan_power(cells, table, Wanted("distance", "assistance"), Expenses())
+    plan = plan_power(cells, table, Wanted("distance", "assistance"), StudyCost())
     assert plan.power > 0.7
-    assert plan == plan_power(cells, table, Wanted("distance", "assistance"), Expenses())
+    assert plan == plan_power(cells, table, Wanted("distance", "assistance"), StudyCost())
 
 
 def test_power_says_what_it_cannot_know():
     cells = [(name, 6) for name in ("none", "highlight", "optimal")]
     table = table_of(made_up_people(dict.fromkeys(cells, 20)))
     with pytest.raises(StatisticsError, match="0 people with highlight and 12 objects"):
-        plan_power([*cells, *((n, 12) for n, _ in cells)], table, Wanted("ipl"), Expenses())
+        plan_power([*cells, *((n, 12) for n, _ in cells)], table, Wanted("ipl"), StudyCost())
     with pytest.raises(ConfigError, match="one level only"):
-        plan_power(cells, table, Wanted("ipl", "objects"), Expenses())
+        plan_power(cells, table, Wanted("ipl", "objects"), StudyCost())
     with pytest.raises(ConfigError, match="no measure 'speed'"):
-        plan_power(cells, table, Wanted("speed"), Expenses())
+        plan_power(cells, table, Wanted("speed"), StudyCost())
     for wrong in ({"difference": -1.0}, {"eta_squared": 1.5}, {"power": 0.0}, {"effect": "gravity"}):
         with pytest.raises(ConfigError):
             Wanted("ipl", **wrong)

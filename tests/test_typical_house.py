@@ -5,16 +5,16 @@ import tomllib
 import numpy as np
 import pytest
 
-from experiments.examples.typical_house import OBJECTS, main, peculiarity, tour_lengths
+from experiments.examples.typical_house import OBJECTS, main, rms_z_scores, tour_lengths
 from experiments.studies import FOLDER
 
 
 def test_the_mean_house_is_the_most_typical_and_units_do_not_matter():
     lengths = np.random.default_rng(0).uniform(50.0, 150.0, (40, len(OBJECTS)))
     lengths[7] = np.delete(lengths, 7, axis=0).mean(axis=0)
-    assert peculiarity(lengths).argmin() == 7
-    assert peculiarity(lengths) == pytest.approx(peculiarity(lengths * [1.0, 2.0, 3.0, 0.1]))
-    assert peculiarity(lengths)[7] == pytest.approx(0.0, abs=1e-9)
+    assert rms_z_scores(lengths).argmin() == 7
+    assert rms_z_scores(lengths) == pytest.approx(rms_z_scores(lengths * [1.0, 2.0, 3.0, 0.1]))
+    assert rms_z_scores(lengths)[7] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_more_objects_make_longer_tours():

@@ -110,7 +110,7 @@ ODD: tuple[Callable[[np.random.Generator], str | bytes], ...] = (
     lambda rng: str(
         rng.choice(['{"type":"begin"}', '{"type":"takeover"}', '{"type":"resume"}', "{}", "", "null"])
     ),
-    lambda _: json.dumps({"type": "open", "folder": "/etc", "run": "/tmp/x"}),
+    lambda _: json.dumps({"type": "open", "folder": "/etc", "run": "/var/x"}),
 )
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f
 
-from experiments.analysis.expenses import Expenses
 from experiments.analysis.statistics.anova import (
     Design,
     Values,
@@ -21,6 +20,7 @@ from experiments.analysis.statistics.anova import (
 )
 from experiments.analysis.statistics.effects import ALPHA, Interval
 from experiments.analysis.statistics.power import POWER, people_per_cell
+from experiments.analysis.study_cost import StudyCost
 from experiments.analysis.study_table import StudyTable
 from experiments.errors import ConfigError, StatisticsError
 
@@ -85,7 +85,7 @@ class PowerPlan:
         power: Share of studies of that size, drawn from the pool, that find the effect.
         power_error: Standard error of that share.
         people: Who finish, in all cells.
-        recruits: Who must begin.
+        to_recruit: Who must begin.
         cost: In the currency of the pay.
         hours: Of all people together.
         cost_interval: Cost at both ends of `interval`, or None.
@@ -100,7 +100,7 @@ class PowerPlan:
     power: float
     power_error: float
     people: int
-    recruits: int
+    to_recruit: int
     cost: float
     hours: float
     cost_interval: Interval | None
@@ -108,7 +108,7 @@ class PowerPlan:
 
 
 def plan_power(
-    cells: Sequence[Cell], table: StudyTable, wanted: Wanted, expenses: Expenses, *, seed: int = 0
+    cells: Sequence[Cell], table: StudyTable, wanted: Wanted, cost: StudyCost, *, seed: int = 0
 ) -> PowerPlan:
     """How many people each cell of a study needs.
 
@@ -116,7 +116,7 @@ def plan_power(
         cells: Condition and number of objects of each.
         table: The pool: people in the same cells.
         wanted: What is to be found.
-        expenses: What people cost.
+        cost: What people cost.
         seed: Of what is drawn.
 
     Raises:
@@ -140,11 +140,11 @@ def plan_power(
         power,
         math.sqrt(power * (1 - power) / STUDIES),
         people,
-        expenses.recruits(people),
-        expenses.cost(people),
-        expenses.hours(people),
-        None if ends is None else (expenses.cost(ends[0]), expenses.cost(ends[1])),
-        None if ends is None else (expenses.hours(ends[0]), expenses.hours(ends[1])),
+        cost.to_recruit(people),
+        cost.total(people),
+        cost.hours(people),
+        None if ends is None else (cost.total(ends[0]), cost.total(ends[1])),
+        None if ends is None else (cost.hours(ends[0]), cost.hours(ends[1])),
     )
 
 

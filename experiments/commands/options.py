@@ -164,6 +164,14 @@ def add_trial_settings(parser: argparse.ArgumentParser) -> None:
         help="simulated seconds after which a trial ends (default: 60, plus 150 per object)",
     )
     add_points(parser)
+    _add_task_settings(parser)
+    for name, what in SEEDS.items():
+        option = f"--{name.replace('_', '-')}"
+        parser.add_argument(option, type=int, metavar="S", help=f"seed of {what} (default: the seed)")
+    add_person_options(parser)
+
+
+def _add_task_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--capacity",
         type=int,
@@ -185,10 +193,6 @@ def add_trial_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--story", type=Path, metavar="FILE", help="text to read in the phase story, instead of the usual one"
     )
-    for name, what in SEEDS.items():
-        option = f"--{name.replace('_', '-')}"
-        parser.add_argument(option, type=int, metavar="S", help=f"seed of {what} (default: the seed)")
-    add_person_options(parser)
 
 
 TRIAL_OPTIONS = (

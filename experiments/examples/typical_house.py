@@ -41,7 +41,7 @@ def tour_lengths(houses: int) -> NDArray[np.float64]:
     return lengths
 
 
-def peculiarity(lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+def rms_z_scores(lengths: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far from the mean house each one is, in standard deviations, (n,); lengths (n, 4) are those of `n` houses."""
     scores = (lengths - lengths.mean(axis=0)) / lengths.std(axis=0)
     return np.asarray(np.sqrt((scores**2).mean(axis=1)))
@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     if houses < 2:
         parser.error(f"--houses {houses}: at least 2 are needed for a mean and a standard deviation")
     lengths = tour_lengths(houses)
-    found = peculiarity(lengths)
+    found = rms_z_scores(lengths)
     table = Table(title=f"Shortest tours of {houses} houses, m")
     for heading in ("house seed", *(f"{n} objects" for n in OBJECTS), "from the mean, SD"):
         table.add_column(heading, justify="right")

@@ -58,8 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
         StatisticsError: The pool does not say it.
     """
     require_statsmodels()
-    from experiments.analysis.expenses import Expenses
     from experiments.analysis.measures import read_measures
+    from experiments.analysis.study_cost import StudyCost
     from experiments.analysis.study_power import Wanted, plan_power
     from experiments.analysis.study_table import read_study
     from experiments.errors import ConfigError
@@ -80,13 +80,13 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.power,
         arguments.alpha,
     )
-    expenses = Expenses(arguments.pay, arguments.fee, arguments.minutes, arguments.dropout)
+    cost = StudyCost(arguments.pay, arguments.fee, arguments.minutes, arguments.dropout)
     cells = [(trial.assistance, trial.objects) for trial in read_design(study_path(arguments.study)).trials]
     pool = read_study(arguments.pool, read_measures())
-    found = plan_power(cells, pool, wanted, expenses, seed=arguments.seed)
+    found = plan_power(cells, pool, wanted, cost, seed=arguments.seed)
     _show(found, wanted, pool.sources[wanted.measure])
     if arguments.out is not None:
-        write_json(arguments.out, {**asdict(wanted), **asdict(expenses), **asdict(found)})
+        write_json(arguments.out, {**asdict(wanted), **asdict(cost), **asdict(found)})
     return 0
 
 
@@ -96,7 +96,7 @@ def _show(plan: Any, wanted: Any, column: str) -> None:
     print(
         f"people      {plan.per_cell}{_range(plan.interval)} in each of {plan.cells} cells, {plan.people} in all"
     )
-    print(f"to recruit  {plan.recruits}")
+    print(f"to recruit  {plan.to_recruit}")
     print(f"cost        {plan.cost:.0f}{_range(plan.cost_interval)}")
     print(f"hours       {plan.hours:.0f}{_range(plan.hours_interval)}")
     error = f"{plan.power:.1%} +- {plan.power_error:.1%}"

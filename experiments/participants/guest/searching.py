@@ -27,7 +27,7 @@ class Place:
 
 
 class Frontier:
-    """Places that have not been searched. When all have been, all are searched again.
+    """Places that have not been searched. When all have been, all are searched again, more closely.
 
     Args:
         house: The house.

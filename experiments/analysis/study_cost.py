@@ -7,7 +7,7 @@ from experiments.errors import ConfigError
 
 
 @dataclass(frozen=True)
-class Expenses:
+class StudyCost:
     """What people cost.
 
     Attributes:
@@ -30,14 +30,14 @@ class Expenses:
                     f"{name} is {value:g}; it must be 0 or more{', below 1' * (name == 'dropout')}"
                 )
 
-    def cost(self, people: int) -> float:
+    def total(self, people: int) -> float:
         """Of so many people who finish."""
         return people * self.pay * (1 + self.fee)
 
     def hours(self, people: int) -> float:
         """Of so many people who finish and of those who do not."""
-        return self.recruits(people) * self.minutes / 60
+        return self.to_recruit(people) * self.minutes / 60
 
-    def recruits(self, people: int) -> int:
+    def to_recruit(self, people: int) -> int:
         """How many people must begin."""
         return math.ceil(people / (1 - self.dropout) - 1e-9)
