@@ -263,13 +263,14 @@ def off_screen() -> Iterator[None]:
     """Let `mujoco.Renderer` make EGL contexts, whatever MUJOCO_GL was when MuJoCo was imported."""
     from mujoco import egl  # only now, when the driver is known to work
 
-    backend = sys.modules[mujoco.Renderer.__module__].gl_context
-    kept = backend.GLContext
-    backend.GLContext = egl.GLContext
+    backend = vars(sys.modules[mujoco.Renderer.__module__].gl_context)
+    kept = dict(backend)  # without `GLContext` where MuJoCo was imported to draw nothing
+    backend["GLContext"] = egl.GLContext
     try:
         yield
     finally:
-        backend.GLContext = kept
+        backend.clear()
+        backend.update(kept)
 
 
 def timed(clock: Callable[[], float], work: Callable[[], Any]) -> float:

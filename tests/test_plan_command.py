@@ -126,7 +126,7 @@ def test_a_limit_too_short_for_any_planner_still_gives_a_tour(tmp_path, capsys):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_planning_with_the_best_tour_so_far(tmp_path, number):
     path = tmp_path / "problem.json"
-    path.write_text(json.dumps(scattered(40)))
+    path.write_text(json.dumps(scattered(80)))
     command = [sys.executable, "-m", "experiments.cli", "plan", str(path), "--time-limit", "100"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")

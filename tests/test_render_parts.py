@@ -13,6 +13,7 @@ import pytest
 
 from mjsim.render import FAST, CameraPose, Renderer, RenderProfile
 from mjsim.render.cameras import View
+from mjsim.render.culling import Bounds, outside
 from mjsim.render.occlusion import BoxOccluders
 from mjsim.render.rasteriser import Rasteriser, reduced
 
@@ -25,32 +26,36 @@ WALL = """<mujoco>
     <geom name="at_the_edge" pos="4 {edge} 0" size=".2"/>
     <geom name="before" pos="1.5 0 0" size=".2"/>
     <geom name="inside" type="box" pos="2 .2 0" size=".04 .1 .1"/>
+    <geom name="ground" type="plane" pos="4 0 -.2" size="0 0 1"/>
+    <geom name="rug_behind" type="plane" pos="4 0 -.2" size=".3 .2 1"/>
+    <geom name="strip" type="plane" pos="2.5 {strip} -.2" size="1.5 .05 1"/>
     <geom name="long" type="box" pos="4 0 0" euler="0 0 90" size="2.5 .05 .05"/>
   </worldbody></mujoco>"""
 AHEAD = np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]])
 
 
-def hidden(view: View | None = None, *, wall: str = "", edge: float = 3.0) -> set[str]:
-    model = mujoco.MjModel.from_xml_string(WALL.format(wall=wall, edge=edge))
+def hidden(view: View | None = None, *, wall: str = "", edge: float = 2.5, strip: float = 1.5) -> set[str]:
+    model = mujoco.MjModel.from_xml_string(WALL.format(wall=wall, edge=edge, strip=strip))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     everything = np.ones(model.ngeom, bool)
     view = view or View(np.zeros(3), AHEAD, 0.7)
     rotations = data.geom_xmat.reshape(-1, 3, 3)
-    mask = BoxOccluders(model, model.geom_group < 3).hidden(view, 1.3, data.geom_xpos, rotations, everything)
+    occluders = BoxOccluders(model, Bounds.of(model), model.geom_group < 3)
+    mask = occluders.unseen(view, 1.3, data.geom_xpos, rotations, everything)
     return {model.geom(i).name for i in np.flatnonzero(mask)}
 
 
 def test_a_wall_hides_what_stands_wholly_behind_it():
-    assert hidden() == {"behind"}
+    assert hidden() == {"behind", "rug_behind"}
 
 
-def test_the_edge_of_a_wall_by_hand():
-    """The wall's middle reaches y = 1 at x = 2, so its shadow ends at y = x / 2."""
-    fits = 2.0 - 0.2 - 0.01 * math.hypot(1, 0.5)  # a box around the sphere, and the margin
-    fits -= 0.1  # the box's near corner lies at x = 3.8
-    assert "at_the_edge" in hidden(edge=fits - 0.005)
-    assert "at_the_edge" not in hidden(edge=fits + 0.005)
+def test_what_lies_beside_the_view_is_left_out_though_the_sphere_around_it_reaches_into_it():
+    """At x = 4 the view ends at y = 3.64; the strip's far end lies there."""
+    assert "strip" not in hidden(strip=3.6)
+    assert "strip" in hidden(strip=4.2)
+    sphere = outside(View(np.zeros(3), AHEAD, 0.7), 1.3, np.array([[2.5, 4.2, 0]]), np.array([1.5]))
+    assert not sphere.any()
 
 
 @pytest.mark.parametrize("wall", ['rgba="1 1 1 .99"', 'material="glass"', 'group="3"'])
@@ -59,8 +64,8 @@ def test_what_is_seen_through_hides_nothing(wall):
 
 
 def test_a_wall_at_the_eye_or_in_a_parallel_view_hides_nothing():
-    assert hidden(View(np.array([1.9, 0, 0]), AHEAD, 0.7)) == set()
-    assert hidden(View(np.array([2.0, 0, 0]), AHEAD, 0.7)) == set()
+    for x in (1.9, 2.0):
+        assert not hidden(View(np.array([x, 0, 0]), AHEAD, 0.7), edge=1.0) & {"behind", "at_the_edge"}
     assert hidden(View(np.zeros(3), AHEAD, 0.7, orthographic=True)) == set()
 
 

@@ -6,7 +6,7 @@ pixels do. Leaving those out does not change a frame as long as nothing casts sh
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,6 +20,29 @@ _MARGIN = 0.01
 _NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)
 # Comparing with the enumeration itself takes ten times as long.
 _GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
+
+
+class Bounds(NamedTuple):
+    """What the geoms of a model fill, each in its own frame.
+
+    Attributes:
+        radii: Of spheres around their origins, m, shape (ngeom,); 0 means unbounded.
+        boxes: Centres and half-sizes of boxes, m, shape (ngeom, 6).
+    """
+
+    radii: NDArray[np.float64]
+    boxes: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, model: Any) -> "Bounds":
+        """Those of a model. The engine takes all planes for infinite, but draws those with a size as rectangles."""
+        radii, boxes = model.geom_rbound.copy(), model.geom_aabb.copy()
+        plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+        finite = plane & (model.geom_size[:, :2] > 0.0).all(axis=1)
+        half = model.geom_size[finite, :2]
+        radii[finite] = np.hypot(*half.T)
+        boxes[finite] = np.pad(half, ((0, 0), (3, 1)))
+        return cls(radii, boxes)
 
 
 def outside(

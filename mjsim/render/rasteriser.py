@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mjsim.errors import RenderError
 from mjsim.render import context
 from mjsim.render.cameras import View
-from mjsim.render.culling import outside, without
+from mjsim.render.culling import Bounds, outside, without
 from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, blend_hidden, in_view
 from mjsim.render.occlusion import BoxOccluders
 from mjsim.render.profiles import RenderProfile
@@ -76,7 +76,8 @@ class Rasteriser:
         self._drawn = checked_size(round(width * scale)), checked_size(round(height * scale))
         self._option = visual_option(groups, profile)
         shown = np.isin(model.geom_group, list(groups))
-        self._occluders = BoxOccluders(model, shown)
+        self._bounds = Bounds.of(model)
+        self._occluders = BoxOccluders(model, self._bounds, shown)
         self._shadows = ContactShadows(model, shown) if profile.contact_shadows else None
         spots = self._shadows.count if self._shadows else 0
         self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + MAX_MARKERS + spots)
@@ -226,8 +227,8 @@ class Rasteriser:
         if profile is not None and (profile.shadow_size or profile.reflections):
             return np.zeros(self._model.ngeom, dtype=bool)
         aspect = self._aspect
-        unseen = outside(view, aspect, self._positions, self._model.geom_rbound)
-        return unseen | self._occluders.hidden(view, aspect, self._positions, self._rotations, ~unseen)
+        unseen = outside(view, aspect, self._positions, self._bounds.radii)
+        return unseen | self._occluders.unseen(view, aspect, self._positions, self._rotations, ~unseen)
 
     def _draw(
         self,
