@@ -119,11 +119,9 @@ class Geodesics:
         array = np.array(points, dtype=np.float64).reshape(-1, 2)
         islands = np.zeros(len(array), dtype=np.int64)
         for k, point in enumerate(array):
-            island = self.navmesh.island_of(point)
-            if island is None:
-                array[k] = self.navmesh.snap(point, self.max_snap)
-            else:
-                islands[k] = island
+            islands[k] = self.navmesh.island_of(point) or 0
+            # Also where a point is navigable only by tolerance: no vertex is tangent to a line from inside an obstacle.
+            array[k] = self.navmesh.snap(point, self.max_snap, int(islands[k]))
         return array, islands
 
     def _query(self, points: NDArray[np.float64], islands: NDArray[np.int64]) -> _Query:

@@ -131,14 +131,15 @@ class NavMesh:
             island: Index into `islands`.
 
         Returns:
-            The point itself if it is on the island, else the nearest one that is, (2,), m.
+            The point itself if it is on the island, else the nearest one that is, (2,), m. Here, the tolerance of
+            what is navigable is not added.
 
         Raises:
             NotNavigableError: The island is farther away than `max_distance`.
         """
         x, y = _point(point)
         cell = self._cell(x, y)
-        if cell == island or (cell == MIXED and shapely.intersects_xy(self._outer[island], x, y)):
+        if cell == island or (cell == MIXED and shapely.intersects_xy(self.islands[island], x, y)):
             return np.array([x, y])
         line = shapely.shortest_line(self._inner[island], shapely.Point(x, y))
         nearest = np.asarray(line.coords[0], dtype=np.float64)

@@ -210,3 +210,22 @@ def test_a_start_on_a_corner_of_an_obstacle_is_no_special_case():
     corner = np.asarray(mesh.islands[0].interiors[0].coords[0])
     near = geodesics.shortest_path(corner + 1e-7, (3.9, 3.9)).geodesic_distance
     assert geodesics.shortest_path(corner, (3.9, 3.9)).geodesic_distance == pytest.approx(near, abs=1e-6)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds)
+def test_a_point_that_is_navigable_by_tolerance_only_is_as_far_as_the_one_beside_it(seed):
+    mesh = NavMesh.build(random_field(seed), BOUNDS, agent_radius=0.1)
+    island, rng = mesh.islands[0], np.random.default_rng(seed)
+    edge = np.array([island.boundary.interpolate(s, normalized=True).coords[0] for s in rng.random(20)])
+    beyond = edge + 3e-5 * np.column_stack([np.cos(angle := rng.uniform(0, math.tau, 20)), np.sin(angle)])
+    kept = [
+        k
+        for k in range(20)
+        if mesh.island_of(beyond[k]) == 0 and not shapely.intersects_xy(island, *beyond[k])
+    ]
+    assume(kept)
+    geodesics, targets = Geodesics(mesh), sampled(mesh, seed, 5)
+    found = geodesics.distances_between(beyond[kept], targets)
+    np.testing.assert_allclose(found, geodesics.distances_between(edge[kept], targets), atol=1e-3)
+    assert all(geodesics.shortest_path(beyond[k], targets[0]).geodesic_distance < 20 for k in kept)
