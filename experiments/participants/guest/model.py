@@ -213,11 +213,10 @@ class Guest:
         self._thinks_until = percept.time + self._behaviour.timing.choice_time(poles=poles)
 
     def _follow(self, percept: Percept, shown: Guidance) -> None:
-        self._stops = self._wandering.stops(percept.position, shown.goal, path=True)
         after = self._adherence.gives_up_after(path_length(shown.path) / percept.person.walking_speed)
         until = math.inf if after is None else percept.time + after
         off = project(shown.path, percept.position[0], percept.position[1])[1] > shown.tolerance
-        self._intention = Intention(shown.visit, True, off or bool(self._stops), until)
+        self._intention = Intention(shown.visit, True, off, until)
         self._passed = set()
 
     def _options(self, percept: Percept, shown: Guidance | None) -> Known:

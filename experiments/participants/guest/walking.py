@@ -17,15 +17,14 @@ class Walking:
     """Where a walk goes astray. The shapes of the distributions are starting values.
 
     Attributes:
-        lapses: Probability, at each walk to something, of going elsewhere first without noticing.
-        on_path: Share of these lapses that there are where a path is shown.
+        lapses: Probability, at each walk to something, of going elsewhere first without noticing; not on a path that
+            is shown.
         astray: How long a walk that is at most, m.
         pull: Probability, at each walk to a flagpole in another room, of first walking to where this room is nearest
             to it; also how much straight lines count in estimating how far away flagpoles are.
     """
 
     lapses: float = chance({"beta": [0.5, 3.0]})
-    on_path: float = chance(0.2)
     astray: float = varies(5.0, 0.0, 50.0, "m")
     pull: float = chance({"beta": [2.0, 3.0]})
 
@@ -42,18 +41,17 @@ class Wandering:
     def __init__(self, walking: Walking, house: House, rng: np.random.Generator) -> None:
         self._walking, self._house, self._rng = walking, house, rng
 
-    def stops(self, start: Point, goal: Point, *, pole: bool = False, path: bool = False) -> list[Point]:
+    def stops(self, start: Point, goal: Point, *, pole: bool) -> list[Point]:
         """Places to pass on the way, m, shape (2,) each; usually none.
 
         Args:
             start: Where the person is, m, shape (2,).
             goal: Where it wants to go, m, shape (2,).
             pole: Whether a flagpole stands there that shows through walls.
-            path: Whether a path to it is shown.
         """
         lapse, pulled = self._rng.random(2).tolist()
         start, stops = self._house.navmesh.snap(start), []
-        if lapse < self._walking.lapses * (self._walking.on_path if path else 1.0):
+        if lapse < self._walking.lapses:
             stops += self._elsewhere(start)
         if pole and pulled < self._walking.pull:
             stops += self._towards(start, goal)
