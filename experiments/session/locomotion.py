@@ -177,7 +177,9 @@ class LocomotionController:
         x, y = now.position.tolist()
         if project(walk.path, x, y)[1] > walk.tolerance:
             return False
-        return np.array_equal(_loose_positions(now), _loose_positions(asked))
+        moved = (now.object_positions != asked.object_positions).any(axis=1).nonzero()[0].tolist()
+        status = now.object_status
+        return status == asked.object_status and all(status[k] is not ObjectStatus.LOOSE for k in moved)
 
     def moves(
         self, decision: Decision, seen: Observation, state: LocomotionState | None, limit: int
@@ -245,11 +247,6 @@ class LocomotionController:
             flags = [status is ObjectStatus.LOOSE and name != target for name, status in pairs]
             self._is_obstacle = np.array(flags, np.bool_)
         return Obstacles(np.ascontiguousarray(seen.object_positions), self._is_obstacle, self._walls)
-
-
-def _loose_positions(seen: Observation) -> Floats:
-    """Where the loose objects are, m, shape (loose objects, 3)."""
-    return seen.object_positions[[status is ObjectStatus.LOOSE for status in seen.object_status]]
 
 
 def _values(walk: WalkAlong) -> tuple[Floats, tuple[float, float], float, bool, bool, float]:
