@@ -7,7 +7,7 @@ from collections.abc import Callable
 SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # px
 FIRST_SIZE = 2
 FRAMES = 20  # between two changes of the size
-SLOW, QUICK = 0.042, 0.028  # s a frame may take before the size goes down, and may take to go up
+SLOW, QUICK = 0.033, 0.022  # s a frame may take before the size goes down, and may take to go up
 HELD_UP = 0.06  # s a frame may wait for the link before the size goes down
 SHARE = 0.65  # of the time that may be spent on drawing; the rest is left to other sessions
 RETRY = 30.0  # s after which a size that was too large is tried again
