@@ -1,4 +1,7 @@
-"""The same simulated people in `event` and in `full`: does every test of the study decide the same?"""
+"""The same simulated people in `event` and in `full`: does every test of the study decide the same?
+
+Orders of means are shown beside the tests. Two draws of the same people may differ in an order of means that are close.
+"""
 
 import dataclasses
 import os
@@ -24,6 +27,7 @@ PEOPLE = 40  # of each cell
 QUICK_PEOPLE = 2
 QUICK_OBJECTS = (6,)
 TIERS = ("full", "event")
+INFERENCE, ORDER = "inferences", "orders of means"
 
 
 def measure(
@@ -42,8 +46,8 @@ def measure(
     tables = {tier: _simulated(chosen, tier, workers or os.cpu_count() or 1) for tier in TIERS}
     published = read_published()
     rows = [
-        {"what": what, **{tier: found[tier] for tier in TIERS}}
-        for what, found in _decisions(tables, published).items()
+        {"what": what, "kind": kind, **{tier: found[tier] for tier in TIERS}}
+        for (kind, what), found in _decisions(tables, published).items()
     ]
     return {"people": len(chosen), "objects": list(levels), "decisions": rows, "same_person": _gaps(tables)}
 
@@ -67,9 +71,9 @@ def _simulated(trials: Sequence[TrialConfig], tier: str, workers: int) -> StudyT
         return published_cells(read_study(Path(folder) / tier, read_measures()), read_published())
 
 
-def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[str, dict[str, str]]:
-    """What each tier decides, by what is decided; what cannot be computed with so few people is left out."""
-    found: dict[str, dict[str, str]] = {}
+def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[tuple[str, str], dict[str, str]]:
+    """What each tier decides, by kind and words; what cannot be computed with so few people is left out."""
+    found: dict[tuple[str, str], dict[str, str]] = {}
     for tier, table in tables.items():
         for test in published.tests:
             where = f"{test.objects} objects" if test.objects else "all objects"
@@ -78,13 +82,14 @@ def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[str,
             except StatisticsError:
                 continue
             words = f"{'p < .05' if one.significant else 'n.s.'} (F = {one.statistic:.2f})"
-            found.setdefault(f"{test.measure}: {test.effect}, {where}", {})[tier] = words
+            found.setdefault((INFERENCE, f"{test.measure}: {test.effect}, {where}"), {})[tier] = words
         for direction in published.directions:
             try:
                 holds = points(table, direction)
             except StatisticsError:
                 continue
-            found.setdefault(f"{direction.measure}: {direction.label()}", {})[tier] = "yes" if holds else "no"
+            what = ORDER, f"{direction.measure}: {direction.label()}"
+            found.setdefault(what, {})[tier] = "yes" if holds else "no"
     return {what: tiers for what, tiers in found.items() if len(tiers) == len(TIERS)}
 
 
@@ -123,5 +128,8 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
         yield (
             f"{name}: event - full is {gap['mean']:+.3f} standard deviations on average, {gap['largest']:.3f} at most"
         )
-    agree, of = sum(map(same, result["decisions"])), len(result["decisions"])
-    yield f"decisions that agree: {agree} of {of} ({'pass' if agree == of else 'FAIL'})"
+    for kind in (INFERENCE, ORDER):
+        rows = [row for row in result["decisions"] if row["kind"] == kind]
+        agree = sum(map(same, rows))
+        verdict = "" if kind == ORDER else f" ({'pass' if agree == len(rows) else 'FAIL'})"
+        yield f"{kind} that agree: {agree} of {len(rows)}{verdict}"
