@@ -1,6 +1,7 @@
 """Commands as a user gives them, and a user's own code."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,16 @@ from experiments.house import House
 
 FAST = ("--objects", "2", "--fidelity", "event", "--no-regret")
 ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(autouse=True)
+def signals_as_in_a_terminal():
+    """Under `nohup`, and in the background of a shell, tests would inherit that signals are ignored."""
+    defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in defaults.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session")
