@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
+from unittest import mock
 
 import mujoco
 import numpy as np
@@ -263,14 +264,10 @@ def off_screen() -> Iterator[None]:
     """Let `mujoco.Renderer` make EGL contexts, whatever MUJOCO_GL was when MuJoCo was imported."""
     from mujoco import egl  # only now, when the driver is known to work
 
-    backend = vars(sys.modules[mujoco.Renderer.__module__].gl_context)
-    kept = dict(backend)  # without `GLContext` where MuJoCo was imported to draw nothing
-    backend["GLContext"] = egl.GLContext
-    try:
+    backend = sys.modules[mujoco.Renderer.__module__].gl_context
+    # There is none yet where MuJoCo was imported to draw nothing.
+    with mock.patch.object(backend, "GLContext", egl.GLContext, create=True):
         yield
-    finally:
-        backend.clear()
-        backend.update(kept)
 
 
 def timed(clock: Callable[[], float], work: Callable[[], Any]) -> float:
