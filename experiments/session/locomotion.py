@@ -137,7 +137,7 @@ class LocomotionController:
         self._predicted = self._progress[None]
         self._back_off_until = -math.inf
         self._status: tuple[ObjectStatus, ...] | None = None
-        self._is_obstacle = np.zeros(0, np.bool_)
+        self._is_loose = self._is_obstacle = np.zeros(0, np.bool_)
         self.blocked = False
 
     def step(self, walk: WalkAlong, seen: Observation) -> Action:
@@ -174,12 +174,14 @@ class LocomotionController:
         """Whether one who walks along a shown path has nothing to answer to but what there was in the state `asked`."""
         if self.blocked or now.busy or (walk.until is not None and now.time >= walk.until - TIME_TOLERANCE):
             return False
-        x, y = now.position.tolist()
-        if project(walk.path, x, y)[1] > walk.tolerance:
-            return False
-        moved = (now.object_positions != asked.object_positions).any(axis=1).nonzero()[0].tolist()
-        status = now.object_status
-        return status == asked.object_status and all(status[k] is not ObjectStatus.LOOSE for k in moved)
+        return now.object_status == asked.object_status and _is_as_before(
+            walk.path,
+            walk.tolerance,
+            now.position,
+            now.object_positions,
+            asked.object_positions,
+            self._flags(now)[0],
+        )
 
     def moves(
         self, decision: Decision, seen: Observation, state: LocomotionState | None, limit: int
@@ -240,13 +242,17 @@ class LocomotionController:
 
     def _obstacles(self, seen: Observation) -> Obstacles:
         """What lies on the floor, but for the object that the present or last visit is about."""
+        return Obstacles(np.ascontiguousarray(seen.object_positions), self._flags(seen)[1], self._walls)
+
+    def _flags(self, seen: Observation) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which objects are loose, and which of these are obstacles, shape (n,)."""
         if seen.object_status != self._status:
             self._status = seen.object_status
             target = None if self._visit is None else self._visit.object
-            pairs = zip(seen.object_names, seen.object_status, strict=True)
-            flags = [status is ObjectStatus.LOOSE and name != target for name, status in pairs]
-            self._is_obstacle = np.array(flags, np.bool_)
-        return Obstacles(np.ascontiguousarray(seen.object_positions), self._is_obstacle, self._walls)
+            self._is_loose = np.array([s is ObjectStatus.LOOSE for s in seen.object_status], np.bool_)
+            others = np.array([name != target for name in seen.object_names], np.bool_)
+            self._is_obstacle = self._is_loose & others
+        return self._is_loose, self._is_obstacle
 
 
 def _values(walk: WalkAlong) -> tuple[Floats, tuple[float, float], float, bool, bool, float]:
@@ -273,3 +279,19 @@ def _next_step(
         progress,
     )
     return step.phase, step.forward, step.left, step.turn
+
+
+@kernel
+def _is_as_before(
+    path: Floats, tolerance: float, position: Floats, objects: Floats, before: Floats, loose: NDArray[np.bool_]
+) -> bool:  # fmt: skip
+    """Whether somebody at `position` (2,) is on the path, within `tolerance`, and no loose object (n,) has moved.
+
+    `objects` and `before` (n, 3) are where the objects are and where they were; all in m.
+    """
+    for k in range(len(loose)):
+        if loose[k]:
+            for axis in range(3):
+                if objects[k, axis] != before[k, axis]:
+                    return False
+    return bool(project(path, position[0], position[1])[1] <= tolerance)
