@@ -115,6 +115,14 @@ def test_the_documented_designs_are_designs():
     assert len(read_design(study_path("paper")).trials) == 447
 
 
+def test_a_folder_does_not_hide_a_study_of_the_package_and_a_file_does(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "paper").mkdir()  # as after `mjsim study simulate paper --out paper`
+    (tmp_path / "pool").write_text("")
+    assert study_path("paper").name == "paper.toml"
+    assert study_path("pool") == Path("pool")
+
+
 def test_an_own_episode_and_house_are_found_beside_the_design(tmp_path, house):
     house.sample_episode(objects=2, seed=5).save(tmp_path / "mine.json")
     cell = "[[cells]]\nassistance = 'none'\npeople = 2\nepisode = 'mine.json'\n"

@@ -21,9 +21,9 @@ CONTROLS = FOLDER / "controls.toml"
 
 
 def study_path(name: str) -> Path:
-    """The file of a study: a path, or the name of one that comes with the package (`paper`)."""
+    """The file of a study: a path, or the name of one that comes with the package (`paper`); folders do not count."""
     packaged = FOLDER / f"{name}.toml"
-    return packaged if packaged.is_file() and not Path(name).exists() else Path(name)
+    return packaged if packaged.is_file() and not Path(name).is_file() else Path(name)
 
 
 def read_study(path: Path, people: int | None = None) -> Design:
