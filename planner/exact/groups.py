@@ -24,13 +24,13 @@ def numbered(labels: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def with_one_alone(
-    group: NDArray[np.int64], miscount: NDArray[np.float64], max_rows: int
+    group: NDArray[np.int64], violation: NDArray[np.float64], max_rows: int
 ) -> NDArray[np.int64] | None:
     """Give one object a group of its own.
 
     Args:
         group: Group of each object, numbered from 0, (n,).
-        miscount: The object with the largest one is taken, (n,).
+        violation: The object with the largest one is taken, (n,).
         max_rows: Of the table afterwards.
 
     Returns:
@@ -40,5 +40,5 @@ def with_one_alone(
     if size.max(initial=1) == 1:
         return None
     new = group.copy()
-    new[np.argmax(np.where(size > 1, miscount, -1.0))] = group.max() + 1
+    new[np.argmax(np.where(size > 1, violation, -1.0))] = group.max() + 1
     return new if rows_of(new) <= max_rows else None

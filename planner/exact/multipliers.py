@@ -15,7 +15,7 @@ from planner.exact.relaxed_tour import walk
 from planner.exact.table import Table, new_table, rows_of
 from planner.exact.warm_start import Start
 
-DECAY = 0.97  # of the record of miscounts, from one step to the next
+DECAY = 0.97  # of the record of violations, from one step to the next
 MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
@@ -31,7 +31,7 @@ class Ascent(NamedTuple):
     Attributes:
         current: Multipliers, (n,).
         direction: Their last change, (n,).
-        miscount: As in `Bound`, (n,).
+        violation: As in `Bound`, (n,).
         best: The multipliers with the best bound, (n,) int64.
         sizes: Length of each step, as a share of what would close the gap, (steps,).
         progress: Steps taken, rows filled for the next one, and the best bound, units; (3,) int64.
@@ -39,7 +39,7 @@ class Ascent(NamedTuple):
 
     current: NDArray[np.float64]
     direction: NDArray[np.float64]
-    miscount: NDArray[np.float64]
+    violation: NDArray[np.float64]
     best: NDArray[np.int64]
     sizes: NDArray[np.float64]
     progress: NDArray[np.int64]
@@ -53,13 +53,13 @@ class Bound:
         instance: The instance.
         table: Relaxed cost-to-go.
         root: Bound at the root, units.
-        miscount: How far relaxed tours were from picking each object once, recent ones most, (n,).
+        violation: How far relaxed tours were from picking each object once, recent ones most, (n,).
     """
 
     instance: Instance
     table: Table
     root: int
-    miscount: NDArray[np.float64]
+    violation: NDArray[np.float64]
 
     @property
     def prices(self) -> int:
@@ -101,7 +101,7 @@ def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
 def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
     """Split the groups and fit again, until the gap closes, the table has reached its size, or time is over.
 
-    Each time the object with the largest miscount gets a group of its own.
+    Each time the object with the largest violation gets a group of its own.
 
     Args:
         bound: The bound so far.
@@ -109,11 +109,11 @@ def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
         max_rows: Of the table.
         deadline: Stop growing when it is over.
     """
-    warm = not bound.miscount.any()  # a warm start: first see how good its multipliers are here
+    warm = not bound.violation.any()  # a warm start: first see how good its multipliers are here
     while bound.root < upper - bound.instance.tie:
         group: NDArray[np.int64] | None = bound.table.group
         if not warm:
-            group = with_one_alone(bound.table.group, bound.miscount, max_rows)
+            group = with_one_alone(bound.table.group, bound.violation, max_rows)
         elif rows_of(bound.table.group) > max_rows:
             break
         warm = False
@@ -189,7 +189,7 @@ def fit(
     while not climb(instance, table, ascent, upper, SLICE):
         if deadline.over():
             return None
-    return Bound(instance, table, int(ascent.progress[BEST]), ascent.miscount)
+    return Bound(instance, table, int(ascent.progress[BEST]), ascent.violation)
 
 
 @kernel
@@ -240,7 +240,7 @@ def _stepped(inst: Instance, table: Table, ascent: Ascent, upper: int, actions: 
     if not ended:
         gap = 1.002 * upper - value
         ended = not step(
-            actions[:count], gap, ascent.sizes[k], ascent.current, ascent.direction, ascent.miscount
+            actions[:count], gap, ascent.sizes[k], ascent.current, ascent.direction, ascent.violation
         )
     if ended:
         progress[STEP] = ascent.sizes.size
@@ -257,7 +257,7 @@ def step(
     step_size: float,
     current: NDArray[np.float64],
     direction: NDArray[np.float64],
-    miscount: NDArray[np.float64],
+    violation: NDArray[np.float64],
 ) -> bool:
     """Raise the price of objects that a relaxed tour picks too often; False if it picks each once.
 
@@ -267,7 +267,7 @@ def step(
         step_size: Share of the gap.
         current: Prices, changed in place, units, (n,).
         direction: Last change of the prices, changed in place, (n,).
-        miscount: As in `Bound`, changed in place, (n,).
+        violation: As in `Bound`, changed in place, (n,).
     """
     n = current.size
     surplus = np.full(n, -1.0)
@@ -277,7 +277,7 @@ def step(
     norm = 0.0
     for j in range(n):  # loops rather than slices: they compile much faster
         norm += surplus[j] * surplus[j]
-        miscount[j] = DECAY * miscount[j] + abs(surplus[j])
+        violation[j] = DECAY * violation[j] + abs(surplus[j])
     if norm == 0.0:
         return False
     for j in range(n):

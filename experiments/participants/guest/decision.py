@@ -94,7 +94,9 @@ def _imagined(
     return cost
 
 
-def judged(legs: NDArray[np.float64], decision: Decision, rng: np.random.Generator) -> NDArray[np.float64]:
+def judged_distances(
+    legs: NDArray[np.float64], decision: Decision, rng: np.random.Generator
+) -> NDArray[np.float64]:
     """Distances as a person judges them, m; any shape."""
     return np.asarray(legs * np.exp(decision.distance_error * rng.standard_normal(legs.shape)))
 

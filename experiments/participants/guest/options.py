@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.participants.base import Percept, Point
 from experiments.participants.distances import estimated_distances
-from experiments.participants.guest.decision import Decision, Task, choose, first_step_costs, judged
+from experiments.participants.guest.decision import Decision, Task, choose, first_step_costs, judged_distances
 from experiments.participants.guest.searching import Frontier, Place
 from mjsim.episode import CAPACITY
 from planner.errors import PlannerError
@@ -61,9 +61,11 @@ class Chooser:
         points = [place.point for place in places]
         walks = np.array(estimated_distances(self._house, percept.position, points))
         rooms = [place.room for place in places]
-        counted = walks + self._decision.room_cost * self._elsewhere(percept.position, rooms)
+        counted = walks + self._decision.room_cost * self._in_another_room(percept.position, rooms)
         best = choose(
-            judged(counted, self._decision, self._rng).tolist(), self._decision.temperature, self._rng
+            judged_distances(counted, self._decision, self._rng).tolist(),
+            self._decision.temperature,
+            self._rng,
         )
         options = [*costs, float(counted[best]) + self._decision.search_cost]
         chosen = choose(options, self._decision.temperature, self._rng)
@@ -94,7 +96,7 @@ class Chooser:
         legs[:, to_poles] = (1 - pull) * legs[:, to_poles] + pull * straight[:, to_poles]
         rooms = np.array([self._house.rooms.room_at(point) for point in points])
         crossing = rooms[:, None] != rooms[None]
-        counted = judged(legs, self._decision, self._rng) + self._decision.room_cost * crossing
+        counted = judged_distances(legs, self._decision, self._rng) + self._decision.room_cost * crossing
         return np.asarray(counted)
 
     def _all_legs(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -103,6 +105,6 @@ class Chooser:
         except PlannerError:  # one of them cannot be reached
             return np.array([estimated_distances(self._house, point, list(points)) for point in points])
 
-    def _elsewhere(self, position: Point, rooms: Sequence[str]) -> NDArray[np.bool_]:
+    def _in_another_room(self, position: Point, rooms: Sequence[str]) -> NDArray[np.bool_]:
         here = self._house.rooms.room_at(position)
         return np.array([room != here for room in rooms])

@@ -52,12 +52,12 @@ class Wandering:
         lapse, pulled = self._rng.random(2).tolist()
         start, stops = self._house.navmesh.snap(start), []
         if lapse < self._walking.lapses:
-            stops += self._elsewhere(start)
+            stops += self._lapse(start)
         if pole and pulled < self._walking.pull:
             stops += self._towards(start, goal)
         return stops
 
-    def _elsewhere(self, start: Point) -> list[Point]:
+    def _lapse(self, start: Point) -> list[Point]:
         """Any place of the house that is not too far, shape (2,); none where there is none."""
         places = np.concatenate(list(self._house.viewpoints.values()))
         walks = np.array(estimated_distances(self._house, start, list(places)))
