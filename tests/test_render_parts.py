@@ -50,6 +50,14 @@ def test_a_wall_hides_what_stands_wholly_behind_it():
     assert hidden() == {"behind", "rug_behind"}
 
 
+def test_the_edge_of_a_wall_by_hand():
+    """The wall's middle reaches y = 1 at x = 2, so its shadow ends at y = x / 2."""
+    fits = 2.0 - 0.2 - 0.01 * math.hypot(1, 0.5)  # a box around the sphere, and the margin
+    fits -= 0.1  # the box's near corner lies at x = 3.8
+    assert "at_the_edge" in hidden(edge=fits - 0.005)
+    assert "at_the_edge" not in hidden(edge=fits + 0.005)
+
+
 def test_what_lies_beside_the_view_is_left_out_though_the_sphere_around_it_reaches_into_it():
     """At x = 4 the view ends at y = 3.64; the strip's far end lies there."""
     assert "strip" not in hidden(strip=3.6)
