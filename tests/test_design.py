@@ -121,6 +121,8 @@ def test_a_folder_does_not_hide_a_study_of_the_package_and_a_file_does(tmp_path,
     (tmp_path / "pool").write_text("")
     assert study_path("paper").name == "paper.toml"
     assert study_path("pool") == Path("pool")
+    with pytest.raises(ConfigError, match="no study 'papers'; `paper` is the published one"):
+        study_path("papers")
 
 
 def test_an_own_episode_and_house_are_found_beside_the_design(tmp_path, house):

@@ -131,6 +131,16 @@ def test_missing_cells_and_measures_say_so():
     assert found[DIRECTION, "deviations", "optimal < none", 6].agrees is None
 
 
+def test_part_of_the_design_judges_nothing_about_all_of_it():
+    """Deviations of these people rise from 6 to 12 objects; nothing is known of 18 and 24."""
+    rows = score(table_of([r for r in made_up_people() if r["objects"] <= 12]), PUBLISHED).rows
+    for row in rows:
+        if row.measure.startswith("likert_"):
+            continue
+        assert (row.agrees is None) == (row.objects not in (6, 12)), row
+        assert row.agrees is not None or row.remark == f"nobody is in the cell none, {row.objects or 18}"
+
+
 def test_people_of_no_published_cell_are_refused():
     table = table_of(made_up_people({("none", 2): 3, ("optimal", 2): 3}))
     with pytest.raises(StatisticsError, match=r"nobody is in a cell .*\[6, 12, 18, 24\] objects"):

@@ -16,7 +16,14 @@ from experiments.analysis.measures import LIKERT_PREFIX
 from experiments.analysis.page import p_value
 from experiments.analysis.published import Direction, Published, PublishedTest
 from experiments.analysis.score_population import population_eta_squared
-from experiments.analysis.score_rules import Found, points, published_cells, tests_of, varies_most
+from experiments.analysis.score_rules import (
+    Found,
+    points,
+    published_cells,
+    require_cells,
+    tests_of,
+    varies_most,
+)
 from experiments.analysis.statistics.effects import Interval
 from experiments.analysis.study_table import StudyTable
 from experiments.errors import StatisticsError
@@ -174,6 +181,7 @@ class _Judge:
             yield replace(row, kind=INFERENCE, ours=NOT_SIMULATED)
             return
         try:
+            require_cells(self.table, self.published, test.measure, test.objects)
             found = tests_of(self.table, test.measure, test.objects)[test.effect]
             yield self._effect_size(row, test, found)
             yield self._inference(replace(row, kind=INFERENCE), test, found)
@@ -217,6 +225,7 @@ class _Judge:
 
     def _judged(self, row: Row, rule: Rule, *, by_rate: bool = False) -> Row:
         try:
+            require_cells(self.table, self.published, row.measure, row.objects)
             agrees = rule(self.table)
         except StatisticsError as error:
             return replace(row, remark=str(error))

@@ -53,6 +53,18 @@ def published_cells(table: StudyTable, published: Published) -> StudyTable:
     return table.take(np.flatnonzero([cell in published.people.sizes() for cell in cells]))
 
 
+def require_cells(table: StudyTable, published: Published, measure: str, objects: int | None) -> None:
+    """Check that every published cell has people, at a number of objects or at all of them.
+
+    Raises:
+        StatisticsError: The measure is not known, or nobody is in a cell, which the message names.
+    """
+    _known(table, measure)
+    for condition, level in published.people.sizes():
+        if objects in (None, level) and condition not in table.groups(measure, level):
+            raise StatisticsError(f"nobody is in the cell {condition}, {level}")
+
+
 def tests_of(table: StudyTable, measure: str, objects: int | None) -> dict[str, Found]:
     """Tests of a measure on a table by effect: of assistance at a number of objects, else of both factors (Type II).
 

@@ -148,7 +148,7 @@ def _read(name: str, parse: Callable[[bytes], T]) -> T:
     try:
         text = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
     except OSError as error:
-        raise ConfigError(f"cannot read {name}: {error}") from error
+        raise ConfigError(f"cannot read {name}: {error.strerror}") from error
     try:
         return parse(text)
     except ProblemError as error:

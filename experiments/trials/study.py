@@ -21,9 +21,17 @@ CONTROLS = FOLDER / "controls.toml"
 
 
 def study_path(name: str) -> Path:
-    """The file of a study: a path, or the name of one that comes with the package (`paper`); folders do not count."""
-    packaged = FOLDER / f"{name}.toml"
-    return packaged if packaged.is_file() and not Path(name).is_file() else Path(name)
+    """The file of a study: a path, or the name of one that comes with the package (`paper`); folders do not count.
+
+    Raises:
+        ConfigError: There is neither.
+    """
+    own, packaged = Path(name), FOLDER / f"{name}.toml"
+    if not own.is_file() and not packaged.is_file():
+        raise ConfigError(
+            f"no study {name!r}; `paper` is the published one, or give the path of a design file"
+        )
+    return own if own.is_file() else packaged
 
 
 def read_study(path: Path, people: int | None = None) -> Design:
