@@ -36,7 +36,7 @@ def test_every_command_of_the_page_works(
     assert main(command) == 0
     if command[0] == "check":
         said = capsys.readouterr().out
-        assert "0 errors, 1 warnings" in said and "--points" in said
+        assert "0 errors, 1 warning\n" in said and "--points" in said
     if command[0] == "run":
         metrics = json.loads((folder / command[-1] / "metrics.json").read_text(encoding="utf-8"))
         assert metrics["delivered"] == metrics["objects"] == 4

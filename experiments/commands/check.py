@@ -81,5 +81,10 @@ def _print(report: Report) -> None:
         console.print(table)
     bad = sum(finding.severity == "error" for finding in report.findings)
     verdict = "can be used" if report.usable else "cannot be used"
-    text = f"{report.kind} {report.path} {verdict}: {bad} errors, {len(report.findings) - bad} warnings"
+    counts = f"{_counted(bad, 'error')}, {_counted(len(report.findings) - bad, 'warning')}"
+    text = f"{report.kind} {report.path} {verdict}: {counts}"
     console.print(text, markup=False, soft_wrap=True)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
