@@ -18,7 +18,7 @@ from experiments.participants.guest.decision import Task, choose, first_step_cos
 from experiments.participants.guest.memory import Memory, Recollection
 from experiments.participants.guest.perception import Noticing, Perception
 from experiments.participants.guest.timing import Timing
-from experiments.participants.guest.walking import Walking, Wandering
+from experiments.participants.guest.walking import Detours, Walking
 from experiments.runs.records import EventLog
 from experiments.trials.setup import draw_behaviour, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
@@ -162,26 +162,26 @@ def test_whoever_quits_follows_nothing_more_and_sooner_or_later_everybody_does()
 
 def test_without_lapses_and_pull_a_walk_has_no_stops(house):
     ends = house.navmesh.sample(np.random.default_rng(1), 40).reshape(-1, 2, 2)
-    steady = Wandering(Walking(0.0, 3.0, 0.0), house, np.random.default_rng(0))
+    steady = Detours(Walking(0.0, 3.0, 0.0), house, np.random.default_rng(0))
     assert not any(steady.stops(a, b, pole=True) for a, b in ends)
-    pulled = Wandering(Walking(0.0, 3.0, 1.0), house, np.random.default_rng(0))
+    pulled = Detours(Walking(0.0, 3.0, 1.0), house, np.random.default_rng(0))
     stops = [stop for a, b in ends for stop in pulled.stops(a, b, pole=True)]
     assert stops and all(np.linalg.norm(stop - house.navmesh.snap(stop)) < 0.01 for stop in stops)
     assert not any(pulled.stops(a, b, pole=False) for a, b in ends)
 
 
-@pytest.mark.parametrize("astray", [2.5, 6.0])
-def test_lapses_lead_to_places_of_the_house_that_are_not_too_far(house, astray):
+@pytest.mark.parametrize("lapse_distance", [2.5, 6.0])
+def test_lapses_lead_to_places_of_the_house_that_are_not_too_far(house, lapse_distance):
     starts = house.navmesh.sample(np.random.default_rng(2), 60)
-    absent = Wandering(Walking(1.0, astray, 0.0), house, np.random.default_rng(0))
+    absent = Detours(Walking(1.0, lapse_distance, 0.0), house, np.random.default_rng(0))
     walks = [
         house.geodesics.shortest_path(start, stop).geodesic_distance
         for start in starts
         for stop in absent.stops(start, start, pole=False)
     ]
-    assert len(walks) >= 55 and max(walks) <= astray and max(walks) > 0.8 * astray
+    assert len(walks) >= 55 and max(walks) <= lapse_distance and max(walks) > 0.8 * lapse_distance
     assert (
-        Wandering(Walking(1.0, 0.1, 0.0), house, np.random.default_rng(0)).stops(
+        Detours(Walking(1.0, 0.1, 0.0), house, np.random.default_rng(0)).stops(
             starts[0], starts[1], pole=False
         )
         == []
@@ -289,7 +289,7 @@ def test_who_complies_never_deviates_and_who_does_not_does(house):
 @pytest.mark.parametrize("seed", [1, 3])
 def test_who_gives_up_the_only_object_it_knows_looks_for_others(house, seed):
     fickle = {"compliance.follows": 0.5, "compliance.abandons": 1.0, "compliance.picks_up": 0.0}
-    slow_eyes = {"perception.half_distance": 3.0, "walking.lapses": 0.0, "timing.pace": 1.0}
+    slow_eyes = {"perception.half_distance": 3.0, "walking.lapse_rate": 0.0, "timing.pace": 1.0}
     _, events = played(house, trial(fickle | slow_eyes, seed=seed))
     assert events[-1]["reason"] == "all delivered"
 
@@ -307,7 +307,7 @@ def test_guidance_takes_its_time(house):
 
 def test_nobody_loses_a_path_that_is_shown(house):
     steady, absent = (
-        played(house, trial(FULL_COMPLIANCE | {"walking.lapses": lapses})) for lapses in (0.0, 1.0)
+        played(house, trial(FULL_COMPLIANCE | {"walking.lapse_rate": lapses})) for lapses in (0.0, 1.0)
     )
     assert steady[0] == absent[0]
 

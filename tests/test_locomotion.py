@@ -82,6 +82,27 @@ def test_a_blocked_person_who_only_walks_is_told_so_and_does_not_back_off():
     assert BACK_OFF not in moves
 
 
+def test_a_walker_goes_on_unasked_only_while_there_is_nothing_new():
+    controller = LocomotionController(NO_WALLS, PersonParameters())
+    walk = dataclasses.replace(walk_to(3.0), shown=True, tolerance=0.3, until=2.0)
+    asked = seen(objects=[(5.0, 5.0), (1.0, 5.0)])
+    later = dataclasses.replace(asked, time=1.0, position=np.array([1.0, 0.29]))
+    assert controller.keeps_on(walk, asked, later)
+    shifted = asked.object_positions + np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 1e-12)])
+    new = [
+        {"position": np.array([1.0, 0.31])},
+        {"object_positions": shifted},
+        {"object_status": (ObjectStatus.LOOSE, ObjectStatus.DELIVERED)},
+        {"busy": True},
+        {"time": 2.0},
+    ]
+    for changed in new:
+        assert not controller.keeps_on(walk, asked, dataclasses.replace(later, **changed)), changed
+    carrying = {"object_status": (ObjectStatus.LOOSE, ObjectStatus.CARRIED)}
+    moved = dataclasses.replace(later, object_positions=shifted, **carrying)
+    assert controller.keeps_on(walk, dataclasses.replace(asked, **carrying), moved)
+
+
 class House:
     seen, receptacles = None, {}
     """A floor without walls, where every path has a detour of its own."""

@@ -15,7 +15,7 @@ from experiments.participants.guest.options import Chooser, Known
 from experiments.participants.guest.perception import Noticing, Perception
 from experiments.participants.guest.searching import Frontier, Place
 from experiments.participants.guest.timing import Timing
-from experiments.participants.guest.walking import Walking, Wandering
+from experiments.participants.guest.walking import Detours, Walking
 from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor
 from hud.markers import BREADCRUMB, FLAGPOLE
@@ -60,7 +60,7 @@ class Guest:
         self._frontier = Frontier(house, rng)
         self._chooser = Chooser(behaviour.decision, house, self._frontier, rng)
         self._adherence = Adherence(behaviour.compliance, rng)
-        self._wandering = Wandering(behaviour.walking, house, rng)
+        self._detours = Detours(behaviour.walking, house, rng)
         self._intention: Intention | None = None
         self._stops: list[Point] = []
         self._turn: FullTurn | None = None
@@ -209,7 +209,7 @@ class Guest:
         self._intention = Intention(aim)
         is_pole = poles and isinstance(aim, Visit) and aim.kind is VisitKind.PICK
         goal = self._goal(percept, aim, shown)
-        self._stops = self._wandering.stops(percept.position, goal, pole=is_pole)
+        self._stops = self._detours.stops(percept.position, goal, pole=is_pole)
         self._thinks_until = percept.time + self._behaviour.timing.choice_time(poles=poles)
 
     def _follow(self, percept: Percept, shown: Guidance) -> None:

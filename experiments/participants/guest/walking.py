@@ -9,27 +9,27 @@ from experiments.participants.base import Point
 from experiments.participants.behaviour import chance, varies
 from experiments.participants.distances import estimated_distances
 
-WORTH_WALKING = 0.5  # m; nobody goes out of the way for less
+SHORTEST_DETOUR = 0.5  # m; nobody goes out of the way for less
 
 
 @dataclass(frozen=True)
 class Walking:
-    """Where a walk goes astray. The shapes of the distributions are starting values.
+    """Where a walk leaves the shortest path. The shapes of the distributions are starting values.
 
     Attributes:
-        lapses: Probability, at each walk to something, of going elsewhere first without noticing; not on a path that
-            is shown.
-        astray: How long a walk that is at most, m.
+        lapse_rate: Probability, at each walk to something, of going elsewhere first without noticing; not on a path
+            that is shown.
+        lapse_distance: How long the walk there is at most, m.
         pull: Probability, at each walk to a flagpole in another room, of first walking to where this room is nearest
             to it; also how much straight lines count in estimating how far away flagpoles are.
     """
 
-    lapses: float = chance({"beta": [0.5, 3.0]})
-    astray: float = varies(5.0, 0.0, 50.0, "m")
+    lapse_rate: float = chance({"beta": [0.5, 3.0]})
+    lapse_distance: float = varies(5.0, 0.0, 50.0, "m")
     pull: float = chance({"beta": [2.0, 3.0]})
 
 
-class Wandering:
+class Detours:
     """Finds the places at which a walk passes by before it reaches its goal.
 
     Args:
@@ -51,7 +51,7 @@ class Wandering:
         """
         lapse, pulled = self._rng.random(2).tolist()
         start, stops = self._house.navmesh.snap(start), []
-        if lapse < self._walking.lapses:
+        if lapse < self._walking.lapse_rate:
             stops += self._lapse(start)
         if pole and pulled < self._walking.pull:
             stops += self._towards(start, goal)
@@ -61,7 +61,7 @@ class Wandering:
         """Any place of the house that is not too far, shape (2,); none where there is none."""
         places = np.concatenate(list(self._house.viewpoints.values()))
         walks = np.array(estimated_distances(self._house, start, list(places)))
-        near = places[(walks > WORTH_WALKING) & (walks <= self._walking.astray)]
+        near = places[(walks > SHORTEST_DETOUR) & (walks <= self._walking.lapse_distance)]
         return [near[self._rng.integers(len(near))]] if len(near) else []
 
     def _towards(self, start: Point, goal: Point) -> list[Point]:
@@ -71,5 +71,5 @@ class Wandering:
             return []
         places = self._house.viewpoints.get(room, start[None])
         gaps = np.linalg.norm(places - goal, axis=1)
-        nearer = gaps.min() < np.linalg.norm(start - goal) - WORTH_WALKING
+        nearer = gaps.min() < np.linalg.norm(start - goal) - SHORTEST_DETOUR
         return [places[gaps.argmin()]] if nearer else []
