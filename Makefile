@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 WORKERS ?= auto
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format wheel-check assets pictures data-dictionary clean
+.PHONY: help demo test test-slow check check-client format wheel-check assets pictures data-dictionary client-protocol clean
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -14,14 +14,20 @@ help: ## List the targets
 demo: $(READY) ## Set up, then film an assisted clean-up into runs/demo
 	$(BIN)/mjsim run --objects 6 --assistance guided --seed 0 --out runs/demo
 
-test: $(READY) ## Set up, then run the whole test suite; COVERAGE=1 measures what it covers
-	$(BIN)/python -m pytest -n $(WORKERS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered)
+test: $(READY) ## Set up, then run the tests but for the slow ones; COVERAGE=1 measures what they cover
+	$(BIN)/python -m pytest -n $(WORKERS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered --cov-fail-under=0)
 
-check: $(READY) ## Lint, strict types, import contracts
+test-slow: $(READY) ## Run the slow tests; COVERAGE=1 adds to what `make test` measured, and checks the sum
+	$(BIN)/python -m pytest -n $(WORKERS) -m slow $(if $(COVERAGE),--cov --cov-append --cov-report=term:skip-covered)
+
+check: check-client $(READY) ## Lint, strict types, import contracts
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+check-client: $(READY) ## Types, lint and unit tests of the client of `mjsim play`
+	PYTHON=$(abspath $(BIN)/python) .ci/check-client
 
 format: $(READY) ## Put the code into the house style
 	$(BIN)/ruff check --fix .
@@ -31,13 +37,16 @@ wheel-check: $(READY) ## Build the wheel and use it in an empty environment
 	PYTHON=$(BIN)/python .ci/wheel-check
 
 assets: $(READY) ## Make textures and meshes under models/ anew
-	PYTHONPATH=tools $(BIN)/python -m authoring
+	$(BIN)/python -m tools.authoring
 
 pictures: $(READY) ## Make the pictures of the README anew
 	$(BIN)/mjsim gallery --force --out docs/pictures
 
 data-dictionary: $(READY) ## Make docs/data.md anew from the types
-	$(BIN)/python -m experiments.data_dictionary > docs/data.md
+	$(BIN)/python -m tools.data_dictionary > docs/data.md
+
+client-protocol: $(READY) ## Make the client's copy of the protocol anew from the types
+	$(BIN)/python -m tools.client_protocol > experiments/web/client/static/protocol.js
 
 clean: ## Remove the environment, caches and runs
 	rm -rf $(VENV) runs dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -4,6 +4,7 @@ Called by the planner benchmark with a number of objects and of houses; writes o
 this folder has a module named like the package that it measures.
 """
 
+import contextlib
 import json
 import sys
 import time
@@ -13,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from experiments.house import House
-from planner.live import LiveReplanner
 from planner.plan import Status, Visit, VisitKind
-from planner.route import XY, TaskState
+from planner.regret import RegretEvaluator
+from planner.route import XY, Route, TaskState
+from planner.service import Mode, Planner
 from planner.solver import solver
+from planner.solver_source import SolverSource
 
 REACH = 0.3  # m, spread of where a person stands to reach something
 LARGE = 15  # objects left from which on a first plan is a matter of search rather than of a small table
@@ -39,7 +42,8 @@ def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
     deliveries = {name: approach[key] for name, key in episode.targets.items()}
     loose = {o.name: (o.position[0], o.position[1]) for o in episode.objects}
     carried: list[str] = []
-    with LiveReplanner(house.geodesics, solver("exact")) as guide:
+    source = SolverSource(house.geodesics, solver("exact"))
+    with contextlib.closing(Planner(source, RegretEvaluator(house.geodesics), Mode.LIVE)) as guide:
         guide.prepare(TaskState((episode.start.x, episode.start.y), dict(loose), (), deliveries))
         while len(loose) + len(carried) > 1:
             kind, name = possible(loose, carried)[int(rng.integers(len(possible(loose, carried))))]
@@ -56,17 +60,26 @@ def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
                 yield record
 
 
-def replan(guide: LiveReplanner, state: TaskState) -> dict[str, Any]:
+def replan(guide: Planner, state: TaskState) -> dict[str, Any]:
     """What the caller waits for, and what comes of it in the background."""
     wall, own, cpu = time.perf_counter(), time.thread_time(), time.process_time()
-    first = guide.update(state).plan.cost
+    first = route(guide, state).plan.cost
     record = {"wall": time.perf_counter() - wall, "cpu": time.thread_time() - own}
     guide.wait()
     record |= {"proof_wall": time.perf_counter() - wall, "proof_cpu": time.process_time() - cpu}
-    guide.poll(state)
-    best, plan = guide.route.plan.cost, guide.route.plan
+    guide.improve(state)
+    plan = route(guide, state).plan
+    best = plan.cost
     gap = 100 * (first / best - 1) if best else 0.0
     return record | {"gap": gap, "proven": plan.status is Status.OPTIMAL, "left": len(state.loose)}
+
+
+def route(guide: Planner, state: TaskState) -> Route:
+    """The route for a state."""
+    guide.ask(state)
+    if guide.route is None:
+        raise ValueError("no route")
+    return guide.route
 
 
 def possible(loose: dict[str, XY], carried: list[str]) -> list[Visit]:

@@ -1,4 +1,4 @@
-"""What the planner benchmark makes of its records: a table, lines of text and a picture."""
+"""Report of the planner benchmark: a table, lines of text and a picture."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -27,10 +27,10 @@ def summary(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], float]) -> dict[str, Any]:
-    """What one planner did with the problems of one size and state; None where there is nothing to say."""
+    """Figures of one planner on the problems of one size and state; None where a figure does not apply."""
     solved = [r for r in group if r["cost"] is not None]
     gaps = [100 * (r["cost"] / best[r["objects"], r["seed"], r["state"]] - 1) for r in solved]
-    # An empty tour of length 0 is optimal: nothing is left to do there.
+    # A tour of length 0 is optimal.
     bounds = [100 * (r["cost"] - r["bound"]) / (r["cost"] or 1.0) for r in solved if r["bound"] is not None]
     cpu, wall = [r["cpu"] for r in group], [r["wall"] for r in group]
     return {

@@ -19,8 +19,7 @@ import numpy as np
 from planner.problem import RoutingProblem
 from planner.solver import PATIENT_WORK, SolveLimit, solver
 
-# What a planner makes of a problem: length of its tour in m (None: found none), its lower bound in m if it gives one,
-# whether it is proven.
+# Length of a tour in m (None: found none), its lower bound in m if the planner gives one, whether it is proven.
 Answer = tuple[float | None, float | None, bool]
 Method = Callable[[RoutingProblem], Answer]
 
@@ -31,7 +30,7 @@ def main() -> None:
     solve = method(name, limit)
     problems: list[RoutingProblem] = pickle.loads(Path(path).read_bytes())
     if name == "exact":
-        import planner.exact.relaxation  # noqa: F401 - or it plans a few objects without its kernels
+        import planner.exact.table_kernels  # noqa: F401 - or it plans a few objects without its kernels
     solve(problems[0])  # loads the compiled kernels and the libraries
     for problem in problems:
         wall, cpu = time.perf_counter(), time.process_time()

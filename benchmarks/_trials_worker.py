@@ -17,6 +17,9 @@ from pkgutil import resolve_name
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
+from numpy.typing import NDArray
+
 from benchmarks.support.recorded_trial import RecordingWorld, play
 from experiments.house import House
 from experiments.trials.trial import run_trial
@@ -27,30 +30,25 @@ from mjsim.world import World
 
 # Part -> callables. Time in a callable of one part that is called by another part belongs to the caller.
 PARTS = {
-    "planning": (  # what the session waits for; the rest of it goes on in a thread
-        "planner.replanner.Replanner.update",
+    "planning": (  # waiting times; the rest runs in a thread
+        "planner.service.Planner.ask",
         "concurrent.futures._base.Future.result",
         "concurrent.futures.thread.ThreadPoolExecutor.shutdown",
     ),
     "shortest paths": ("planner.geodesics.Geodesics.shortest_path",),
     "looking": ("experiments.session.perception.visible_objects",),
-    "world": tuple(f"mjsim.world.World.{n}" for n in ("reset", "step", "walk", "finish", "state", "restore")),
+    "world": tuple(f"mjsim.world.World.{n}" for n in ("reset", "step", "state", "restore")),
     "house and scene": (
         "experiments.house.House.sample_episode",
         "experiments.trials.trial.compose",
         "mjsim.world.World.__init__",
     ),
     "recording": (
-        "experiments.runs.records.EventLog.append",
-        "experiments.runs.trajectory.Trajectory.append",
-        "experiments.runs.trajectory.Trajectory.extend",
-        "experiments.runs.trajectory.Trajectory.arrays",
-        "experiments.runs.recording.Recording.append",
-        "experiments.runs.recording.Recording.extend",
-        "experiments.runs.recording.Recording.recorded",
-        "experiments.runs.recording.Recorded.save",
-        "experiments.trials.trial_record.save_arrays",
-        "experiments.trials.trial_record.write_json",
+        "experiments.record.records.EventLog.append",
+        "experiments.record.writer.RecordWriter.append",
+        "experiments.record.writer.RecordWriter.record",
+        "experiments.record.export.save_arrays",
+        "experiments.record.export.write_json",
         "mjsim.episode.Episode.save",
     ),
 }
@@ -58,7 +56,7 @@ REST = "participant and the rest"
 
 
 class Timers:
-    """Wall time of the main thread in the callables of `PARTS`; use as a context manager, which patches them meanwhile.
+    """Wall time of the main thread in the callables of `PARTS`; a context manager that patches them.
 
     Attributes:
         seconds: Part -> s.
@@ -100,13 +98,15 @@ def main() -> None:
     house_s = time.perf_counter() - started
     worlds: list[RecordingWorld] = []
 
-    def recording_world(scene: Scene, options: WorldOptions) -> World:
-        worlds.append(RecordingWorld(scene, options))
+    def recording_world(scene: Scene, options: WorldOptions, walls: NDArray[np.float64]) -> World:
+        worlds.append(RecordingWorld(scene, options, walls=walls))
         return worlds[-1]
 
     timers, trials_s, bare_s = Timers(), 0.0, 0.0
     for seed in range(seeds):
-        config = TrialConfig(objects, assistance, seed, user, fidelity=fidelity, regret=False)
+        config = TrialConfig(
+            objects=objects, assistance=assistance, seed=seed, user=user, fidelity=fidelity, regret=False
+        )
         with (
             tempfile.TemporaryDirectory() as folder,
             timers,
@@ -116,7 +116,7 @@ def main() -> None:
             run_trial(config, Path(folder) / "run", topdown=False, house=house)
             trials_s += time.perf_counter() - started
         recorded = worlds.pop()
-        world = World(recorded.scene, recorded.options)
+        world = World(recorded.scene, recorded.options, walls=house.navmesh.outline)
         world.reset()
         started = time.perf_counter()
         play(world, recorded.calls)

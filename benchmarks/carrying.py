@@ -1,4 +1,4 @@
-"""Carrying two objects through the house at 1.4 m/s: how far welds stretch and twist, and what is lost meanwhile."""
+"""Carrying two objects through the house at 1.4 m/s: how far welds stretch and twist, and how many objects are lost."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""The same trials in every fidelity: how far `windows` and `event` agree with `full`, trial by trial."""
+"""The same trials in every fidelity: how far `event` agrees with `full`, trial by trial."""
 
 import os
 import statistics

@@ -3,7 +3,6 @@
 Orders of means are shown beside the tests. Two draws of the same people may differ in an order of means that are close.
 """
 
-import dataclasses
 import os
 import tempfile
 from collections import Counter
@@ -11,17 +10,19 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
-from experiments.analysis.measures import read_measures
-from experiments.analysis.published import Published, read_published
-from experiments.analysis.score_rules import points, published_cells, tests_of
-from experiments.analysis.study_table import StudyTable, read_study
+from experiments.analysis.statistics.effects import ALPHA
 from experiments.errors import StatisticsError
-from experiments.trials import study
+from experiments.study import simulate as study
+from experiments.study.measures import read_measures
+from experiments.study.table import StudyTable, read_study
 from experiments.trials.batch import run_batch
 from experiments.trials.design import Design
 from experiments.trials.trial_config import TrialConfig
+from studies.published import Published, read_published
+from studies.score_rules import points, published_cells, tests_of
 
 PEOPLE = 40  # of each cell
 QUICK_PEOPLE = 2
@@ -53,7 +54,7 @@ def measure(
 
 
 def people(count: int, objects: Sequence[int]) -> list[TrialConfig]:
-    """The first so many people of every cell of the published design with these numbers of objects."""
+    """The first `count` people of every cell of the published design with these numbers of objects."""
     taken: Counter[Any] = Counter()
     chosen = []
     for trial in study.read_study(study.study_path("paper")).trials:
@@ -65,14 +66,14 @@ def people(count: int, objects: Sequence[int]) -> list[TrialConfig]:
 
 
 def _simulated(trials: Sequence[TrialConfig], tier: str, workers: int) -> StudyTable:
-    design = Design(tuple(dataclasses.replace(trial, fidelity=tier) for trial in trials))
+    design = Design(tuple(msgspec.structs.replace(trial, fidelity=tier) for trial in trials))
     with tempfile.TemporaryDirectory() as folder:
         run_batch(design, Path(folder) / tier, workers=workers)
         return published_cells(read_study(Path(folder) / tier, read_measures()), read_published())
 
 
 def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[tuple[str, str], dict[str, str]]:
-    """What each tier decides, by kind and words; what cannot be computed with so few people is left out."""
+    """What each tier decides, by kind and words; without tests that cannot be computed."""
     found: dict[tuple[str, str], dict[str, str]] = {}
     for tier, table in tables.items():
         for test in published.tests:
@@ -81,7 +82,7 @@ def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[tupl
                 one = tests_of(table, test.measure, test.objects)[test.effect]
             except StatisticsError:
                 continue
-            words = f"{'p < .05' if one.significant else 'n.s.'} (F = {one.statistic:.2f})"
+            words = f"{'p < .05' if one.p < ALPHA else 'n.s.'} (F = {one.statistic:.2f})"
             found.setdefault((INFERENCE, f"{test.measure}: {test.effect}, {where}"), {})[tier] = words
         for direction in published.directions:
             try:

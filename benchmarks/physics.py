@@ -32,7 +32,7 @@ DEFAULT_OBJECTS = 24
 CHUNK = 100  # calls that are timed at once
 REPEATS = 3
 PROFILED = 60.0  # s of simulated time that the profile covers
-TARGETS = (("full", 120.0), ("windows", 500.0), ("event", 3000.0))  # simulated s per core-second
+TARGETS = (("full", 120.0), ("event", 3000.0))  # simulated s per core-second
 MAX_OVERHEAD = 1.3  # times the raw engine
 
 
@@ -131,9 +131,9 @@ def engine_inputs(trial: RecordedTrial) -> tuple[list[EngineInput], float, float
 
     mujoco.mj_step = record
     try:
-        for name, argument in trial.calls:
+        for name, argument in trial.single_steps:
             if name == "step":
-                world.step(argument)
+                world.step(*argument)
             elif name == "restore":
                 world.restore(world.state())
                 found.append(EngineInput(physics=take_physics(world.model, world.data)))
@@ -161,7 +161,7 @@ def step_raw(model: Any, data: Any, chunk: Sequence[EngineInput], substeps: int)
 
 def measure_overhead(trial: RecordedTrial, repeats: int) -> dict[str, Any]:
     """Microseconds of `World.step` and of the raw engine for the same control steps, in alternating chunks."""
-    calls = [call for call in trial.calls if call[0] in ("step", "restore")]
+    calls = trial.single_steps
     found, awake, contacts = engine_inputs(trial)
     world, model = trial.world(), trial.scene.model
     data = mujoco.MjData(model)

@@ -22,7 +22,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from experiments.commands.bench import load
+from benchmarks._command import load
 from experiments.house import House
 from planner.problem import RoutingProblem
 from planner.route import TaskState
@@ -198,7 +198,7 @@ def first_call(problem: RoutingProblem) -> dict[str, float]:
 
 
 def live(objects: int, houses: int) -> dict[str, Any]:
-    """Replans beside a person who goes their own way: see the worker."""
+    """Replans during a task of a simulated person who ignores the plan: see the worker."""
     command = [sys.executable, "-P", str(LIVE_WORKER), str(objects), str(houses)]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     found: dict[str, Any] = json.loads(done.stdout)

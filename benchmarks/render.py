@@ -29,7 +29,7 @@ from hud.state import HudState
 from hud.task import KnownPlan, TaskStep
 from mjsim.model.scene import Scene, compose
 from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info, render_pictures
-from mjsim.render.cameras import View
+from mjsim.render.cameras import ViewVolume
 from mjsim.render.context import current_context
 from mjsim.render.markers import add_markers
 from mjsim.render.scene_settings import buffer_settings
@@ -210,7 +210,7 @@ def raw_renderer(
     rectangle = mujoco.MjrRect(0, 0, *drawn)
 
     def draw(pose: CameraPose) -> None:
-        View.of(pose).aim(scene)
+        ViewVolume.of(pose).aim(scene)
         with current_context():
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
             mujoco.mjr_render(rectangle, scene, context)
@@ -235,7 +235,7 @@ def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[st
     with Renderer(model) as fast:
         for pose in subject.poses[:SLOW_VIEWS]:
             default.update_scene(subject.data, scene_option=option)
-            View.of(pose).aim(default.scene)
+            ViewVolume.of(pose).aim(default.scene)
             default.render()
             fast.rgb(subject.data, pose)
             defaults.append(timed(subject.clock, default.render))

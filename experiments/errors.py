@@ -2,11 +2,11 @@
 
 ExperimentError
 ├── ConfigError     an option of a run or batch is unusable
-├── SessionError    a session cannot go on
+├── SessionError    a session cannot continue
 ├── RecordError     a run directory is missing, incomplete or in the way
-├── UserCodeError   a participant, condition or planner of somebody's own raised, or returned something unusable
+├── UserCodeError   a user-supplied participant, condition or planner raised, or returned something unusable
 ├── StatisticsError the data do not allow a statistical test
-└── ReplayError     a recorded run cannot be replayed, or does not go as recorded
+└── ReplayError     a recorded run cannot be replayed, or differs from its record
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class ConfigError(ExperimentError):
 
 
 class SessionError(ExperimentError):
-    """A session cannot go on."""
+    """A session cannot continue."""
 
 
 class RecordError(ExperimentError):
@@ -29,7 +29,7 @@ class RecordError(ExperimentError):
 
 
 class UserCodeError(ExperimentError):
-    """A participant, condition or planner of somebody's own raised, or returned something unusable."""
+    """A user-supplied participant, condition or planner raised, or returned something unusable."""
 
 
 class StatisticsError(ExperimentError):
@@ -37,11 +37,11 @@ class StatisticsError(ExperimentError):
 
 
 class ReplayError(ExperimentError):
-    """A recorded run cannot be replayed, or does not go as recorded.
+    """A recorded run cannot be replayed, or differs from its record.
 
     Attributes:
         step: First bad control step, or None where no step can be named.
-        verdicts: A line for every file of the run, where it got as far as that.
+        verdicts: A line for every file of the run that was checked.
     """
 
     def __init__(self, message: str, step: int | None = None, verdicts: Sequence[str] = ()) -> None:

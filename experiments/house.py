@@ -16,13 +16,14 @@ from mjsim.model.house import compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 from mjsim.model.sampling import house_points, sample_episode
+from mjsim.model.validation.validate import require_usable
 from mjsim.person_parameters import PersonParameters
+from mjsim.walking.path_following import ARRIVED_WITHIN
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
 VIEWPOINT_SPACING = 2.2  # m; from a viewpoint one sees what lies within it in spite of furniture
 VIEWPOINT_CANDIDATES = 3000
-ARRIVED_WITHIN = 0.06  # m from the end of its path, a walk is over
 WALL_GAP = 0.05  # m that planned paths keep from walls beyond the body's radius, so that corners can be cut
 
 
@@ -62,10 +63,11 @@ class House:
             name: Name under `models/houses`, or the path of a `catalogue.toml`.
 
         Raises:
-            AssetError: The house cannot be read, or does not compile.
+            AssetError: The house cannot be read, does not compile, or breaks a convention of docs/models.md.
         """
         catalogue = Catalogue.load(name)
         house = compiled_house(catalogue)
+        require_usable(house)
         floor = house.floor
         person = PersonParameters()
         navmesh = _navmesh(floor, person.body_radius + WALL_GAP)
@@ -75,7 +77,7 @@ class House:
         )
 
     def for_person(self, person: PersonParameters) -> "House":
-        """The same house, with the same episodes, for somebody of another size or reach.
+        """The same house, with the same episodes, for a person of another size or reach.
 
         Raises:
             ConfigError: A receptacle is out of reach from where this person would stand.

@@ -35,15 +35,10 @@ class Rect:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A rasterised part: frame := frame * keep / 255 + colour.
+    """A rasterised part: frame := frame * keep / 255 + colour."""
 
-    Attributes:
-        colour: Colour times opacity, uint8, shape (h, w, 3).
-        keep: How much of the frame shows through, 255 all of it, uint8, shape (h, w, 3).
-    """
-
-    colour: NDArray[np.uint8]
-    keep: NDArray[np.uint8]
+    colour: NDArray[np.uint8]  # colour times opacity, uint8, (h, w, 3)
+    keep: NDArray[np.uint8]  # how much of the frame shows through, 255 all of it, uint8, (h, w, 3)
 
     def faded(self, opacity: float) -> "Patch":
         """The same with this share of its opacity, 0 to 1."""
@@ -54,13 +49,7 @@ class Patch:
         return Patch(cv2.LUT(self.colour, colour), cv2.LUT(self.keep, keep))
 
     def lay_over(self, frame: NDArray[np.uint8], x: int, y: int) -> None:
-        """Blend onto `frame`, shape (H, W, 3), in place.
-
-        Args:
-            frame: Must hold the whole patch.
-            x: Column of the upper left corner, px.
-            y: Row of the upper left corner, px.
-        """
+        """Blend onto `frame` (H, W, 3) in place, with the upper left corner at column x and row y, px; it must fit."""
         height, width = self.keep.shape[:2]
         view = frame[y : y + height, x : x + width]
         cv2.multiply(view, self.keep, dst=view, scale=1.0 / 255.0)
@@ -68,13 +57,7 @@ class Patch:
 
 
 class Canvas:
-    """Draws shapes, text and pictures with opacity; `patch` turns the result into bytes.
-
-    Args:
-        stencils: What is drawn with; their scale is the canvas's.
-        width: px of the frame.
-        height: px of the frame.
-    """
+    """Draws shapes, text and pictures with opacity on `width` x `height` px; `patch` turns the result into bytes."""
 
     def __init__(self, stencils: Stencils, width: int, height: int) -> None:
         self.width, self.height = width, height
@@ -128,15 +111,7 @@ class Canvas:
     def arrow(
         self, centre: float, angle: float, outline: Sequence[tuple[float, float]], size: float, colour: Rgb
     ) -> None:
-        """A filled outline around the middle of a square canvas, turned to a direction.
-
-        Args:
-            centre: Column and row of the middle, px of the frame.
-            angle: Direction of the outline's x axis, rad, 0 to the right, counter-clockwise.
-            outline: Corners, in units of `size`, y downwards.
-            size: px of the frame.
-            colour: Of the inside.
-        """
+        """A filled outline (k, 2), in units of `size` px, y downwards, turned by `angle` rad around `centre`."""
         c, s = math.cos(angle), -math.sin(angle)
         points = [(centre + size * (a * c - b * s), centre + size * (a * s + b * c)) for a, b in outline]
         self.shape(points, colour)

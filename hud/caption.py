@@ -13,15 +13,7 @@ from hud.stencils import Stencils
 
 
 class Captions:
-    """Draws captions over frames of one size.
-
-    Args:
-        width: px.
-        height: px.
-
-    Raises:
-        FrameError: The frame is too small.
-    """
+    """Draws captions over frames of one size, px; a FrameError where it is too small."""
 
     def __init__(self, width: int, height: int) -> None:
         self._size = (width, height)
@@ -29,11 +21,7 @@ class Captions:
         self._patch = functools.lru_cache(64)(self._draw)
 
     def over(self, frame: NDArray[np.uint8], title: str, detail: str = "") -> NDArray[np.uint8]:
-        """A copy of a frame, RGB, uint8, shape (height, width, 3), with a caption.
-
-        Raises:
-            FrameError: The frame has another size.
-        """
+        """A copy of a frame, RGB, uint8, shape (height, width, 3), with a caption."""
         width, height = self._size
         if frame.shape != (height, width, 3):
             raise FrameError(f"frame must be of shape {(height, width, 3)}, got {frame.shape}")

@@ -2,7 +2,7 @@
 
 from hud import theme
 from hud.canvas import Canvas, Patch, Rect
-from hud.layout import Row
+from hud.layout import ListRow
 from hud.state import ChecklistItem
 from hud.stencils import Stencils
 
@@ -20,19 +20,10 @@ def draw_checklist(
     rect: Rect,
     header: tuple[str, str],
     items: tuple[ChecklistItem, ...],
-    rows: tuple[Row, ...],
+    rows: tuple[ListRow, ...],
     hidden: tuple[int, int],
 ) -> Patch:
-    """The task list.
-
-    Args:
-        stencils: What is drawn with.
-        rect: Of the panel.
-        header: Title, and a count beside it.
-        items: Those that fit.
-        rows: Their rows.
-        hidden: How many items do not fit before and after them.
-    """
+    """The task list: a title, a count, the items that fit, and how many are `hidden` before and after."""
     canvas = Canvas.panel(stencils, rect)
     px, width = canvas.px, canvas.typeface.width
     title, count = header
@@ -52,7 +43,7 @@ def draw_checklist(
     return canvas.patch()
 
 
-def _draw_row(canvas: Canvas, item: ChecklistItem, row: Row, top: int) -> None:
+def _draw_row(canvas: Canvas, item: ChecklistItem, row: ListRow, top: int) -> None:
     px, side = canvas.px, canvas.px(theme.TILE)
     if item.current:
         area = Rect(px(3), top, canvas.width - 2 * px(3), row.height)
@@ -73,7 +64,7 @@ def _draw_row(canvas: Canvas, item: ChecklistItem, row: Row, top: int) -> None:
     _draw_text(canvas, item, row, x + side + px(theme.GAP), top)
 
 
-def _draw_text(canvas: Canvas, item: ChecklistItem, row: Row, x: int, top: int) -> None:
+def _draw_text(canvas: Canvas, item: ChecklistItem, row: ListRow, x: int, top: int) -> None:
     px = canvas.px
     face = theme.ITEM_CURRENT if item.current else theme.ITEM
     if canvas.typeface.width(item.text, face) > row.text_width:

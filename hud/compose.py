@@ -78,11 +78,7 @@ class Compositor:
         return out
 
     def layout(self, state: HudState, width: int, height: int) -> Layout:
-        """Where the panels of `state` go in a frame of `width` x `height` px.
-
-        Raises:
-            FrameError: The frame is too small.
-        """
+        """Where the panels of `state` go in a frame of `width` x `height` px."""
         unit = unit_of(width, height)
         if self._stencils.unit != unit:
             self._stencils = Stencils(self._stencils.pictures, unit)

@@ -22,7 +22,7 @@ CONTEXT = 2  # rows above the current one that stay in sight
 
 
 @dataclass(frozen=True)
-class Row:
+class ListRow:
     """A row of a list: its height, px, the px that its text may take, and its detail, broken into lines."""
 
     height: int
@@ -32,23 +32,14 @@ class Row:
 
 @dataclass(frozen=True)
 class Layout:
-    """Rectangles of the panels in a frame, px, and what fits into them.
+    """Rectangles of the panels in a frame, px, and what fits into them."""
 
-    Attributes:
-        panels: Those that are shown, by name, in the order in which they are drawn.
-        free: The part of the view between the panels.
-        first: Index of the first row of the task list that is shown.
-        rows: The rows of the task list that are shown.
-        bin_rows: The rows of the list of bins that are shown, from the first one on.
-        message_lines: The message, broken into lines.
-    """
-
-    panels: Mapping[str, Rect]
-    free: Rect
-    first: int
-    rows: tuple[Row, ...]
-    bin_rows: tuple[Row, ...]
-    message_lines: tuple[str, ...]
+    panels: Mapping[str, Rect]  # those that are shown, by name, in the order in which they are drawn
+    free: Rect  # the part of the view between the panels
+    first: int  # index of the first row of the task list that is shown
+    rows: tuple[ListRow, ...]  # the rows of the task list that are shown
+    bin_rows: tuple[ListRow, ...]  # the rows of the list of bins that are shown, from the first one on
+    message_lines: tuple[str, ...]  # the message, broken into lines
 
     @property
     def stop(self) -> int:
@@ -57,11 +48,7 @@ class Layout:
 
 
 def unit_of(width: int, height: int) -> float:
-    """Frame px per theme px: the frame always has room for 640 x 480 theme px.
-
-    Raises:
-        FrameError: The frame is too small to be read.
-    """
+    """Frame px per theme px: the frame, of 320 x 240 px or more, always has room for 640 x 480 theme px."""
     smallest = theme.MIN_FRAME
     if width < smallest[0] or height < smallest[1]:
         raise FrameError(
@@ -71,14 +58,7 @@ def unit_of(width: int, height: int) -> float:
 
 
 def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Layout:
-    """Lay out the panels of `state`, without its pointer.
-
-    Args:
-        state: What is shown.
-        width: Of the frame, px.
-        height: Of the frame, px.
-        typeface: Of the frame's scale.
-    """
+    """Lay out the panels of `state`, without its pointer, in a frame of a width and a height, px."""
     grid = _Grid(width, height, typeface)
     checklist, first, rows = grid.checklist(state.checklist, state.scroll)
     minimap = grid.minimap(state.minimap)
@@ -111,16 +91,7 @@ def pointer_rect(angle: float, free: Rect, side: int) -> Rect:
 
 
 def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, int]:
-    """Which rows of a list to show: the current one, up to two before it, and as many after it as fit.
-
-    Args:
-        heights: Height of each row, px.
-        current: Index of the current row; it is shown even when it is higher than `room`.
-        room: Height that there is, px.
-
-    Returns:
-        First row, and one past the last; neither neighbour would still fit.
-    """
+    """First and one past the last row to show in `room` px: the current one, two before it, then what fits."""
     first, stop, used = current, current + 1, heights[current]
     while first > max(0, current - CONTEXT) and used + heights[first - 1] <= room // 2:
         first -= 1
@@ -135,16 +106,7 @@ def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, 
 
 
 def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
-    """Which rows of a list to show from a row on; from an earlier one where the rest leaves room.
-
-    Args:
-        heights: Height of each row, px; at least one.
-        first: Index of the row wanted at the top; the nearest one there is if it is outside of the list.
-        room: Height that there is, px.
-
-    Returns:
-        First row, and one past the last.
-    """
+    """First and one past the last row to show in `room` px, from `first` on, or earlier near the end."""
     ends = np.cumsum(heights)
     last_first = int(np.searchsorted(ends, ends[-1] - room)) + 1 if ends[-1] > room else 0
     first = min(max(first, 0), last_first, len(heights) - 1)
@@ -182,7 +144,7 @@ class _Grid:
 
     def checklist(
         self, items: tuple[ChecklistItem, ...], scroll: int
-    ) -> tuple[Rect | None, int, tuple[Row, ...]]:
+    ) -> tuple[Rect | None, int, tuple[ListRow, ...]]:
         """Rectangle of the task list, its first row and the rows it shows; never more than fit."""
         if not items:
             return None, 0, ()
@@ -198,14 +160,14 @@ class _Grid:
         height = fixed + sum(heights[first:stop])
         return Rect(self.margin, self._top, self._list_width, height), first, rows[first:stop]
 
-    def _list_row(self, item: ChecklistItem) -> Row:
+    def _list_row(self, item: ChecklistItem) -> ListRow:
         """More lines of detail where one is too short for what is still to be done."""
         taken = 2 * theme.PADDING + 2 + theme.TILE + theme.GAP + (0 if item.number is None else theme.NUMBER)
         if item.target_picture is not None:
             taken += theme.TARGET + 3
         width = self._list_width - self._px(taken)
         detail = self._typeface.paragraph(item.detail, theme.DETAIL, width, 2 if item.done else 4)
-        return Row(self._px(theme.ROW + theme.LINE * max(0, len(detail) - 1)), width, detail)
+        return ListRow(self._px(theme.ROW + theme.LINE * max(0, len(detail) - 1)), width, detail)
 
     def minimap(self, minimap: MiniMap | None) -> Rect | None:
         """As wide as the list of bins, in the lower right corner, in the proportions of the house."""
@@ -217,7 +179,9 @@ class _Grid:
         height = min(max(inner, 1), self._px(theme.MAX_MAP_HEIGHT)) + inset
         return Rect(self._bins_left, self._height - self.margin - height, self._bins_width, height)
 
-    def bins(self, entries: tuple[BinEntry, ...], below: Rect | None) -> tuple[Rect | None, tuple[Row, ...]]:
+    def bins(
+        self, entries: tuple[BinEntry, ...], below: Rect | None
+    ) -> tuple[Rect | None, tuple[ListRow, ...]]:
         """Rectangle of the list of bins and its rows; places get fewer lines when many bins must fit."""
         if not entries:
             return None, ()
@@ -225,14 +189,14 @@ class _Grid:
         room = self._column_height if below is None else below.y - self._gap - self._top
         width = self._bins_width - px(2 * theme.PADDING + theme.BIN_TILE + theme.GAP)
         fixed = px(theme.HEADER) + px(theme.PADDING)
-        rows: tuple[Row, ...] = ()
+        rows: tuple[ListRow, ...] = ()
         for lines in (3, 2, 1, 0):
             places = [
                 self._typeface.paragraph(b.place, theme.DETAIL, width, lines) if lines else ()
                 for b in entries
             ]
             heights = [px(max(theme.BIN_TILE, theme.LINE * (1 + len(p))) + theme.GAP) for p in places]
-            rows = tuple(Row(height, width, place) for height, place in zip(heights, places, strict=True))
+            rows = tuple(ListRow(height, width, place) for height, place in zip(heights, places, strict=True))
             if fixed + sum(heights) <= room:
                 break
         while len(rows) > 1 and fixed + sum(row.height for row in rows) > room:

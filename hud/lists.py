@@ -27,7 +27,7 @@ def bins(view: TaskView) -> tuple[BinEntry, ...]:
 
 
 def inventory(view: TaskView) -> tuple[InventorySlot | None, InventorySlot]:
-    """What the left and the right hand hold; who carries one object at most does so in the right one."""
+    """Contents of the left and the right hand; at a capacity of one, only the right hand carries."""
     left, right = (
         InventorySlot() if name is None else InventorySlot(view.object(name).label, view.object(name).picture)
         for name in view.hands

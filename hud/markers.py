@@ -29,16 +29,9 @@ SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
 
 
 def breadcrumbs(path: NDArray[np.float64], clearance: float = 0.0) -> tuple[Marker, ...]:
-    """Spheres along a floor path, from chest height at its start down to the floor at its end (PAPER section 5).
+    """Spheres along a floor path (k, 2), m, from chest height down to the floor at its end (PAPER section 5).
 
-    They are counted back from the end, where the last one lies on the floor.
-
-    Args:
-        path: Floor polyline to the goal, m, shape (k, 2).
-        clearance: How much of the path is left empty at its start, m.
-
-    Returns:
-        Markers in order to the goal: one at least.
+    They are counted back from the end; the first `clearance` m of the path stay empty.
     """
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
@@ -69,18 +62,9 @@ def rims(crumbs: tuple[Marker, ...]) -> tuple[Marker, ...]:
 def flagpole(
     position: Vec3, *, object: str | None = None, low: bool = False, x_ray: bool = False
 ) -> tuple[Marker, ...]:
-    """A pole with a flag, clear above an object and 1.2 m tall.
+    """A pole with a flag above an object, 1.2 m tall, banded so that it stands out from any background.
 
-    A low one has half the height and no flag: for objects so near that a flag would fill the view.
-
-    Pole and flag are banded light and dark, so that they stand out from light walls and from dark floors, also for
-    people with colour-vision deficiencies.
-
-    Args:
-        position: Of the object, m.
-        object: Instance name of the object.
-        low: Half the height and no flag.
-        x_ray: Whether the pole also shows faintly through walls.
+    A low one has half the height and no flag; an x-ray one also shows faintly through walls.
     """
     x, y, z = position
     foot, top = z + 0.25, z + (0.85 if low else 1.45)

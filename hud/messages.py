@@ -46,17 +46,7 @@ GENERIC: Final = MappingProxyType({"object": "object", "receptacle": "right bin"
 def message(
     key: str, *, object: str | None = None, receptacle: str | None = None, opacity: float = 1.0
 ) -> Message:
-    """The message for an event or a refusal.
-
-    Args:
-        key: Value of the event or refusal ("picked", "hands_full").
-        object: Label of the object concerned, if any.
-        receptacle: Label of the receptacle concerned, if any.
-        opacity: 1 opaque, 0 gone; see `fade`.
-
-    Raises:
-        MessageError: No such key.
-    """
+    """The message for an event or a refusal ("picked", "hands_full"), with labels of the object and the receptacle."""
     if key not in TEXTS:
         raise MessageError(f"no message {key!r}; there are {', '.join(TEXTS)}")
     kind, template = TEXTS[key]

@@ -4,7 +4,7 @@ import math
 
 from hud import theme
 from hud.canvas import Canvas, Patch, Rect
-from hud.layout import Row
+from hud.layout import ListRow
 from hud.state import BinEntry, InventorySlot, MessageKind
 from hud.stencils import Stencils
 from hud.text import ELLIPSIS
@@ -13,9 +13,9 @@ POINTER_STEPS = 72  # drawn directions of the pointer, 5 degrees apart
 
 
 def draw_bins(
-    stencils: Stencils, rect: Rect, bins: tuple[BinEntry, ...], rows: tuple[Row, ...], hidden: int
+    stencils: Stencils, rect: Rect, bins: tuple[BinEntry, ...], rows: tuple[ListRow, ...], hidden: int
 ) -> Patch:
-    """The list of bins: picture, name and place; how many are hidden stands beside the title."""
+    """The list of bins: picture, name and place; the title says how many are hidden."""
     canvas = Canvas.panel(stencils, rect)
     px = canvas.px
     x = px(theme.PADDING + 2)

@@ -16,22 +16,16 @@ NEAR = 1e-6  # m; nearer than this along the view direction counts as behind the
 class CameraView:
     """A pinhole camera with square pixels and its principal point at the centre of the image.
 
-    Attributes:
-        position: Eye, m, shape (3,).
-        rotation: Columns right, up and backward (the camera looks along minus the third), shape (3, 3).
-        fovy: Vertical field of view, rad.
-        width: Image width, px.
-        height: Image height, px.
-
     Raises:
         FrameError: A shape or a number is unusable.
     """
 
-    position: NDArray[np.float64]
+    position: NDArray[np.float64]  # eye, m, (3,)
+    # columns right, up and backward (the camera looks along minus the third), (3, 3)
     rotation: NDArray[np.float64]
-    fovy: float
-    width: int
-    height: int
+    fovy: float  # vertical field of view, rad
+    width: int  # image width, px
+    height: int  # image height, px
 
     def __post_init__(self) -> None:
         if np.shape(self.position) != (3,) or np.shape(self.rotation) != (3, 3):
@@ -59,15 +53,9 @@ class CameraView:
 
 
 def project(camera: CameraView, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Pixels at which points appear.
+    """Pixels (n, 2) at which points (n, 3), m, appear, NaN behind the eye, and their depths along the view, m, (n,).
 
-    Args:
-        camera: The camera.
-        points: House frame, m, shape (n, 3).
-
-    Returns:
-        Pixels (x right, y down; the image spans 0..width and 0..height), shape (n, 2), NaN behind the eye,
-        and depths along the view direction, m, shape (n,).
+    x is to the right and y down; the image spans 0..width and 0..height.
     """
     local = camera.to_eye(np.reshape(np.asarray(points, dtype=np.float64), (-1, 3)))
     depth = local[:, 2]
@@ -90,16 +78,7 @@ def in_view(camera: CameraView, point: Vec3, margin: float = 0.0) -> bool:
 
 
 def pointer_to(camera: CameraView, target: Vec3, margin: float = 0.02) -> Pointer | None:
-    """A pointer at the edge of the view; turning that way brings a target into view.
-
-    Args:
-        camera: The eye camera.
-        target: House frame, m.
-        margin: Share of the image's height from its edge within which the target counts as out of view.
-
-    Returns:
-        None when the target is in view already.
-    """
+    """A pointer at the edge of the view towards a target, m; None if that is in view, `margin` from the edge."""
     if in_view(camera, target, margin):
         return None
     right, up, forward = (float(v) for v in camera.to_eye(target))

@@ -140,7 +140,7 @@ class HudState:
         inventory: Left and right hand; no left one for a person who carries one object at most.
         message: Message bar, or None.
         markers: World-locked objects.
-        rerouted: Whether the breadcrumbs start at the person and lead anew when the person leaves them.
+        rerouted: Whether the breadcrumbs start at the person and are replaced when the person leaves them.
         delivered: How many objects are in their receptacle.
         total: How many there are.
         clock: Elapsed task time to show, s, or None.

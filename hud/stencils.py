@@ -36,12 +36,7 @@ class Scaled(NamedTuple):
 
 
 class Stencils:
-    """Text and pictures at one scale.
-
-    Args:
-        pictures: RGBA pictures, uint8 (s, s, 4), straight alpha, by key. Must not change.
-        unit: Frame px per theme px.
-    """
+    """Text and RGBA pictures, uint8 (s, s, 4), straight alpha, by key, at `unit` frame px per theme px."""
 
     def __init__(self, pictures: Pictures, unit: float) -> None:
         self.pictures = pictures

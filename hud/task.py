@@ -174,11 +174,7 @@ class TaskView:
 
     @property
     def plan(self) -> tuple[TaskStep, ...]:
-        """Remaining steps in planned order, the next one first; empty without a planner.
-
-        Raises:
-            TaskViewError: A step is of no object of the task.
-        """
+        """Remaining steps in planned order, the next one first; empty without a planner."""
         self._check_steps(self.ahead.steps)
         return self.ahead.steps
 
@@ -187,19 +183,12 @@ class TaskView:
         """Shortest floor path from where the last step was done, or the start, to the next one, m, shape (k, 2).
 
         None when nothing is left to do.
-
-        Raises:
-            TaskViewError: It has another shape, or is not finite.
         """
         return _checked_path("segment", self.ahead.segment)
 
     @property
     def path(self) -> NDArray[np.float64] | None:
-        """As `segment`, but from where the person is, and anew when the person leaves it.
-
-        Raises:
-            TaskViewError: As for `segment`.
-        """
+        """As `segment`, but from the person, and replaced when the person leaves it."""
         return _checked_path("path", self.ahead.path)
 
     @property
@@ -208,19 +197,11 @@ class TaskView:
         return self.ahead.goal
 
     def object(self, name: str) -> TaskObject:
-        """The object called `name`.
-
-        Raises:
-            TaskViewError: There is none.
-        """
+        """The object called `name`; a TaskViewError where there is none."""
         return _named("object", {o.name: o for o in self.objects}, name)
 
     def receptacle(self, key: str) -> TaskReceptacle:
-        """The receptacle called `key`.
-
-        Raises:
-            TaskViewError: There is none.
-        """
+        """The receptacle called `key`; a TaskViewError where there is none."""
         return _named("receptacle", {r.key: r for r in self.receptacles}, key)
 
     def _check_steps(self, steps: tuple[TaskStep, ...]) -> None:

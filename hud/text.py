@@ -13,11 +13,7 @@ BUILT_IN_FONT = "sans"
 
 
 class Typeface:
-    """OpenCV's built-in variable sans font at one scale.
-
-    Args:
-        unit: Frame px per theme px; faces are in theme px, widths in frame px.
-    """
+    """OpenCV's built-in variable sans font at `unit` frame px per theme px."""
 
     def __init__(self, unit: float) -> None:
         self._unit = unit
@@ -78,11 +74,7 @@ class Typeface:
         return tuple(broken)
 
     def rasterise(self, text: str, face: Face) -> tuple[NDArray[np.uint8], int]:
-        """Coverage of a line of text, and its baseline's row in it.
-
-        Returns:
-            Mask (h, w), 0 outside and 255 inside the glyphs, with one empty column on the left, and the row.
-        """
+        """Mask (h, w) of a line of text, 0 to 255, with an empty column on the left, and the row of its baseline."""
         size = max(1, self.px(face.size))
         baseline = size + size // 4
         mask = np.zeros((baseline + size // 2, self.width(text, face) + size), dtype=np.uint8)

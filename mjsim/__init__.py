@@ -10,13 +10,14 @@ simulator. The Gymnasium environment is `gymnasium.make("mjsim.environments:mjsi
     step = world.step(mjsim.Move(forward=1.0))
 """
 
-from typing import TYPE_CHECKING
+TYPE_CHECKING = False  # as in `typing`, whose import would take most of the time of this one
 
 __all__ = [
     "IDLE",
     "ActionResult",
     "Catalogue",
     "Episode",
+    "FollowPath",
     "MjsimError",
     "Move",
     "Observation",
@@ -26,6 +27,8 @@ __all__ = [
     "Refusal",
     "Scene",
     "StepResult",
+    "Stop",
+    "Wait",
     "World",
     "WorldOptions",
     "compose",
@@ -35,7 +38,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
+    from mjsim.actions import IDLE, ActionResult, FollowPath, Move, Pick, Place, Refusal, Stop, Wait
     from mjsim.environments.dm_environment import make
     from mjsim.episode import Episode
     from mjsim.errors import MjsimError
@@ -49,7 +52,7 @@ if TYPE_CHECKING:
     from mjsim.world import StepResult, World
 else:  # hidden from type checkers, which would otherwise accept any name
     _MODULES = {
-        "actions": ("IDLE", "ActionResult", "Move", "Pick", "Place", "Refusal"),
+        "actions": ("IDLE", "ActionResult", "FollowPath", "Move", "Pick", "Place", "Refusal", "Stop", "Wait"),
         "environments.dm_environment": ("make",),
         "episode": ("Episode",),
         "errors": ("MjsimError",),

@@ -11,7 +11,7 @@ def main() -> int:
     if hidden := hidden_package("experiments"):
         print(f"mjsim: {hidden}", file=sys.stderr)
         return 1
-    return int(importlib.import_module("experiments.cli").main())
+    return int(importlib.import_module("experiments.cli.main").main())
 
 
 if __name__ == "__main__":

@@ -4,7 +4,12 @@ import enum
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mjsim.errors import ActionError
+
+TIME_TOLERANCE = 1e-6  # s; times are sums of many steps, and no decision may depend on their rounding
 
 
 @dataclass(frozen=True)
@@ -55,9 +60,53 @@ class Place:
     object: str | None = None
 
 
-Action = Move | Pick | Place
+@dataclass(frozen=True, eq=False)
+class FollowPath:
+    """Walk along a path, pass objects on the floor, face the goal at its end, and pick or place there.
+
+    Attributes:
+        points: Floor polyline, m, shape (k, 2), k >= 1.
+        goal: Where the walk leads, m, shape (2,): an object or a receptacle may be beside the end of the path.
+        stop_distance: How near to the goal the walk ends, m; it also ends with the path.
+        then: The action at the end, once the person faces the goal; None to do nothing and face nothing.
+        until: Simulated time at which to stop, s; None for the end of the walk.
+        shown: Whether the path is shown by the HUD, which cuts off the part behind the person.
+        tolerance: Distance from the path at which to stop, m.
+
+    Raises:
+        ActionError: The points have another shape.
+    """
+
+    points: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    stop_distance: float
+    then: Pick | Place | None = None
+    until: float | None = None
+    shown: bool = False
+    tolerance: float = 0.4
+
+    def __post_init__(self) -> None:
+        shape = np.shape(self.points)
+        if len(shape) != 2 or shape[1] != 2 or shape[0] < 1:
+            raise ActionError(f"the points of a path must have the shape (n, 2) with n >= 1, got {shape}")
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Stand still until the pick or place under way has ended; without one, for a time.
+
+    Attributes:
+        until: Simulated time at which to stop, s; None for one control step.
+    """
+
+    until: float | None = None
+
+
+StepAction = Move | Pick | Place  # takes one control step
+Action = StepAction | FollowPath | Wait
 
 IDLE = Move()
+WAIT = Wait()
 
 
 class Refusal(enum.Enum):
@@ -94,7 +143,7 @@ class ActionResult:
 
     @property
     def applied(self) -> bool:
-        """Whether the motion was begun."""
+        """Whether the motion was started."""
         return self.refusal is None
 
 
@@ -111,18 +160,22 @@ class EventKind(enum.Enum):
     TUNNELLED = "tunnelled"
 
 
+class Stop(enum.Enum):
+    """Why an action stopped."""
+
+    DONE = "done"  # complete: the control step, the wait, or the motion that was waited for
+    ARRIVED = "arrived"  # at the end of the path; the next step does what is to be done there
+    BLOCKED = "blocked"  # the walk makes no progress
+    CHANGED = "changed"  # the person has left the path, or an object has moved
+    EVENT = "event"  # something happened
+    DUE = "due"  # the time is up, or the limit of control steps is reached
+
+
 @dataclass(frozen=True)
 class WorldEvent:
-    """One physical outcome.
+    """One physical outcome."""
 
-    Attributes:
-        time: Simulated time, s.
-        kind: What happened.
-        object: Instance name of the object concerned.
-        receptacle: Receptacle concerned, if any.
-    """
-
-    time: float
-    kind: EventKind
-    object: str
-    receptacle: str | None = None
+    time: float  # simulated time, s
+    kind: EventKind  # what happened
+    object: str  # instance name of the object concerned
+    receptacle: str | None = None  # receptacle concerned, if any

@@ -20,29 +20,17 @@ DISTRIBUTIONS = ("mujoco", "dm-control", "numpy", "ortools", "opencv-python-head
 
 @dataclass(frozen=True)
 class EnvironmentReport:
-    """Versions, conflicts and graphics of this machine.
+    """Versions, conflicts and graphics of this machine."""
 
-    Attributes:
-        python: Version of the interpreter.
-        platform: Operating system and processor.
-        versions: Distribution -> version, or None where it is not installed.
-        hidden: What to do about packages of ours that other software hides.
-        cache: Where compiled code is kept, and how much there is.
-        egl_vendors: Names of the EGL vendor files found.
-        gl: What draws, or None where no context can be made.
-        problem: Why there is no context, or None.
-        advice: What to do, one step per entry; empty where nothing is amiss.
-    """
-
-    python: str
-    platform: str
-    versions: Mapping[str, str | None]
-    hidden: tuple[str, ...]
-    cache: str
-    egl_vendors: tuple[str, ...]
-    gl: "GlInfo | None"
-    problem: str | None
-    advice: tuple[str, ...]
+    python: str  # version of the interpreter
+    platform: str  # operating system and processor
+    versions: Mapping[str, str | None]  # distribution -> version, or None where it is not installed
+    hidden: tuple[str, ...]  # what to do about packages of ours that other software hides
+    cache: str  # where compiled code is kept, and how much there is
+    egl_vendors: tuple[str, ...]  # names of the EGL vendor files found
+    gl: "GlInfo | None"  # what draws, or None where no context can be made
+    problem: str | None  # why there is no context, or None
+    advice: tuple[str, ...]  # what to do, one step per entry; empty where nothing is amiss
 
     @property
     def usable(self) -> bool:
@@ -64,11 +52,7 @@ class EnvironmentReport:
 
 
 def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport:
-    """Look at this machine; makes an OpenGL context if that is possible.
-
-    Args:
-        vendor_folder: Where the vendor-neutral dispatch library looks for EGL drivers.
-    """
+    """Look at this machine and its folder of EGL drivers; makes an OpenGL context if that is possible."""
     gl: GlInfo | None = None
     problem: str | None = None
     try:

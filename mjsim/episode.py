@@ -28,23 +28,14 @@ class StartPose:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """A misplaced object at rest on the floor.
+    """A misplaced object at rest on the floor."""
 
-    Attributes:
-        name: Instance name, unique in the episode (`object_07`).
-        category: Category key in the catalogue (`dishes`).
-        model: Object model key in the catalogue (`mug`).
-        point: The sampled navigable point (x, y), m, where it was dropped.
-        position: Settled origin, m.
-        quaternion: Settled orientation, wxyz.
-    """
-
-    name: str
-    category: str
-    model: str
-    point: tuple[float, float]
-    position: tuple[float, float, float]
-    quaternion: tuple[float, float, float, float]
+    name: str  # instance name, unique in the episode (`object_07`)
+    category: str  # category key in the catalogue (`dishes`)
+    model: str  # object model key in the catalogue (`mug`)
+    point: tuple[float, float]  # the sampled navigable point (x, y), m, where it was dropped
+    position: tuple[float, float, float]  # settled origin, m
+    quaternion: tuple[float, float, float, float]  # settled orientation, wxyz
 
 
 @dataclass(frozen=True)
@@ -105,11 +96,11 @@ class Episode:
             found = msgspec.json.decode(text, type=_Header).format
             if found != FORMAT_VERSION:
                 raise EpisodeError(
-                    f"episode format {found!r} is not {FORMAT_VERSION}; sample it anew with this version"
+                    f"episode format {found!r} is not {FORMAT_VERSION}; sample it again with this version"
                 )
             return msgspec.json.decode(text, type=cls)
         except msgspec.ValidationError as error:
-            raise EpisodeError(f"episode is malformed: {error}; sample it anew") from error
+            raise EpisodeError(f"episode is malformed: {error}; sample it again") from error
         except (msgspec.DecodeError, RecursionError) as error:
             raise EpisodeError(f"episode is not JSON: {error}") from error
 

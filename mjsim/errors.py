@@ -13,6 +13,8 @@
 Every message names the offending value and what to do about it.
 """
 
+from typing import Any
+
 
 class MjsimError(Exception):
     """Base of every error raised by :mod:`mjsim`."""
@@ -39,7 +41,13 @@ class PersonError(MjsimError):
 
 
 class PhysicsError(MjsimError):
-    """MuJoCo warned, or a state is not finite."""
+    """MuJoCo warned, or a state is not finite.
+
+    Attributes:
+        steps: The control steps of the action (`mjsim.steps.Steps`), the last of which failed; None before it.
+    """
+
+    steps: Any = None
 
 
 class StateError(MjsimError):

@@ -10,14 +10,9 @@ LEFT, RIGHT = 0, 1
 
 @dataclass(frozen=True)
 class Inventory:
-    """What the left and the right hand hold: an instance name or None.
+    """Contents of the left and the right hand: an instance name or None; with `capacity` 1, the right hand does all.
 
-    Attributes:
-        left, right: Contents.
-        capacity: How many objects are carried at most, 1 or 2; with 1, the right hand does all.
-
-    Raises:
-        ActionError: Both hands are said to hold the same object.
+    `ActionError` where both hands would hold the same object.
     """
 
     left: str | None = None
@@ -49,11 +44,7 @@ class Inventory:
         return self.hands.index(name) if name in self.hands else None
 
     def take(self, hand: int, name: str) -> "Inventory":
-        """With `name` in `hand`.
-
-        Raises:
-            ActionError: The hand is full, or the other hand already holds `name`.
-        """
+        """With `name` in `hand`; `ActionError` where it is full, or the other hand already holds `name`."""
         if self.hands[hand] is not None:
             raise ActionError(
                 f"hand {hand} already holds {self.hands[hand]!r}; release it before taking {name!r}"
@@ -61,11 +52,7 @@ class Inventory:
         return replace(self, left=name) if hand == LEFT else replace(self, right=name)
 
     def release(self, name: str) -> "Inventory":
-        """Without `name`.
-
-        Raises:
-            ActionError: Neither hand holds `name`.
-        """
+        """Without `name`; `ActionError` where neither hand holds it."""
         hand = self.hand_of(name)
         if hand is None:
             raise ActionError(f"no hand holds {name!r}; the hands hold {self.hands}")

@@ -1,6 +1,6 @@
-"""How numeric kernels are compiled: with numba, and kept on disk where that is possible.
+"""Compilation of numeric kernels with numba, cached on disk where a folder is writable; for all four packages.
 
-The planner and the experiments use this module too. It is the one thing that they share with mjsim below them.
+It imports nothing of mjsim, and numba only once a kernel is declared.
 """
 
 import functools
@@ -9,11 +9,10 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
 from platformdirs import user_cache_path
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -30,48 +29,49 @@ _IMPORT = re.compile(r"^from ((?:mjsim|planner|experiments)[\w.]*) import (\([^)
 def kernel(function: F) -> F:
     """Compile a function at its first call; a later process loads the machine code from disk.
 
-    Where no cache folder is writable (no home, a full disk), each process compiles anew.
+    Where no cache folder is writable (no home, a full disk), each process compiles again.
     """
+    import numba
+
     return cast(F, _cached(functools.partial(numba.njit, **_OPTIONS), function))
 
 
 def inlined(function: F) -> F:
-    """Compile a function as a part of each kernel that calls it.
+    """Compile a function as a part of each kernel that calls it: for small ones that take many arrays."""
+    import numba
 
-    For small ones that are called often with many arrays: to hand these over takes as long as some hundred sums.
-    """
     return cast(F, numba.njit(forceinline=True, **_OPTIONS)(function))
 
 
 def c_function(signature: str, function: Callable[..., Any]) -> Any:
-    """Compile a function at once for callers in C; its `ctypes` is a pointer that lives as long as what is returned.
+    """Compile a function of numbers for callers in C, with types such as `float64(int64)`.
 
-    Args:
-        signature: Its types as numba writes them, such as `float64(int64)`.
-        function: Takes and returns numbers.
+    The `ctypes` of the result is a pointer that is valid for as long as the result exists.
     """
+    import numba
+
     return _cached(functools.partial(numba.cfunc, signature), function)
 
 
 def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
-    """What a compiler makes of a function, with the machine code on disk where that is possible."""
-    folder, chosen = cache_folder(Path(function.__code__.co_filename)), numba.config.CACHE_DIR
+    """Compile a function, with the machine code on disk where that is possible."""
+    from numba import config
+
+    folder, chosen = cache_folder(Path(function.__code__.co_filename)), config.CACHE_DIR
     if folder is not None:
-        numba.config.CACHE_DIR = str(
-            folder
-        )  # read when decorating; other packages' kernels keep their folder
+        config.CACHE_DIR = str(folder)  # read when decorating; kernels of other packages keep their folder
         try:
             return compiler(cache=True)(function)
-        except RuntimeError:  # how numba says that it cannot cache
+        except RuntimeError:  # numba cannot cache it
             pass
         finally:
-            numba.config.CACHE_DIR = chosen
+            config.CACHE_DIR = chosen
     return compiler()(function)
 
 
 def cache_base() -> Path:
-    """Where everything that can be computed again is kept: `NUMBA_CACHE_DIR`, else the user's cache folder."""
-    chosen = numba.config.CACHE_DIR
+    """Folder of all that can be computed again: `NUMBA_CACHE_DIR`, else the user's cache folder."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
     return Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
 
 
@@ -79,16 +79,12 @@ def cache_base() -> Path:
 def cache_folder(source: Path) -> Path | None:
     """Folder for the machine code of a module's kernels, None where none is writable.
 
-    It lies in `NUMBA_CACHE_DIR` where that is set, else in the user's cache folder. Its name holds a hash of this
-    module and of all that is compiled in: numba itself notices a change in a kernel's own file only, not in the
-    kernels that it calls.
+    Its name holds a digest of all that is compiled in: numba itself notices a change in a kernel's own file only, not
+    in the kernels that it calls.
     """
     base = cache_base()
-    digest = hashlib.sha256()
     try:
-        for path in sorted(_compiled_in(source) | {Path(__file__)}):
-            digest.update(path.read_bytes())
-        folder = base / f"mjsim-{source.stem}-{digest.hexdigest()[:16]}"
+        folder = base / f"mjsim-{source.stem}-{source_digest(_compiled_in(source) | {Path(__file__)})}"
         if not folder.is_dir():
             _delete_unused(base)
             folder.mkdir(parents=True, exist_ok=True)
@@ -96,6 +92,18 @@ def cache_folder(source: Path) -> Path | None:
     except OSError:
         return None
     return folder
+
+
+def source_digest(paths: Iterable[Path]) -> str:
+    """16 hex digits over the names and contents of source files, in the order of their paths.
+
+    Raises:
+        OSError: One of them cannot be read.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(paths):
+        digest.update(f"{path.name}\0".encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _compiled_in(source: Path) -> set[Path]:

@@ -120,7 +120,7 @@ GROUPS: dict[str, type[MotionParameters] | type[CarryingParameters] | type[Walki
     "walking": WalkingParameters,
 }
 
-# Whoever picks or places is done within 30 s.
+# A person of these ranges has picked or placed within 30 s.
 GROUP_RANGES: dict[str, tuple[float, float]] = {
     "motion.turn_timeout": (0.04, 4.0),
     "motion.look_gain": (0.01, 1.0),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from mjsim.episode import CAPACITY
 from mjsim.errors import ActionError
 
-FIDELITIES = ("full", "windows", "event")
+FIDELITIES = ("full", "event")
 CAPACITIES = (1, 2)
 REST_STEPS = 4  # control steps in a row below `settle_speed`, after which an object is at rest
 
@@ -24,13 +24,12 @@ class WorldOptions:
         settle_time: How long a released object may take to come to rest, s.
         settle_speed: Slower than this is at rest, m/s.
         volume_margin: How far outside of a receptacle's volume a centre still counts as inside, m.
-        fidelity: `full`, everything in physics; `windows`, physics while something is picked or placed, and
-            kinematic walking in between; `event`, kinematic except for the fall of released objects
+        fidelity: `full`, everything in physics; `event`, kinematic except for the fall of released objects
             (docs/fidelity.md).
         capacity: How many objects are carried at most: 2, or 1 with the right hand alone.
 
     Raises:
-        ActionError: A value is not a positive finite number, there is no such fidelity, or nobody has so many hands.
+        ActionError: A value is not a positive finite number, there is no such fidelity, or the capacity is not 1 or 2.
     """
 
     control_timestep: float = 0.04

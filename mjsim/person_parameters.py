@@ -39,7 +39,7 @@ class PersonParameters:
         reach: Farthest that an object's centre or a receptacle's volume may be from the body's axis, horizontally,
             to pick or place, m: an arm's length and a step of bending forward.
         body_radius: Radius of the trunk, m. Planned paths keep 0.05 m more from walls. Houses are sampled for a person
-            of the usual radius, so that one house serves all.
+            of the default radius, so that one house serves all.
         eye_height: m; standing adults have it at 1.4 to 1.75 m (Pheasant and Haslegrave, Bodyspace, 2006).
         field_of_view: Horizontal field of view of the picture and of what a participant perceives, rad. Vertically, a
             participant sees what a picture of 4:3 shows; the default is 70 degrees high there.
@@ -102,16 +102,16 @@ class PersonParameters:
         return values | {group: getattr(self, group)._asdict() for group in GROUPS}
 
     def unusual(self) -> str:
-        """The values that are not the usual person's, in words; empty if all are."""
-        usual = PersonParameters()
+        """The values that differ from the default person's, in words; empty if none does."""
+        default = PersonParameters()
         others = [
             (name, unit)
             for name, (_, _, unit) in RANGES.items()
-            if getattr(self, name) != getattr(usual, name)
+            if getattr(self, name) != getattr(default, name)
         ]
         words = [f"{name.replace('_', ' ')} {getattr(self, name):.4g} {unit}" for name, unit in others]
         for group in GROUPS:
-            changed = getattr(self, group)._asdict().items() - getattr(usual, group)._asdict().items()
+            changed = getattr(self, group)._asdict().items() - getattr(default, group)._asdict().items()
             words += [f"{name.replace('_', ' ')} {value:.4g}" for name, value in sorted(changed)]
         return ", ".join(words)
 
@@ -144,10 +144,10 @@ RANGES: dict[str, tuple[float, float, str]] = {
 
 def _check(name: str, value: object, low: float, high: float, unit: str) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        said = f"{name} must be {low:.4g} to {high:.4g} {unit}, got {value!r}"
+        message = f"{name} must be {low:.4g} to {high:.4g} {unit}, got {value!r}"
         if unit.startswith("rad") and isinstance(value, int | float) and low <= math.radians(value) <= high:
-            said += f"; {value:g} degrees are {math.radians(value):.4g} rad"
-        raise PersonError(said)
+            message += f"; {value:g} degrees are {math.radians(value):.4g} rad"
+        raise PersonError(message)
 
 
 def _checked(group: str, values: Any) -> Any:

@@ -1,51 +1,82 @@
 """The world: one person, one house, stepped at a fixed control rate."""
 
+import math
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mjsim.actions import Action, ActionResult, Pick, Place, WorldEvent
-from mjsim.errors import ActionError, PhysicsError, StateError
+from mjsim.actions import (
+    IDLE,
+    TIME_TOLERANCE,
+    Action,
+    ActionResult,
+    FollowPath,
+    Pick,
+    Place,
+    StepAction,
+    Stop,
+    Wait,
+    WorldEvent,
+)
+from mjsim.errors import PhysicsError, StateError
 from mjsim.fidelity import make_tier
-from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.health.values import Health, HealthSample
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
-from mjsim.rollout import Rollout
+from mjsim.steps import Steps
+from mjsim.walking.path_following import ARRIVED, BLOCKED, CHANGED
+from mjsim.walking.walker import BACK_OFF, Walker
 from mjsim.world_state import WorldState
+
+MAX_STEPS = 1000  # control steps of one action, unless another limit is given
+
+_STOPS = {ARRIVED: Stop.ARRIVED, BLOCKED: Stop.BLOCKED, CHANGED: Stop.CHANGED}
 
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """The result of one control step.
+    """The result of an action.
 
     Attributes:
-        observation: State after the step.
-        result: Answer to a pick or place, None for a move.
-        events: What happened in the physics during the step.
+        observation: State after the last control step.
+        result: Answer to a pick or place, None for the other actions.
+        events: What happened in the physics during the last control step; an event stops every action.
+        stopped: Why the action stopped.
+        steps: The control steps taken, and the states between them.
     """
 
     observation: Observation
     result: ActionResult | None
     events: tuple[WorldEvent, ...]
+    stopped: Stop
+    steps: Steps
 
 
 class World:
     """A running episode.
 
     During a pick or place (`Observation.busy`) a `Move` is ignored and another `Pick` or `Place` is refused. A
-    refused action leaves the world exactly as `IDLE` would.
+    refused action leaves the world exactly as `IDLE` would. How far the person has got along a path is no part of the
+    state: `restore` leaves it as it is, `reset` forgets it.
 
     Attributes:
         scene: The composed episode; its model is never modified.
         options: The rules, and how much of the world is physics (docs/fidelity.md).
     """
 
-    def __init__(self, scene: Scene, options: WorldOptions | None = None) -> None:
+    def __init__(
+        self, scene: Scene, options: WorldOptions | None = None, *, walls: ArrayLike | None = None
+    ) -> None:
         """Start at the beginning of the episode.
+
+        Args:
+            scene: The composed episode.
+            options: The rules; None for the usual ones.
+            walls: Outline of the floor on which a person who follows a path passes objects, ends x, y, x, y of its
+                edges, m, shape (e, 4); None if all of it is free.
 
         Raises:
             AssetError: The scene has no person, or an object lacks a grip site.
@@ -55,6 +86,8 @@ class World:
         self.options = options or WorldOptions()
         _check_timestep(scene.model, self.options.control_timestep)
         self._tier = make_tier(scene, self.options)
+        outline = np.zeros((0, 4)) if walls is None else np.ascontiguousarray(walls, np.float64)
+        self._walker = Walker(scene.person, outline)
         self.reset()
 
     @property
@@ -64,11 +97,11 @@ class World:
 
     @property
     def data(self) -> mujoco.MjData:
-        """The state, for rendering and rays; read-only. Get it anew after every step."""
+        """The state, for rendering and rays; read-only. Read it anew after every step."""
         return self._tier.data
 
     def copy_data(self, into: mujoco.MjData | None = None) -> mujoco.MjData:
-        """A copy of `data`, to draw while the world goes on; in one made before, where it is given."""
+        """A copy of `data`, to draw while the world is stepped; in an earlier copy, if it is given."""
         copied = mujoco.MjData(self.model) if into is None else into
         mujoco.mj_copyData(copied, self.model, self.data)
         return copied
@@ -94,13 +127,14 @@ class World:
         return self._tier.busy
 
     @property
-    def locomotion(self) -> LocomotionState | None:
-        """What walking depends on, for kernels of `mjsim.fidelity.kinematics`; None while physics moves the person."""
-        return self._tier.locomotion
+    def blocked(self) -> bool:
+        """Whether the path that is followed makes no progress; until the first step after backing off."""
+        return self._walker.blocked
 
     def reset(self) -> Observation:
         """Return to the episode's beginning; the same actions then lead to bit-identical states."""
         self._tier.reset()
+        self._walker.reset()
         return self._tier.observation()
 
     def state_hash(self) -> int:
@@ -134,15 +168,61 @@ class World:
             raise StateError(f"the state's details do not fit this version's worlds: {error}") from error
         return self._tier.observation()
 
-    def step(self, action: Action) -> StepResult:
-        """Advance by one control step.
+    def step(self, action: Action, limit: int = MAX_STEPS) -> StepResult:
+        """Carry out an action: one control step for `Move`, `Pick` and `Place`, up to `limit` for the others.
+
+        Args:
+            action: What the person does.
+            limit: How many control steps to take at most, 1 or more.
 
         Raises:
             ActionError: `action` is not an action.
-            PhysicsError: MuJoCo warned or the state is not finite; call `reset` before stepping on.
+            PhysicsError: MuJoCo warned or the state is not finite; call `reset` before the next step.
         """
-        result = self._tier.step(action)
-        return StepResult(self._tier.observation(), result, tuple(self._tier.episode_state.events))
+        if isinstance(action, FollowPath):
+            return self._follow(action, limit)
+        if isinstance(action, Wait):
+            return self._wait(action, limit)
+        return self._single_step(action)
+
+    def _single_step(self, action: StepAction, stopped: Stop = Stop.DONE) -> StepResult:
+        steps = Steps(action)
+        try:
+            result = self._tier.step(action)
+        except PhysicsError as error:
+            error.steps = steps
+            raise
+        return self._result(steps, stopped, result)
+
+    def _follow(self, action: FollowPath, limit: int) -> StepResult:
+        seen = self._tier.observation()
+        walk = self._walker.walk(action, seen)
+        if walk is None:
+            return self._single_step(BACK_OFF, Stop.BLOCKED)
+        if action.until is not None:
+            limit = self._steps_until(action.until, seen.time, limit)
+        phase, steps = self._tier.follow(walk, self._walker.progress, 1 if seen.busy else limit)
+        self._walker.note(phase, seen.time)
+        if steps is None:
+            return self._single_step(action.then or IDLE, Stop.ARRIVED)
+        return self._result(steps, _STOPS.get(phase, Stop.DUE))
+
+    def _wait(self, action: Wait, limit: int) -> StepResult:
+        if action.until is None:
+            limit = limit if self.busy else 1
+        else:
+            limit = self._steps_until(action.until, self._tier.time, limit)
+        steps = self._tier.wait(limit)
+        return self._result(steps, Stop.DUE if self.busy else Stop.DONE)
+
+    def _steps_until(self, time: float, now: float, limit: int) -> int:
+        """Control steps up to a time, s, at least 1 and at most `limit`."""
+        steps = (time - TIME_TOLERANCE - now) / self.control_timestep
+        return limit if steps >= limit else max(1, math.ceil(steps))
+
+    def _result(self, steps: Steps, stopped: Stop, result: ActionResult | None = None) -> StepResult:
+        events = tuple(self._tier.episode_state.events)
+        return StepResult(self._tier.observation(), result, events, Stop.EVENT if events else stopped, steps)
 
     def answer(self, action: Pick | Place) -> ActionResult:
         """What `step` would answer to a pick or place now; nothing changes.
@@ -151,33 +231,6 @@ class World:
             ActionError: `action` is neither.
         """
         return self._tier.answer(action)
-
-    def walk(self, moves: ArrayLike) -> Rollout:
-        """Take one control step per row, as `step(Move(*row))` would; stop early after a step with events.
-
-        Args:
-            moves: Columns forward, left (m/s), turn and look (rad/s), shape (n, 4).
-
-        Raises:
-            ActionError: A pick or place is under way, or the moves have another shape or are not finite.
-            PhysicsError: As in `step`.
-        """
-        rows = np.ascontiguousarray(moves, dtype=np.float64)
-        if self.busy:
-            raise ActionError("a pick or place is under way; `finish` it before walking")
-        if rows.ndim != 2 or rows.shape[1] != 4 or not np.isfinite(rows).all():
-            raise ActionError(f"moves must be finite numbers of shape (n, 4), got shape {rows.shape}")
-        return self._tier.walk(rows)
-
-    def finish(self) -> Rollout:
-        """Step with `IDLE` until no pick or place is under way; no step at all when none is.
-
-        Stops early after a step with events, as `walk` does. If the motion has not ended then, the world is still busy.
-
-        Raises:
-            PhysicsError: As in `step`.
-        """
-        return self._tier.finish()
 
     def observation(self) -> Observation:
         """The present state."""

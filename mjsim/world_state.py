@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from mjsim.errors import StateError
 from mjsim.health.monitor import HealthState
+from mjsim.kernels import source_digest
 from mjsim.observation import ObjectStatus
 from mjsim.person.carrying import CarryingState
 from mjsim.person.grips import GripState
@@ -36,65 +37,38 @@ _HASHED = int(
 )
 # Looks only: textures, colours, the renderer's share of meshes and cameras. Names and paths do not matter either.
 _LOOKS = (
-    "tex_",
-    "mat_",
-    "light_",
-    "cam_",
-    "skin_",
-    "mesh_normal",
-    "mesh_texcoord",
-    "mesh_facenormal",
-    "name_",
-)
+    "tex_", "mat_", "light_", "cam_", "skin_", "mesh_normal", "mesh_texcoord", "mesh_facenormal", "name_",
+)  # fmt: skip
 _LOOKS_ANYWHERE = ("rgba", "matid", "facetexcoord", "texcoord", "path", "names_map", "signature")
 _NO_PHYSICS = ("render", "environments")  # folders of this package that no state depends on
 
 
 @dataclass(frozen=True, eq=False)
 class PersonState:
-    """Commands, grips and compliance of the person where physics moves it.
+    """Commands, grips and compliance of the person where physics moves it."""
 
-    Attributes:
-        rig: Commands of the servos.
-        grips: Object and grip in each hand.
-        carrying: Compliance offsets and strain of the hands.
-        hand_velocities: Of the hands' targets, m/s, shape (2, 3).
-    """
-
-    rig: RigState
-    grips: GripState
-    carrying: CarryingState
-    hand_velocities: NDArray[np.float64]
+    rig: RigState  # commands of the servos
+    grips: GripState  # object and grip in each hand
+    carrying: CarryingState  # compliance offsets and strain of the hands
+    hand_velocities: NDArray[np.float64]  # of the hands' targets, m/s, (2, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class StateDetails:
-    """The part of a world's state that is not physics.
+    """The part of a world's state that is not physics."""
 
-    Attributes:
-        hands: Object in the left and the right hand.
-        status: Status per object.
-        health: What the health monitor has accumulated.
-        person: The person's commands; None in a state without physics.
-    """
-
-    hands: tuple[str | None, str | None]
-    status: tuple[ObjectStatus, ...]
-    health: HealthState
-    person: PersonState | None
+    hands: tuple[str | None, str | None]  # object in the left and the right hand
+    status: tuple[ObjectStatus, ...]  # status per object
+    health: HealthState  # what the health monitor has accumulated
+    person: PersonState | None  # the person's commands; None in a state without physics
 
 
 @dataclass(frozen=True, eq=False)
 class WorldState:
-    """The complete state of a world between two motions.
+    """The complete state of a world between two motions."""
 
-    Attributes:
-        physics: MuJoCo's integration state, or that of a world without physics, shape (n,).
-        details: Everything else.
-    """
-
-    physics: NDArray[np.float64]
-    details: StateDetails
+    physics: NDArray[np.float64]  # MuJoCo's integration state, or that of a world without physics, (n,)
+    details: StateDetails  # everything else
 
     @property
     def hash(self) -> int:
@@ -107,11 +81,7 @@ class WorldState:
 
     @classmethod
     def from_json(cls, physics: NDArray[np.float64], details: str) -> "WorldState":
-        """The state of `physics`, shape (n,), and of what `details_json` gave.
-
-        Raises:
-            StateError: `details` is something else.
-        """
+        """The state of `physics`, shape (n,), and of what `details_json` gave; `StateError` for anything else."""
         try:
             values = json.loads(details)
             return cls(physics, msgspec.convert(values, StateDetails, dec_hook=lambda _, a: np.array(a)))
@@ -152,8 +122,7 @@ def take_physics(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float
 def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.float64]) -> None:
     """Reset the data and set it to a state of `take_physics`, shape (n,), whatever it was before.
 
-    Raises:
-        StateError: The state is of another model, or not finite.
+    `StateError` where the state is of another model, or not finite.
     """
     size = mujoco.mj_stateSize(model, _STATE)
     if physics.shape != (size,) or not np.isfinite(physics).all():
@@ -209,8 +178,4 @@ def _own_version() -> str:
 def _code_fingerprint() -> str:
     """16 hex digits over the source of this package, since a version may span many changes."""
     root = Path(__file__).parent
-    digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        if path.relative_to(root).parts[0] not in _NO_PHYSICS:
-            digest.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
+    return source_digest(p for p in root.rglob("*.py") if p.relative_to(root).parts[0] not in _NO_PHYSICS)

@@ -22,20 +22,14 @@ class Proof(enum.Enum):
 
 @dataclass(frozen=True)
 class Certificate:
-    """A claim about the shortest tour, in whole units of length and the metric of distances rounded to these.
+    """A claim about the shortest tour, in whole units of length and the metric of distances rounded to these."""
 
-    Attributes:
-        proof: How the bound was found.
-        unit: m per unit.
-        root: What the proof gives without any search, units: the relaxation at the start of the tour, the length of
-            the spanning tree, the optimum by the table or by trying all. Up to here it takes no search to check. Where
-            a plan's lower bound is higher, it rests on the solver's search being complete.
-        groups: Shipments that the relaxation counts together, each in one group.
-        multipliers: Price of picking each shipment in the relaxation, units.
-    """
-
-    proof: Proof
-    unit: float
+    proof: Proof  # how the bound was found
+    unit: float  # m per unit
+    # bound that the proof gives without a search, units: the optimum by the table or by trying all, the
+    # relaxation at the start of the tour, the length of the spanning tree. A plan's lower bound that is higher
+    # rests on the solver's search being complete.
     root: int
+    # shipments that the relaxation counts together, each in one group
     groups: tuple[tuple[int, ...], ...] = ()
-    multipliers: tuple[int, ...] = ()
+    multipliers: tuple[int, ...] = ()  # price of picking each shipment in the relaxation, units

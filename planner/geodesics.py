@@ -21,15 +21,11 @@ MAX_REMEMBERED = (
 
 @dataclass(frozen=True, eq=False)
 class ShortestPath:
-    """A shortest path.
+    """A shortest path."""
 
-    Attributes:
-        points: Corners from one end to the other, (k, 2) with k >= 2, m. Ends are snapped if need be.
-        geodesic_distance: Length, m.
-    """
-
+    # corners from one end to the other, (k, 2) with k >= 2, m. Ends are snapped if need be.
     points: NDArray[np.float64]
-    geodesic_distance: float
+    geodesic_distance: float  # length, m
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +43,10 @@ class Geodesics:
 
     A point that is not navigable stands for the nearest point of the largest island (`NavMesh.snap`); the gap
     to it does not count as distance. A navigable point on a smaller island stays there.
-
-    Attributes:
-        navmesh: Where one may walk.
-        max_snap: How far away that nearest point may lie, m.
     """
 
-    navmesh: NavMesh
-    max_snap: float = 1.0
+    navmesh: NavMesh  # where one may walk
+    max_snap: float = 1.0  # how far away that nearest point may lie, m
     _graph: VisibilityGraph = field(init=False, repr=False)
     _remembered: dict[tuple[float, float], tuple[NDArray[np.int32], NDArray[np.float64]]] = field(
         init=False, repr=False, default_factory=dict
@@ -64,12 +56,7 @@ class Geodesics:
         object.__setattr__(self, "_graph", VisibilityGraph.build(self.navmesh))
 
     def shortest_path(self, a: ArrayLike, b: ArrayLike) -> ShortestPath:
-        """The shortest path from a to b, each (2,), m.
-
-        Raises:
-            NotNavigableError: No navigable point lies within `max_snap` of an end.
-            UnreachableError: The ends lie on different islands.
-        """
+        """The shortest path from a to b, each (2,), m; raises as `distances`."""
         points, islands = self._locate([np.asarray(a, np.float64), np.asarray(b, np.float64)])
         straight = float(direct_distances(points[:1], points[1:], self._graph.walls)[0, 0])
         if np.isfinite(straight) and islands[0] == islands[1]:
@@ -94,23 +81,13 @@ class Geodesics:
         return result
 
     def distances_from(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
-        """Geodesic distances from one point (2,) to points (m, 2), m; (m,), m.
-
-        Raises:
-            NotNavigableError: No navigable point lies within `max_snap` of a point.
-            UnreachableError: Two points lie on different islands.
-        """
+        """Geodesic distances from one point (2,) to points (m, 2), m; (m,), m; raises as `distances`."""
         targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         between = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)
         return np.asarray(between[0])
 
     def distances_between(self, sources: ArrayLike, targets: ArrayLike) -> NDArray[np.float64]:
-        """Geodesic distances from points (s, 2) to points (t, 2), m; (s, t), m.
-
-        Raises:
-            NotNavigableError: No navigable point lies within `max_snap` of a point.
-            UnreachableError: Two points lie on different islands.
-        """
+        """Geodesic distances from points (s, 2) to points (t, 2), m; (s, t), m; raises as `distances`."""
         source, target = (self._query(*self._locate(points)) for points in (sources, targets))
         return self._between(source, target)
 

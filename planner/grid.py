@@ -12,20 +12,13 @@ MARGIN = 1e-3  # m; a segment is listed in cells that it misses by less, so that
 
 
 class Frame(NamedTuple):
-    """Where a grid's cells lie: row r, column c spans x_min + [c, c + 1] resolution, y_min + [r, r + 1] resolution.
+    """Where a grid's cells lie: row r, column c spans x_min + [c, c + 1] resolution, y_min + [r, r + 1] resolution."""
 
-    Attributes:
-        x_min, y_min: Corner of the first cell, m.
-        resolution: Size of a cell, m.
-        rows: Number of cells along y.
-        columns: Number of cells along x.
-    """
-
-    x_min: float
+    x_min: float  # corner of the first cell, m
     y_min: float
-    resolution: float
-    rows: int
-    columns: int
+    resolution: float  # size of a cell, m
+    rows: int  # number of cells along y
+    columns: int  # number of cells along x
 
     @classmethod
     def covering(cls, bounds: tuple[float, float, float, float], resolution: float) -> "Frame":
@@ -50,19 +43,12 @@ class Frame(NamedTuple):
 
 
 class SegmentGrid(NamedTuple):
-    """Line segments, listed by the cells that they cross.
+    """Line segments, listed by the cells that they cross."""
 
-    Attributes:
-        frame: The grid.
-        segments: x, y of one end and of the other, m, (s, 4).
-        starts: First entry of each cell in `listed`, row by row, (rows * columns + 1,).
-        listed: Numbers of the segments in each cell.
-    """
-
-    frame: Frame
-    segments: NDArray[np.float64]
-    starts: NDArray[np.int64]
-    listed: NDArray[np.int64]
+    frame: Frame  # the grid
+    segments: NDArray[np.float64]  # x, y of one end and of the other, m, (s, 4)
+    starts: NDArray[np.int64]  # first entry of each cell in `listed`, row by row, (rows * columns + 1,)
+    listed: NDArray[np.int64]  # numbers of the segments in each cell
 
     @classmethod
     def build(cls, frame: Frame, segments: NDArray[np.float64]) -> "SegmentGrid":

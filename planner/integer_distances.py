@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 TOLERANCE = 1e-9  # share of its length by which an optimal tour may exceed the shortest one
-FINE = (
-    1 << 44
-)  # units of the largest distance where no coarser unit is exact; 2^62 / FINE legs cannot overflow
+FINE = 1 << 44  # units of the largest distance where no coarser unit is exact; 2^18 legs cannot overflow
 TIE = 1e-10  # share of the largest distance; tours closer than this may differ by rounding alone
 COARSE = 1 << 20  # units of the largest distance that leave tours of 40 objects within 32 bits
 ROUND = 1e-15  # share of the largest distance by which decimal fractions in binary are off
@@ -20,20 +18,13 @@ ROUND = 1e-15  # share of the largest distance by which decimal fractions in bin
 
 @dataclass(frozen=True, eq=False)
 class IntegerDistances:
-    """Distances of a problem in whole units.
+    """Distances of a problem in whole units."""
 
-    Attributes:
-        unit: m per unit.
-        tie: Tours that differ by no more than this are equal, units.
-        rounding: By how much a leg was rounded at most, units; 0 where the unit is exact.
-        used: Locations that tours visit.
-        legs: Distances, rounded, symmetric; those of locations that no tour visits are 0, (k, k).
-    """
-
-    unit: float
-    tie: int
-    rounding: float
-    used: Sequence[int]
+    unit: float  # m per unit
+    tie: int  # tours that differ by no more than this are equal, units
+    rounding: float  # by how much a leg was rounded at most, units; 0 where the unit is exact
+    used: Sequence[int]  # locations that tours visit
+    # distances, rounded, symmetric; those of locations that no tour visits are 0, (k, k)
     legs: NDArray[np.int64]
 
     @cached_property

@@ -18,8 +18,8 @@ from planner.tour import make_plan, possible_next, spanning_bound
 
 FIRST_SOLUTIONS = (1, 10)  # of the anytime form
 DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
-MANY = 250  # nodes; inserting more takes longer than it is worth
-LONGEST = 1e9  # s that OR-Tools can count
+MAX_INSERTED = 250  # nodes; inserting more takes longer than it is worth
+MAX_COUNTED = 1e9  # s that OR-Tools can count
 MAX_SECONDS = 60.0  # ends a search that is limited by work but finds no more solutions
 
 
@@ -33,15 +33,9 @@ class OrToolsSolver:
     name: str = "ortools"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Plan the rest of a task.
+        """Plan the rest of a task, within solutions or seconds, whichever comes first; the seed does not matter.
 
-        Args:
-            problem: What is left to do.
-            seed: Unused: the search is deterministic.
-            limit: Solutions or seconds, whichever comes first; by default 200 solutions.
-
-        Returns:
-            FEASIBLE with a spanning-tree bound, or OPTIMAL where every tour was tried (up to three objects).
+        FEASIBLE with a spanning-tree bound, or OPTIMAL where every tour was tried (up to three objects).
         """
         del seed
         started = time.perf_counter()
@@ -51,9 +45,7 @@ class OrToolsSolver:
             proof = Proof.EXHAUSTIVE
         else:
             bound, proof = spanning_bound(problem), Proof.SPANNING_TREE
-            if limit is None or limit == SolveLimit():
-                limit = SolveLimit(work=DEFAULT_SOLUTIONS)
-            visits = _search(problem, legs, limit, started)
+            visits = _search(problem, legs, _with_budget(limit), started)
         certificate = Certificate(proof, problem.integers.unit, bound)
         return make_plan(problem, legs, visits, bound, started, certificate)
 
@@ -62,17 +54,12 @@ class OrToolsSolver:
     ) -> Iterator[Plan]:
         """Yield the nearest-first tour at once, then the tours of searches of 1 solution, 10, and all.
 
-        The search starts anew each time; the short ones cost little beside the long one.
-
-        Args:
-            problem: What is left to do.
-            seed: Unused.
-            limit: As in `solve`; seconds count from the beginning.
+        The search starts anew each time; the short ones cost little compared with the long one.
         """
         started = time.perf_counter()
         best = GreedySolver().solve(problem)
         yield best
-        limit = SolveLimit(work=DEFAULT_SOLUTIONS) if limit is None or limit == SolveLimit() else limit
+        limit = _with_budget(limit)
         for work in (*(w for w in FIRST_SOLUTIONS if limit.work is None or w < limit.work), limit.work):
             left = None if limit.seconds is None else started + limit.seconds - time.perf_counter()
             if limit.stopped or (left is not None and left <= 0):
@@ -81,6 +68,12 @@ class OrToolsSolver:
             if plan.improves_on(best):
                 best = plan
                 yield best
+
+
+def _with_budget(limit: SolveLimit | None) -> SolveLimit:
+    """The limit, by default on solutions."""
+    limit = limit or SolveLimit()
+    return replace(limit, work=DEFAULT_SOLUTIONS) if limit.work is limit.seconds is None else limit
 
 
 def best_of_all(problem: RoutingProblem, distances: NDArray[np.int64]) -> tuple[list[Visit], int]:
@@ -116,7 +109,12 @@ def _search(
     costs[:, 0] = 0
     routing.SetArcCostEvaluatorOfAllVehicles(routing.RegisterTransitMatrix(costs.tolist()))
     _constrain(problem, manager, routing)
-    solution = routing.SolveWithParameters(_parameters(limit, started)) if count <= MANY else None
+    if limit.stop is not None:
+        stopped = routing.solver().CustomLimit(
+            limit.stop.is_set
+        )  # the search also lets other threads run there
+        routing.AddSearchMonitor(stopped)
+    solution = routing.SolveWithParameters(_parameters(limit, started)) if count <= MAX_INSERTED else None
     if solution is None:
         # Insertion places pairs before single nodes, which fails with full hands; or time ran out.
         greedy = nearest_first(problem)
@@ -166,5 +164,5 @@ def _parameters(limit: SolveLimit, started: float) -> object:
     seconds = MAX_SECONDS
     if limit.seconds is not None:
         seconds = limit.seconds - (time.perf_counter() - started)
-    parameters.time_limit.FromMilliseconds(max(1, round(min(seconds, LONGEST) * 1000)))
+    parameters.time_limit.FromMilliseconds(max(1, round(min(seconds, MAX_COUNTED) * 1000)))
     return parameters

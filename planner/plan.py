@@ -23,15 +23,10 @@ class VisitKind(enum.StrEnum):
 
 
 class Visit(NamedTuple):
-    """One step of a task.
+    """One step of a task."""
 
-    Attributes:
-        kind: Whether the object is picked, or placed where it belongs.
-        object: Name of the object.
-    """
-
-    kind: VisitKind
-    object: str
+    kind: VisitKind  # whether the object is picked, or placed where it belongs
+    object: str  # name of the object
 
 
 @dataclass(frozen=True)

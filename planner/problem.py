@@ -12,8 +12,8 @@ from planner.errors import ProblemError
 from planner.integer_distances import TOLERANCE, IntegerDistances, integer_distances
 from planner.plan import Visit, VisitKind
 
-SMALLEST, LARGEST = 1e-250, 1e250  # m; lengths and units of tours in between are ordinary floats
-ASYMMETRY = 1e-12  # share by which a distance may differ between both ways: rounding of whoever worked it out
+MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # m; lengths and units of tours in between are ordinary floats
+ASYMMETRY = 1e-12  # share by which a distance may differ between both ways: rounding alone
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class RoutingProblem:
         onboard: Delivery index of each object that is carried now.
         capacity: How many objects may be carried at once.
         names: Of the objects, in the order of their numbers; by default the numbers themselves.
-        resolution: Distances mean no more than this, m: they are rounded to it, and tours are equal that differ by the
-            rounding of their legs. None: they mean what they say, to 1e-9 of a tour's length.
+        resolution: Precision of the distances, m: they are rounded to it, and tours are equal that differ by the
+            rounding of their legs. None: distances are exact, and tours compared to 1e-9 of their length.
 
     Raises:
         ProblemError: Not square, negative, not finite, of a scale beyond computing, asymmetric, an index out of range,
@@ -134,9 +134,9 @@ class RoutingProblem:
         if not self.used or not distances.any():
             return
         largest = float(distances.max())
-        if not SMALLEST <= largest <= LARGEST:
+        if not MIN_LARGEST <= largest <= MAX_LARGEST:
             raise ProblemError(
-                f"the largest distance is {largest} m; choose a unit in which it is {SMALLEST} to {LARGEST}"
+                f"the largest distance is {largest} m; choose a unit in which it is {MIN_LARGEST} to {MAX_LARGEST}"
             )
         legs = len(self.shipments) + len(self.names) + 2
         if self.resolution is not None and not 0 < largest * legs / 2**52 <= self.resolution < math.inf:

@@ -1,6 +1,7 @@
-"""The relaxation of a certificate filled anew in plain numpy, without the solvers' code."""
+"""The relaxation of a certificate in plain numpy: its table, and every state that its bound cannot leave out."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,43 +9,11 @@ from numpy.typing import NDArray
 from planner.errors import ProblemError
 from planner.problem import RoutingProblem
 
-LARGE = 100  # prices beyond so many times the longest tour would drown its length in rounding
+MAX_PRICES = 100  # times the longest tour; beyond it, rounding would matter
 
 Lengths = NDArray[np.float64]
 Whole = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Relaxed:
-    """Shortest relaxed rest of a task from every state, prices of picks included.
-
-    A state knows how many of each group of objects are left (a row), so that any of a group may be picked, though
-    none twice in a row. Every real tour is a relaxed one that pays each price once. What belongs where one is, is
-    left there: in a metric that is never wrong.
-
-    Attributes:
-        d: Distances closed to a metric, so that no tour is shorter in the given ones, m, (k, k).
-        at: Place of each object, (n,).
-        bins: Places of the bins, (m,).
-        home: Bin of each object, (n,).
-        price: Of picking each object, m, (n,).
-        group: Group of each object, (n,).
-        stride: By how many rows picking an object goes down, (n,).
-        carrying: At bin b with one object for bin c in hand, c = b: with empty hands, m, (rows, m, m).
-        holding: At object i with only that in hand, m, (rows, n).
-        root: Length of the shortest relaxed tour less all prices, m.
-    """
-
-    d: Lengths
-    at: Whole
-    bins: Whole
-    home: Whole
-    price: Lengths
-    group: Whole
-    stride: Whole
-    carrying: Lengths
-    holding: Lengths
-    root: float
+Field = NDArray[Any]
 
 
 def closed(problem: RoutingProblem) -> Lengths:
@@ -55,77 +24,157 @@ def closed(problem: RoutingProblem) -> Lengths:
     return shortest
 
 
-def relax(problem: RoutingProblem, group: Whole, prices: Lengths) -> Relaxed:
-    """Fill the table of a relaxation, in floats: the rounding of their sums is far below 1e-9 of a tour.
+class States(NamedTuple):
+    """States of a task, each field (states,)."""
 
-    Args:
-        problem: The problem, for capacity two.
-        group: Group of each shipment, numbered from 0, (n,).
-        prices: Of picking each shipment, m, (n,).
+    left: Field  # objects left, as bits
+    place: Field  # bin b, or m + i at object i, just picked, or m + n at the start
+    held: Field  # bin of the object in hand, m for none
+    cost: Field  # length so far with the prices of picks, m
 
-    Raises:
-        ProblemError: The prices are so large that their rounding would matter.
+
+class Relaxation:
+    """Shortest relaxed rest of a task from every state, for capacity one or two, in floats.
+
+    A row of the table tells how many of each group of objects are left; any of a group may be picked, though none
+    twice in a row, each at a price, m. Every real tour is a relaxed one that pays each price once. An object whose bin
+    is here is left here: in a metric that is never wrong. Sums are rounded by far less than 1e-9 of a tour; prices so
+    large that this would not hold are a `ProblemError`. `exact` says whether the table holds for the distances as they
+    are given, not only for shortest connections; no tour is shorter than `root`, m.
     """
-    n, d = len(problem.shipments), closed(problem)
-    reach = (2 * n + 3) * d[np.ix_(problem.used, problem.used)].max()
-    if not np.abs(prices).sum() <= LARGE * reach:
-        raise ProblemError(f"prices of up to {np.abs(prices).max()} m are too large for tours of {reach} m")
-    bins = np.array(sorted({s.delivery for s in problem.shipments} | set(problem.onboard)), np.int64)
-    at = np.array([s.pickup for s in problem.shipments], np.int64)
-    home = np.searchsorted(bins, np.array([s.delivery for s in problem.shipments], np.int64))
-    size = np.bincount(group)
-    stride = np.concatenate([[1], np.cumprod(size + 1)])[:-1][group] if n else group
-    rows = int(np.prod(size + 1))
-    carrying, holding = np.full((rows, len(bins), len(bins)), np.inf), np.full((rows, n), np.inf)
-    table = Relaxed(d, at, bins, home, prices, group, stride, carrying, holding, 0.0)
-    total = _first_leg(problem, table, _fill(table, problem.start))
-    return replace(table, root=total - float(prices.sum()))
+
+    def __init__(self, problem: RoutingProblem, group: Whole, prices: Lengths) -> None:
+        distances, shipments, n = closed(problem), problem.shipments, len(problem.shipments)
+        reach = (2 * n + 3) * distances[np.ix_(problem.used, problem.used)].max()
+        if not np.abs(prices).sum() <= MAX_PRICES * reach:
+            raise ProblemError(
+                f"prices of up to {np.abs(prices).max()} m are too large for tours of {reach} m"
+            )
+        self.exact = bool(np.array_equal(distances, problem.distances))
+        bins = sorted({s.delivery for s in shipments} | set(problem.onboard))
+        places = [*bins, *(s.pickup for s in shipments), problem.start]
+        self._d, self._bins, self._hands = distances[np.ix_(places, places)], len(bins), problem.capacity
+        self._home = np.array([bins.index(s.delivery) for s in shipments], np.int64)
+        self._carried = [bins.index(j) for j in problem.onboard]
+        self._prices = prices
+        size = np.bincount(group, minlength=1)
+        strides = np.concatenate([[1], np.cumprod(size + 1)])
+        self._stride = strides[group]  # by how many rows picking an object goes down
+        rows = np.arange(strides[-1])
+        self._rest = self._filled(group, [rows // s % (k + 1) for s, k in zip(strides, size, strict=False)])
+        here, after = self._begin()
+        first = [float((states.cost + self._rest_of(states)).min(initial=np.inf)) for states in (here, after)]
+        self.root = min(first) - float(prices.sum()) if places[:-1] else 0.0
+
+    def _filled(self, group: Whole, left: list[Whole]) -> Lengths:
+        """The table: column b m + c is at bin b with an object for bin c (c = b: none), m m + i at object i."""
+        n, m, home, total = len(self._home), self._bins, self._home, np.sum(left, axis=0)
+        leave, to_bin, between = self._d[:m, :m], self._d[m:-1, :m], self._d[m:-1, m:-1].copy()
+        np.fill_diagonal(between, np.inf)  # no object follows itself
+        if self._hands == 1:
+            between[:] = np.inf
+        own = to_bin[np.arange(n), home]
+        table = np.full((len(total), m * m + n), np.inf)
+        carrying, holding = table[:, : m * m].reshape(-1, m, m), table[:, m * m :]
+        carrying[0], holding[0] = leave, own
+        for count in range(1, n + 1):
+            rows = np.flatnonzero(total == count)
+            empty, stay = np.full((len(rows), m), np.inf), np.full((len(rows), n), np.inf)
+            after = np.full((len(rows), m, m), np.inf)
+            for j, c in enumerate(home):
+                there = np.flatnonzero(left[group[j]][rows])
+                source = rows[there] - self._stride[j]
+                second = np.minimum(to_bin[j] + carrying[source, :, c], own[j] + carrying[source, c])
+                second += self._prices[j]
+                only = self._prices[j] + holding[source, j, None]
+                empty[there] = np.minimum(empty[there], to_bin[j] + only)
+                after[there] = np.minimum(after[there], to_bin[j][:, None] + second[:, None])
+                stay[there] = np.minimum(stay[there], between[j] + second[:, home])
+            after = np.minimum(after, leave + empty[:, None])
+            after[:, range(m), range(m)] = empty
+            carrying[rows] = after
+            holding[rows] = np.minimum(stay, own + empty[:, home])
+        return table
+
+    def shorter(self, limit: float, max_states: int) -> tuple[bool, int] | None:
+        """Whether a tour shorter than a limit, m, exists, and how many states were visited; None if too many.
+
+        Layer by layer of picks, all states are visited whose cost so far plus bound stays below the limit.
+        """
+        limit += float(self._prices.sum())
+        here, after = self._begin()
+        states = 0
+        for _ in range(len(self._home) + 1):
+            here = self._best([here, self._placed(self._best([here], limit))], limit)
+            states += len(here.left)
+            if states > max_states:
+                return None
+            if ((here.left == 0) & (here.held == self._bins)).any():
+                return True, states
+            here, after = (
+                self._best([after, *(self._best([s], limit) for s in self._picked(here))], limit),
+                NONE,
+            )
+        return False, states
+
+    def _begin(self) -> tuple[States, States]:
+        """States after the first leg: those with all objects left, and those with one picked."""
+        n, m, held = len(self._home), self._bins, self._carried
+        everything = (1 << n) - 1
+        if len(held) == 2:
+            pairs = [(b, c if c != b else m) for b, c in (held, held[::-1])]
+            legs = [self._d[-1, b] for b, _ in pairs]
+            at, other = np.array(pairs, np.int64).T
+            return States(np.full(2, everything), at, other, np.array(legs)), NONE
+        all_left, place, bin_held = np.array([[everything], [m + n], held or [m]], np.int64)
+        start = States(all_left, place, bin_held, np.zeros(1))
+        return self._placed(start), _joined([NONE, *self._picked(start)])
+
+    def _placed(self, states: States) -> States:
+        """Where a leg to the bin of the one object in hand leads."""
+        left, place, held, cost = (field[states.held < self._bins] for field in states)
+        return States(left, held, np.full_like(held, self._bins), cost + self._d[place, held])
+
+    def _picked(self, states: States) -> Iterator[States]:
+        """Where a leg to an object leads, and with two in hand the leg to either bin."""
+        m = self._bins
+        for j, c in enumerate(self._home.tolist()):
+            left, place, held, cost = (field[(states.left >> j & 1).astype(bool)] for field in states)
+            left, cost = left ^ 1 << j, cost + self._d[place, m + j] + self._prices[j]
+            empty, full = held == m, (held < m) & (self._hands == 2)
+            only = left[empty]
+            yield States(only, np.full_like(only, m + j), np.full_like(only, c), cost[empty])
+            left, first, cost = left[full], held[full], cost[full]
+            kept = np.where(first == c, m, c)
+            yield States(left, first, kept, cost + self._d[m + j, first])
+            yield States(
+                left, np.full_like(first, c), np.where(first == c, m, first), cost + self._d[m + j, c]
+            )
+
+    def _rest_of(self, states: States) -> Lengths:
+        """Lower bounds of the cost-to-go, prices included, m, (states,)."""
+        m, row = self._bins, np.zeros(len(states.left), np.int64)
+        for j, stride in enumerate(self._stride.tolist()):
+            row += stride * (states.left >> j & 1)
+        kept = np.where(states.held == m, states.place, states.held)
+        column = np.where(states.place < m, states.place * m + kept, m * m + states.place - m)
+        rest: Lengths = self._rest[row, column]
+        return rest
+
+    def _best(self, parts: list[States], limit: float) -> States:
+        """The shortest path to each state, of those from which a tour shorter than the limit may exist."""
+        states = _joined(parts)
+        kept = states.cost + self._rest_of(states) < limit
+        states = States(*(field[kept] for field in states))
+        order = np.lexsort((states.cost, states.held, states.place, states.left))
+        states = States(*(field[order] for field in states))
+        first = np.ones(len(order), bool)
+        first[1:] = np.any([field[1:] != field[:-1] for field in states[:3]], axis=0)
+        return States(*(field[first] for field in states))
 
 
-def _fill(table: Relaxed, start: int) -> tuple[Lengths, float]:
-    """All rows, by how many objects are left; then carrying and empty-handed at the start with all left."""
-    d, at, bins, home = table.d, table.at, table.bins, table.home
-    n, m = len(at), len(bins)
-    size, index = np.bincount(table.group), np.arange(len(table.carrying))
-    left = [index // s % (k + 1) for s, k in zip(_first(table), size, strict=True)]
-    total = np.sum(left, axis=0) if left else np.zeros(1, int)
-    places = np.concatenate([bins, [start]])
-    leave, to_place, to_bin = d[np.ix_(places, bins)], d[np.ix_(at, places)], d[np.ix_(at, bins)]
-    between = d[np.ix_(at, at)]
-    np.fill_diagonal(between, np.inf)  # no object follows itself
-    after, empty = leave[None].copy(), np.zeros((1, m + 1))
-    table.carrying[0], table.holding[0] = leave[:m], to_bin[np.arange(n), home]
-    for count in range(1, n + 1):
-        rows = np.flatnonzero(total == count)
-        empty = np.full((len(rows), m + 1), np.inf)
-        after, stay = np.full((len(rows), m + 1, m), np.inf), np.full((len(rows), n), np.inf)
-        for j, c in enumerate(home):
-            there = np.flatnonzero(left[table.group[j]][rows])
-            source = rows[there] - table.stride[j]
-            own, other = table.carrying[source, :, c], table.carrying[source, c]
-            second = table.price[j] + np.minimum(to_bin[j] + own, to_bin[j, c] + other)
-            only = table.price[j] + table.holding[source, j, None]
-            empty[there] = np.minimum(empty[there], to_place[j] + only)
-            after[there] = np.minimum(after[there], to_place[j][:, None] + second[:, None])
-            stay[there] = np.minimum(stay[there], between[j] + second[:, home])
-        after = np.minimum(after, leave + empty[:, None, :m])
-        after[:, range(m), range(m)] = empty[:, :m]
-        table.carrying[rows] = after[:, :m]
-        table.holding[rows] = np.minimum(stay, to_bin[np.arange(n), home] + empty[:, home])
-    return after[-1, m], float(empty[-1, m])
+NONE = States(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
 
 
-def _first(table: Relaxed) -> list[int]:
-    """Stride of each group."""
-    return [int(table.stride[table.group == g][0]) for g in range(int(table.group.max(initial=-1)) + 1)]
-
-
-def _first_leg(problem: RoutingProblem, table: Relaxed, start: tuple[Lengths, float]) -> float:
-    bins, carried = table.bins.tolist(), problem.onboard
-    if len(carried) == 2:
-        lengths = [
-            table.d[problem.start, one] + table.carrying[-1, bins.index(one), bins.index(other)]
-            for one, other in (carried, carried[::-1])
-        ]
-        return float(min(lengths))
-    return float(start[0][bins.index(carried[0])]) if carried else start[1]
+def _joined(parts: list[States]) -> States:
+    return States(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))

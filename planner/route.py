@@ -1,8 +1,8 @@
-"""The state of a task, and the route through what is left of it."""
+"""The state of a task, the route through what is left of it, and where routes come from."""
 
-from collections.abc import Mapping, Sequence
+import abc
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from planner.errors import ProblemError
 from planner.plan import Plan, Visit, VisitKind
@@ -18,8 +18,7 @@ class TaskState:
         position: Where the person is, m.
         loose: Where each object lies that is neither carried nor delivered, by name, m.
         carried: Names of the objects that are carried.
-        deliveries: Where a person stands to deliver each loose or carried object, by name, m. Further names
-            do not matter.
+        deliveries: Where a person stands to deliver each loose or carried object, by name, m; may hold more names.
 
     Raises:
         ProblemError: An object is both loose and carried, carried twice, or has no delivery.
@@ -43,16 +42,10 @@ class TaskState:
 
 @dataclass(frozen=True)
 class Route:
-    """What is left to do, in order.
+    """The visits that are left, in order."""
 
-    Attributes:
-        visits: Remaining visits.
-        plan: The plan it follows, with its bound and status. While a route is followed this stays the plan as
-            it was made, done visits included.
-    """
-
-    visits: tuple[Visit, ...]
-    plan: Plan
+    visits: tuple[Visit, ...]  # remaining visits
+    plan: Plan  # the plan as it was made, visits included that are done by now
 
     @property
     def next(self) -> Visit | None:
@@ -61,7 +54,7 @@ class Route:
 
 
 def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | None:
-    """The visits that are still to be done if what was done is a beginning of them, else None."""
+    """The visits that are still to be done if those done are the first ones, else None."""
     loose = {visit.object for visit in visits if visit.kind is VisitKind.PICK}
     carried = {visit.object for visit in visits} - loose
     done = 0
@@ -78,27 +71,31 @@ def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | 
     return tuple(visits[done:])
 
 
-class RoutePlanner(Protocol):
-    """Keeps the route of a task; the replanners of `planner` do, and a replay with the logged plans."""
+class PlanSource(abc.ABC):
+    """Gives the planner its routes."""
 
-    @property
-    def replans(self) -> int:
-        """How often `update` made a new plan because the old one no longer fitted."""
-        ...
+    # runs a search for better plans in the background; None where each plan is final
+    start: Callable[[Callable[[], None]], object] | None = None
+
+    @abc.abstractmethod
+    def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
+        """The visits that are left of a route, or None if another plan is due."""
+
+    @abc.abstractmethod
+    def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
+        """A new route; see `Planner.ask`. `route` is the one before."""
+
+    def check(self, state: TaskState) -> None:  # noqa: B027 - a source may have nothing to check
+        """Raise UnreachableError if an object cannot be fetched or delivered; `names` lists them."""
 
     @property
     def pending(self) -> bool:
-        """Whether `poll` may have a better route."""
-        ...
+        """Whether `better` has to be called."""
+        return False
 
-    def prepare(self, state: TaskState, *, seconds: float | None = None) -> Route:
-        """Plan the task before its clock starts, in at most so many seconds of proofs."""
-        ...
+    def better(self, state: TaskState, route: Route) -> Route | None:  # noqa: ARG002 - each plan is final
+        """A better route for the same task than the present one, or the same with a better bound, if there is one."""
+        return None
 
-    def update(self, state: TaskState, *, shown: bool = True) -> Route:
-        """The route for the task as it is now; `shown` tells whether somebody sees it."""
-        ...
-
-    def poll(self, state: TaskState) -> Route | None:
-        """A better route for the same task, if one was found meanwhile."""
-        ...
+    def close(self) -> None:  # noqa: B027 - a source may have nothing to stop
+        """Stop searching."""

@@ -6,20 +6,22 @@ import pkgutil
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 from planner.errors import PlannerError
-from planner.plan import Plan
-from planner.problem import RoutingProblem
 
-# Name -> module and class. A new planner is its own module and a line here.
+if TYPE_CHECKING:  # options of commands name solvers, and must not load NumPy
+    from planner.plan import Plan
+    from planner.problem import RoutingProblem
+
+# Name -> module and class. A new planner is a module and a line here.
 SOLVERS = {
     "exact": ("planner.exact.solver", "ExactSolver"),
     "ortools": ("planner.ortools_solver", "OrToolsSolver"),
     "greedy": ("planner.greedy_solver", "GreedySolver"),
 }
 DEFAULT_SOLVER = "exact"
-PATIENT_WORK = 60_000_000  # states of the exact search, for who can wait half a minute for 30 objects
+PATIENT_WORK = 60_000_000  # states of the exact search, for offline use: about 30 s at 30 objects
 
 
 @dataclass(frozen=True)
@@ -54,12 +56,12 @@ class Solver(Protocol):
     def name(self) -> str:
         """Name in run records."""
 
-    def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
+    def solve(self, problem: "RoutingProblem", *, seed: int = 0, limit: SolveLimit | None = None) -> "Plan":
         """Find a plan; the same arguments with a limit on work (or none) give the same visits."""
 
     def improve(
-        self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
-    ) -> Iterator[Plan]:
+        self, problem: "RoutingProblem", *, seed: int = 0, limit: SolveLimit | None = None
+    ) -> "Iterator[Plan]":
         """Yield a first plan at once, then each that is shorter or has a better bound.
 
         The last is what `solve` returns for the same arguments, but for limits on time. Leave the iteration
@@ -70,8 +72,7 @@ class Solver(Protocol):
 def solver(name: str) -> Solver:
     """The planner of this name, or one by `package.module:attribute`: a class, or a function without arguments.
 
-    Raises:
-        PlannerError: No planner has this name, or it cannot be made.
+    `PlannerError` where none has this name, or it cannot be made.
     """
     if name in SOLVERS:
         module, attribute = SOLVERS[name]

@@ -16,12 +16,7 @@ RESOLUTION = 1e-4  # m; that of geodesics, and far below where a person stands
 
 
 class TaskProblems:
-    """Makes the routing problems of the successive states of a task; keeps distances between them.
-
-    Args:
-        geodesics: Distances on the navmesh; positions are snapped to its largest island.
-        capacity: How many objects can be carried.
-    """
+    """Makes the routing problems of the successive states of a task; keeps distances between them."""
 
     def __init__(self, geodesics: Geodesics, capacity: int = 2) -> None:
         self._geodesics = geodesics
@@ -33,9 +28,7 @@ class TaskProblems:
     def problem(self, state: TaskState) -> RoutingProblem:
         """The routing problem of a state: shipments in the order of `loose`, onboard as in `carried`, by name.
 
-        Raises:
-            UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
-            ProblemError: More is carried than the capacity allows.
+        `UnreachableError` names objects that cannot be fetched or delivered; `ProblemError` if too many are carried.
         """
         at = self._places(state)
         places = list(dict.fromkeys(at.values()))
@@ -59,19 +52,11 @@ class TaskProblems:
         )
 
     def check(self, state: TaskState) -> None:
-        """Make sure that every object left can be fetched and delivered.
-
-        Raises:
-            UnreachableError: Objects that cannot be; `names` lists them.
-        """
+        """Make sure that every object left can be fetched and delivered; `UnreachableError` names those that cannot."""
         self._places(state)
 
     def length(self, state: TaskState, visits: Sequence[Visit]) -> float:
-        """Length of an open tour from the state's position, m.
-
-        Raises:
-            UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
-        """
+        """Length of an open tour from the state's position, m; raises as `check`."""
         at = self._places(state)
         stops = [at[visit] for visit in visits]
         if not stops:

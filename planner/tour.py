@@ -32,13 +32,7 @@ def possible_next(problem: RoutingProblem, visits: Sequence[Visit] = ()) -> Iter
 def tour_length(
     problem: RoutingProblem, visits: Iterable[Visit], distances: NDArray[Any] | None = None
 ) -> float:
-    """Length of an open tour.
-
-    Args:
-        problem: The problem.
-        visits: The tour.
-        distances: In place of the problem's own, (k, k); the length is in their unit, exact for integers below 2^53.
-    """
+    """Length of an open tour; `distances`, (k, k), replace the problem's own, and are exact for integers below 2^53."""
     stops = problem.stops(visits)
     return float((problem.distances if distances is None else distances)[stops[:-1], stops[1:]].sum())
 
@@ -65,37 +59,15 @@ def make_plan(
 ) -> Plan:
     """A plan with a lower bound that also holds for the given distances, which are not whole units.
 
-    Args:
-        problem: What was solved.
-        metric: The integer distances that it was solved in, (k, k).
-        visits: The tour.
-        bound: No tour is shorter than this in these, units.
-        started: `time.perf_counter()` when solving began.
-        certificate: What proves the bound.
-
-    Returns:
-        OPTIMAL if the tour meets the bound in the integer distances, and in the given ones to the problem's tolerance.
-        The latter fails only for distances that are no metric.
+    `metric` are the integer distances that the problem was solved in, (k, k), in whose units no tour is shorter than
+    `bound`; `started` is `time.perf_counter()` when solving began. OPTIMAL if the tour meets the bound in the integer
+    distances, and in the given ones to the problem's tolerance; the latter fails only for distances that are no metric.
     """
-    integers = problem.integers
+    integers, cost = problem.integers, tour_length(problem, visits)
     lower = certificate.unit * (bound - integers.rounding * len(visits))  # each leg may have been rounded up
     met = tour_length(problem, visits, metric) <= bound + integers.tie
-    return with_bound(problem, visits, lower, started, certificate, proven=met)
-
-
-def with_bound(
-    problem: RoutingProblem,
-    visits: Sequence[Visit],
-    lower: float,
-    started: float,
-    certificate: Certificate,
-    *,
-    proven: bool = True,
-) -> Plan:
-    """A plan with a lower bound, m; OPTIMAL if it is `proven` and as long as that, to the problem's tolerance."""
-    cost = tour_length(problem, visits)
     rounding = (problem.resolution or 0.0) * len(visits) / 2
-    optimal = proven and cost - lower <= problem.tolerance(cost) + rounding
+    optimal = met and cost - lower <= problem.tolerance(cost) + rounding
     status = Status.OPTIMAL if optimal else Status.FEASIBLE
     lower = cost if optimal else max(0.0, min(cost, lower))
     return Plan(tuple(visits), cost, lower, status, time.perf_counter() - started, certificate)

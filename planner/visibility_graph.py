@@ -20,19 +20,14 @@ from planner.path_search import Edges
 
 @dataclass(frozen=True, eq=False)
 class VisibilityGraph:
-    """Static part of the shortest-path search; built once per navmesh.
+    """Static part of the shortest-path search; built once per navmesh."""
 
-    Attributes:
-        vertices: Reflex vertices, (v, 6): x, y, then the ring's previous and next vertex, m.
-        island: Island of each vertex, (v,) int64.
-        walls: Edges of the solid obstacles.
-        edges: Which vertices see each other.
-    """
-
-    vertices: NDArray[np.float64]
-    island: NDArray[np.int64]
-    walls: SegmentGrid
-    edges: Edges
+    vertices: NDArray[
+        np.float64
+    ]  # reflex vertices, (v, 6): x, y, then the ring's previous and next vertex, m
+    island: NDArray[np.int64]  # island of each vertex, (v,) int64
+    walls: SegmentGrid  # edges of the solid obstacles
+    edges: Edges  # which vertices see each other
 
     @classmethod
     def build(cls, navmesh: NavMesh) -> "VisibilityGraph":
@@ -94,16 +89,9 @@ def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) ->
 def vertex_pairs(
     vertices: NDArray[np.float64], island: NDArray[np.int64], walls: SegmentGrid, slack: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs i < j of vertices that see each other along a line tangent at both.
+    """Pairs i < j of vertices (v, 6) that see each other along a line tangent at both; i and j, each (pairs,).
 
-    Args:
-        vertices: As in `VisibilityGraph`, m, (v, 6).
-        island: Island of each vertex, (v,).
-        walls: Edges of the solid obstacles.
-        slack: Tolerance of the tangents, m.
-
-    Returns:
-        i and j, each of shape (pairs,).
+    `island` is that of each vertex, (v,), `walls` the edges of the solid obstacles, `slack` the tolerance, m.
     """
     rows, columns = [0], [0]
     for i in range(vertices.shape[0]):
@@ -128,19 +116,7 @@ def visible_vertices(
     walls: SegmentGrid,
     slack: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Usable vertices that a point sees along tangents, and the distances to them.
-
-    Args:
-        x: Of the point, m.
-        y: Of the point, m.
-        vertices: As in `VisibilityGraph`, m, (v, 6).
-        usable: Which vertices count, (v,).
-        walls: Edges of the solid obstacles.
-        slack: Tolerance of the tangents, m.
-
-    Returns:
-        Indices of the vertices, and the distances, m, each of shape (seen,).
-    """
+    """Usable (v,) vertices (v, 6) that a point sees along tangents, and distances to them, m, each (seen,)."""
     found, lengths = [0], [0.0]
     for j in range(vertices.shape[0]):
         q = vertices[j]

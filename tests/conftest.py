@@ -1,61 +1,76 @@
 """Fixtures shared by the tests: the apartment as shipped, and a small house written for tests."""
 
-from pathlib import Path
-
-import mujoco
 import pytest
 from hypothesis import settings
 
-from mjsim.episode import Episode
+from experiments.house import House
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.footprint import Footprint, footprint
+from mjsim.model.footprint import footprint
 from mjsim.model.house import compiled_house
 from mjsim.model.sampling import sample_episode
-from mjsim.model.scene import Scene, compose
+from mjsim.model.scene import compose
 from planner.navmesh import NavMesh
 
 # Whether a test passes must not depend on how busy the machine is.
 settings.register_profile("unhurried", deadline=None)
+settings.register_profile("thorough", deadline=None, max_examples=3000)
 settings.load_profile("unhurried")
 
 
 @pytest.fixture(scope="session")
-def catalogue() -> Catalogue:
+def catalogue():
     """The apartment's catalogue."""
     return Catalogue.load("apartment")
 
 
 @pytest.fixture(scope="session")
-def house_model(catalogue: Catalogue) -> mujoco.MjModel:
+def house():
+    """The apartment with its navmesh and geodesics; do not change it."""
+    return House.load()
+
+
+@pytest.fixture(scope="session")
+def house_model(catalogue):
     """The tidy apartment, without objects or person."""
     return compiled_house(catalogue).model
 
 
 @pytest.fixture(scope="session")
-def house_footprint(house_model: mujoco.MjModel) -> Footprint:
+def house_footprint(house_model):
     return footprint(house_model)
 
 
 @pytest.fixture(scope="session")
-def navmesh(house_footprint: Footprint) -> NavMesh:
+def navmesh(house_footprint):
     """Navigable floor of the apartment."""
     return NavMesh.build(house_footprint.obstacles, house_footprint.bounds)
 
 
 @pytest.fixture(scope="session")
-def episode(catalogue: Catalogue, navmesh: NavMesh) -> Episode:
+def episode(catalogue, navmesh):
     """A disorganized apartment with 24 objects."""
     return sample_episode(catalogue, navmesh, objects=24, seed=5)
 
 
 @pytest.fixture(scope="session")
-def scene(episode: Episode, catalogue: Catalogue) -> Scene:
+def scene(episode, catalogue):
     """The composed `episode`; do not change it."""
     return compose(episode, catalogue)
 
 
+@pytest.fixture
+def step_singly():
+    """Makes a world take one control step per action, as for a viewer."""
+
+    def limit(world):
+        step = world.step
+        world.step = lambda action, limit=1: step(action, 1)  # noqa: ARG005
+
+    return limit
+
+
 @pytest.fixture(scope="session")
-def small_house(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def small_house(tmp_path_factory):
     """Folder of a house of two rooms, 3 m x 4 m each, with two receptacles and three object models."""
     folder = tmp_path_factory.mktemp("small_house")
     write_small_house(folder)
@@ -63,13 +78,13 @@ def small_house(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def small_catalogue(small_house: Path) -> Catalogue:
+def small_catalogue(small_house):
     """Categories `solids` (cube, wedge) -> crate in the west, and `rounds` (ball) -> tray in the east."""
     return Catalogue.load(str(small_house / "catalogue.toml"))
 
 
 @pytest.fixture
-def fresh_house(tmp_path: Path) -> Path:
+def fresh_house(tmp_path):
     """Catalogue of a small house with a content of its own, so that nothing of it is compiled yet."""
     write_small_house(tmp_path)
     (tmp_path / "house.xml").write_text(
@@ -79,7 +94,7 @@ def fresh_house(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def cramped_catalogue(tmp_path_factory: pytest.TempPathFactory) -> Catalogue:
+def cramped_catalogue(tmp_path_factory):
     """The small house with a crate on whose floor there is room for four cubes."""
     folder = tmp_path_factory.mktemp("cramped_house")
     write_small_house(folder)
@@ -87,12 +102,12 @@ def cramped_catalogue(tmp_path_factory: pytest.TempPathFactory) -> Catalogue:
     return Catalogue.load(str(folder / "catalogue.toml"))
 
 
-def write_small_house(folder: Path) -> None:
+def write_small_house(folder):
     for name, text in _SMALL_HOUSE.items():
         (folder / name).write_text(text.replace("FOLDER", str(folder)), encoding="utf-8")
 
 
-def _receptacle(half: float) -> str:
+def _receptacle(half):
     wall = half - 0.01
     return f"""
 <mujoco>
@@ -113,7 +128,7 @@ def _receptacle(half: float) -> str:
 """
 
 
-def _object(geom: str, top: float, asset: str = "") -> str:
+def _object(geom, top, asset=""):
     return f"""
 <mujoco>
   <compiler angle="radian"/>

@@ -2,11 +2,9 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from hud.projection import CameraView
-from hud.state import Message
-from hud.task import KnownPlan, Status, TaskObject, TaskReceptacle, TaskStep, TaskView
+from hud.task import KnownPlan, TaskObject, TaskReceptacle, TaskStep, TaskView
 
 EYE = (0.0, 0.0, 1.6)
 ROOMS = ("Kitchen", "Living room", "Bedroom", "Office", "Hallway")
@@ -29,7 +27,7 @@ _LABELS = (
 )
 
 
-def receptacles() -> tuple[TaskReceptacle, ...]:
+def receptacles():
     """Six bins, one per category."""
     return tuple(
         TaskReceptacle(key, label, place, room, f"receptacle:{key}", (1.5 * i - 3.0, 6.0, 0.4))
@@ -37,12 +35,8 @@ def receptacles() -> tuple[TaskReceptacle, ...]:
     )
 
 
-def objects(count: int) -> tuple[TaskObject, ...]:
-    """The first `count` of 24 objects, all lying about, in equal numbers per category.
-
-    Args:
-        count: 0 to 24.
-    """
+def objects(count):
+    """The first `count` of 24 objects, all lying about, in equal numbers per category."""
     labels = [(kind, _LABELS[kind][i]) for i in range(4) for kind in range(6)]
     return tuple(
         TaskObject(
@@ -59,19 +53,10 @@ def objects(count: int) -> tuple[TaskObject, ...]:
     )
 
 
-def task(
-    count: int, *, steps: int = 0, message: Message | None = None, clock: float | None = 83.0
-) -> TaskView:
-    """A task of `count` objects, `steps` visits into a plan that fetches two objects at a time.
-
-    Args:
-        count: Objects, 0 to 24.
-        steps: Visits made already, 0 to 2 x count.
-        message: For the message bar.
-        clock: Elapsed time, s.
-    """
+def task(count, *, steps=0, message=None, clock=83.0):
+    """A task of `count` objects, `steps` visits into a plan that fetches two objects at a time."""
     items = objects(count)
-    plan: list[TaskStep] = []
+    plan = []
     for i in range(0, count, 2):
         pair = [o.name for o in items[i : i + 2]]
         plan += [TaskStep("pick", n) for n in pair] + [TaskStep("place", n) for n in pair]
@@ -97,7 +82,7 @@ def task(
     )
 
 
-def camera(width: int, height: int, *, yaw: float = 0.0, pitch: float = -0.35) -> CameraView:
+def camera(width, height, *, yaw=0.0, pitch=-0.35):
     """An eye at the origin that looks along +y, turned by `yaw` to the left and `pitch` upwards, rad."""
     cy, sy, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
     right = np.array([cy, sy, 0.0])
@@ -106,9 +91,9 @@ def camera(width: int, height: int, *, yaw: float = 0.0, pitch: float = -0.35) -
     return CameraView(np.array(EYE), rotation, 1.2, width, height)
 
 
-def pictures(size: int = 96) -> dict[str, NDArray[np.uint8]]:
+def pictures(size=96):
     """A simple picture per object and per bin: RGBA, uint8, shape (size, size, 4)."""
-    drawn: dict[str, NDArray[np.uint8]] = {}
+    drawn = {}
     for kind, (key, _, _, _, colour) in enumerate(_BINS):
         drawn[f"receptacle:{key}"] = _box(colour, size)
         for i, label in enumerate(_LABELS[kind]):
@@ -116,7 +101,7 @@ def pictures(size: int = 96) -> dict[str, NDArray[np.uint8]]:
     return drawn
 
 
-def backdrop(width: int, height: int) -> NDArray[np.uint8]:
+def backdrop(width, height):
     """A plain room: wall, floor and a dark doorway, uint8, shape (height, width, 3)."""
     rows = np.linspace(0.0, 1.0, height)[:, None, None]
     wall = np.array([226.0, 219.0, 206.0]) - 40.0 * rows
@@ -127,8 +112,8 @@ def backdrop(width: int, height: int) -> NDArray[np.uint8]:
     return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
 
 
-def _with_status(item: TaskObject, done: list[TaskStep]) -> TaskObject:
-    status: Status = "loose"
+def _with_status(item, done):
+    status = "loose"
     if TaskStep("place", item.name) in done:
         status = "delivered"
     elif TaskStep("pick", item.name) in done:
@@ -136,7 +121,7 @@ def _with_status(item: TaskObject, done: list[TaskStep]) -> TaskObject:
     return TaskObject(**{**vars(item), "status": status})
 
 
-def _box(colour: tuple[int, int, int], size: int) -> NDArray[np.uint8]:
+def _box(colour, size):
     """An open crate."""
     image = np.zeros((size, size, 4), dtype=np.uint8)
     points = np.array([[0.12, 0.35], [0.88, 0.35], [0.78, 0.88], [0.22, 0.88]]) * size
@@ -148,7 +133,7 @@ def _box(colour: tuple[int, int, int], size: int) -> NDArray[np.uint8]:
     return image
 
 
-def _token(colour: tuple[int, int, int], corners: int, size: int) -> NDArray[np.uint8]:
+def _token(colour, corners, size):
     """A regular polygon."""
     image = np.zeros((size, size, 4), dtype=np.uint8)
     angles = np.arange(corners) * 2.0 * np.pi / corners - np.pi / 2.0

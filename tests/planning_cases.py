@@ -8,7 +8,10 @@ from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 from planner.plan import VisitKind
 from planner.problem import RoutingProblem, Shipment
+from planner.regret import RegretEvaluator
 from planner.route import TaskState
+from planner.service import Mode, Planner
+from planner.solver_source import SolverSource
 
 WALL = [
     np.array([(3.9, 0), (4.1, 0), (4.1, 4), (3.9, 4)]),
@@ -17,13 +20,18 @@ WALL = [
 BINS = [(1.0, 7.0), (7.0, 7.0), (7.0, 1.0)]
 
 
-def random_problem(seed, shipments, onboard=0, capacity=2, bins=4, coincide=False):
+def random_problem(seed, shipments, onboard=0, capacity=2, bins=4, coincide=False, planar=True):
     """Points in the plane, or of a coarse grid: location 0 is the start, then the bins, then the objects."""
     rng = np.random.default_rng(seed)
-    points = rng.uniform(0, 10, (1 + bins + shipments, 2))
-    if coincide:
-        points = np.round(points / 5) * 5
-    d = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+    count = 1 + bins + shipments
+    if planar:
+        points = rng.uniform(0, 10, (count, 2))
+        if coincide:
+            points = np.round(points / 5) * 5
+        d = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+    else:  # any numbers between 1 and 2 are a metric, and one with many near ties
+        d = np.triu(rng.uniform(1, 2, (count, count)).round(1), 1)
+        d = d + d.T
     deliveries = rng.integers(1, bins + 1, shipments)
     return RoutingProblem(
         d,
@@ -34,23 +42,19 @@ def random_problem(seed, shipments, onboard=0, capacity=2, bins=4, coincide=Fals
     )
 
 
-def optimum(problem):
-    """Least length by recursion on the problem itself: every possible visit, one after another."""
+def optimum(problem, number=float):
+    """Least length, added as a type of `number`, by recursion: every possible visit, one after another."""
+    d = [[number(x) for x in row] for row in problem.distances.tolist()]
 
     @functools.cache
     def go(here, loose, carried):
-        ways = [
-            problem.distances[here, j] + go(j, loose, carried[:k] + carried[k + 1 :])
-            for k, j in enumerate(carried)
-        ]
+        ways = [d[here][j] + go(j, loose, carried[:k] + carried[k + 1 :]) for k, j in enumerate(carried)]
         if len(carried) < problem.capacity:
             for k in loose:
                 s = problem.shipments[k]
-                ways.append(
-                    problem.distances[here, s.pickup]
-                    + go(s.pickup, loose - {k}, tuple(sorted((*carried, s.delivery))))
-                )
-        return min(ways, default=0.0)
+                held = tuple(sorted((*carried, s.delivery)))
+                ways.append(d[here][s.pickup] + go(s.pickup, loose - {k}, held))
+        return min(ways, default=number(0))
 
     return go(problem.start, frozenset(range(len(problem.shipments))), tuple(sorted(problem.onboard)))
 
@@ -58,6 +62,17 @@ def optimum(problem):
 def two_rooms():
     """Geodesics of two rooms of 4 m x 8 m, a door between them."""
     return Geodesics(NavMesh.build(WALL, (0, 0, 8, 8)))
+
+
+def planner_of(geodesics, solver, mode=Mode.INLINE, **options):
+    """A planner that asks a solver."""
+    return Planner(SolverSource(geodesics, solver, **options), RegretEvaluator(geodesics), mode)
+
+
+def asked(planner, state, **options):
+    """The route of a planner for a state."""
+    planner.ask(state, **options)
+    return planner.route
 
 
 class Task:

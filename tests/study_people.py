@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from experiments.analysis.measures import read_measures
-from experiments.analysis.published import read_published
-from experiments.analysis.study_table import study_table
+from experiments.study.measures import read_measures
+from experiments.study.table import study_table
+from studies.published import read_published
 
 SIZES = read_published().people.sizes()  # of the published study
 MEANS = {"none": 0.75, "highlight": 0.65, "optimal": 0.3}
@@ -19,22 +19,16 @@ def made_up_people(sizes=SIZES, seed=0, **same):
             level = (objects - 6) / 18
             deviations = np.clip(MEANS[assistance] + 0.2 * level + rng.normal(0, spread), 0, 1)
             rows.append(
-                {
-                    "objects": objects,
-                    "assistance": assistance,
-                    "user": "follower",
-                    "house": "apartment",
-                    "house_seed": k % 7,
-                    "person_seed": k,
-                    "order_seed": k,
-                    "ended": "all delivered",
+                {"objects": objects, "assistance": assistance, "user": "follower", "house": "apartment"}
+                | {"house_seed": k % 7, "person_seed": k, "order_seed": k, "ended": "all delivered"}
+                | {
                     "nd_feasible": float(deviations),
                     "nd_strict_2n": round(deviations * 2 * objects) / (2 * objects),
                     "ipl_locations": float(1.1 - 0.5 * MEANS[assistance] + rng.normal(0, 0.15)),
                     "task_distance_m": float(objects * (5 + 4 * MEANS[assistance]) + rng.normal(0, 12)),
                     "completion_time_s": float(30 * objects + rng.normal(0, 40)),
-                    **same,
                 }
+                | same
             )
     return rows
 

@@ -8,9 +8,11 @@ from functools import cache
 from multiprocessing import get_context
 from typing import Any
 
+import msgspec
+
 from experiments.house import House
-from experiments.runs.metrics import compute_metrics
-from experiments.runs.records import EventLog
+from experiments.record.metrics import compute_metrics
+from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
@@ -24,7 +26,7 @@ class TierResult:
 
     Attributes:
         config: The trial.
-        delivered: Names of the objects that lay in their receptacles at the end.
+        delivered: Names of the objects in their receptacles at the end.
         metrics: The paper's metrics, by name.
     """
 
@@ -38,18 +40,18 @@ def run_in_tiers(config: TrialConfig, house: House) -> dict[str, TierResult]:
     scene = compose(trial_episode(config, house), house.catalogue)
     results = {}
     for fidelity in FIDELITIES:
-        tier = dataclasses.replace(config, fidelity=fidelity)
+        tier = msgspec.structs.replace(config, fidelity=fidelity)
         log = EventLog()
         session, world = prepare_session(tier, house, scene, log)
         session.run()
-        metrics = compute_metrics(log.events, session.trajectory.arrays()["position"])
+        metrics = compute_metrics(log.events, session.record.record().trajectory["position"])
         delivered = world.observation().names_with(ObjectStatus.DELIVERED)
         results[fidelity] = TierResult(tier, frozenset(delivered), dataclasses.asdict(metrics))
     return results
 
 
 def run_all_in_tiers(configs: Sequence[TrialConfig], *, workers: int = 1) -> Iterator[dict[str, TierResult]]:
-    """Run trials in every tier, on so many processes; yields fidelity -> result, trial by trial."""
+    """Run trials in every tier, on several processes; yields fidelity -> result, trial by trial."""
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(_run_one, configs)
 

@@ -1,6 +1,6 @@
-"""Carrying two objects through the house at full speed: how far welds stretch and twist, and what is lost meanwhile.
+"""Carrying two objects through the house at full speed: how far welds stretch and twist, and how many objects are lost.
 
-In a session the person picks up two objects that lie beside them and walks to another point of the house by the
+In a session the person picks up two objects next to them and walks to another point of the house by the
 shortest path, at 1.4 m/s round every corner.
 """
 
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from experiments.session.path_following import wrap_angle
-from mjsim.actions import IDLE, Action, EventKind, Move, Pick
+from mjsim.actions import IDLE, WAIT, Action, EventKind, Move, Pick
 from mjsim.episode import Episode
 from mjsim.model.scene import compose
+from mjsim.walking.path_following import wrap_angle
+from mjsim.walking.polyline import path_length, point_along, project
 from mjsim.world import World
-from planner.polyline import path_length, point_along, project
 
 SEED = 2027
 SPEED = 1.4  # m/s
@@ -31,7 +31,7 @@ ARRIVED = 0.1  # m
 
 @dataclass(frozen=True)
 class CarryResult:
-    """What a walk with two objects brought.
+    """Result of a walk with two objects.
 
     Attributes:
         session: Its number; `run_session` repeats it.
@@ -66,7 +66,7 @@ def run_session(house: House, number: int) -> CarryResult:
     world = World(compose(episode, house.catalogue))
     for placed in episode.objects:
         world.step(Pick(placed.name))
-        world.finish()
+        world.step(WAIT)
     rows, lost = [], 0
     heading = world.observation().heading
     for _ in range(MAX_STEPS):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from experiments.house import House
-from experiments.runs.records import EventLog
+from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor

@@ -46,8 +46,8 @@ class Placement:
         fill: How many objects the receptacle held before.
         outcome: `placed`, or `place_failed`, `pick_failed`, `grip_lost`, `refused`, `dislodged` if it was placed and
             pushed another one out, `error` if the physics failed.
-        ejections: Objects ejected meanwhile.
-        tunnellings: Objects that tunnelled meanwhile.
+        ejections: Number of objects ejected.
+        tunnellings: Number of objects that tunnelled.
         settle_s: Time from release to rest, s.
         weld_m: Largest weld error, m.
         weld_rad: Likewise, rad.

@@ -15,10 +15,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from benchmarks.support.play_server import PATIENCE
-from experiments.web.protocol import FRAME_HEAD
+from experiments.web.protocol import FRAME_HEAD, MAX_INPUTS
 
 RETRANSMISSION = 0.2  # s that a lost packet costs, as TCP sends it again
-BATCH = 64  # inputs of one message
 
 
 @dataclass(frozen=True)
@@ -43,12 +42,12 @@ class Link:
 
 @dataclass(frozen=True)
 class SeenFrame:
-    """A frame or state that arrived.
+    """A frame or snapshot that arrived.
 
     Attributes:
         at: When, as `time.perf_counter` has it.
         input: Number of the last input that counts in it.
-        width: Of a frame, px; 0 for a state.
+        width: Of a frame, px; 0 for a snapshot.
     """
 
     at: float
@@ -62,7 +61,7 @@ class SimulatedBrowser:
     Args:
         address: Of the visit.
         codec: `jpeg`, `h264` or `none`.
-        state: Whether to ask for states.
+        snapshots: Whether to ask for snapshots.
         link: What the network does.
         size: Of the view, px.
         seed: Of the network's chance.
@@ -70,7 +69,7 @@ class SimulatedBrowser:
     Attributes:
         next: Number of the next input.
         acknowledged: Number of the last input that is safe.
-        frames: Those that came, and the states.
+        frames: Frames and snapshots that arrived.
         last: Type -> the latest message of it.
         sent_at: Number of an input -> when it was sent.
     """
@@ -80,14 +79,20 @@ class SimulatedBrowser:
         address: str,
         *,
         codec: str = "none",
-        state: bool = False,
+        snapshots: bool = False,
         link: Link | None = None,
         size: tuple[int, int] = (640, 480),
         seed: int = 0,
     ) -> None:
         self.address = address
         self._tab = secrets.token_hex(8)
-        self._view = {"type": "view", "width": size[0], "height": size[1], "codec": codec, "state": state}
+        self._view = {
+            "type": "view",
+            "width": size[0],
+            "height": size[1],
+            "codec": codec,
+            "snapshots": snapshots,
+        }
         self._link, self._rng = link or Link(), np.random.default_rng(seed)
         self._changed = asyncio.Condition()
         self._tasks: list[asyncio.Task[None]] = []
@@ -99,7 +104,7 @@ class SimulatedBrowser:
         self.last: dict[str, dict[str, Any]] = {}
         self.sent_at: dict[int, float] = {}
 
-    async def open(self, phase: str) -> None:
+    async def open(self, trial: str) -> None:
         """Connect, and say hello."""
         parts = urlsplit(self.address)
         self.last.clear()
@@ -112,7 +117,7 @@ class SimulatedBrowser:
             open_timeout=PATIENCE,
         )
         self._tasks = [asyncio.create_task(self._send_all()), asyncio.create_task(self._receive_all())]
-        self.say(type="hello", tab=self._tab, phase=phase, view=self._view)
+        self.say(type="hello", tab=self._tab, trial=trial, view=self._view)
 
     async def cut(self) -> None:
         """Lose the connection, without a word to the server."""
@@ -134,6 +139,11 @@ class SimulatedBrowser:
         """Forget the frames and inputs so far."""
         self.frames.clear()
         self.sent_at.clear()
+
+    @property
+    def pending(self) -> int:
+        """Number of inputs that are not acknowledged."""
+        return len(self._waiting)
 
     def say(self, **message: Any) -> None:
         """Send a message."""
@@ -170,18 +180,25 @@ class SimulatedBrowser:
         if not holds():
             raise ConnectionError(f"the server closed the connection; it said {sorted(self.last)}")
 
-    async def ready(self) -> dict[str, Any]:
-        """Wait until the session is ready and runs; what was not acknowledged is sent again."""
-        await self.until(lambda: "ready" in self.last)
-        ready = self.last["ready"]
-        if not ready["begun"]:
-            self.say(type="begin")
-        self.say(type="resume")
-        self._waiting = [new for new in self._waiting if new["number"] > ready["input"]]
-        self.next = max([ready["input"], *(new["number"] for new in self._waiting)]) + 1
-        for first in range(0, len(self._waiting), BATCH):
-            self.say(type="inputs", inputs=self._waiting[first : first + BATCH])
-        return ready
+    @property
+    def phase(self) -> str:
+        """Phase of the session, as the server sent it last."""
+        return str(self.last.get("state", {}).get("phase", ""))
+
+    async def run(self) -> int:
+        """Let the clock run once the session is open, and send again what was not acknowledged.
+
+        Returns:
+            Number of the last input that the session had.
+        """
+        await self.until(lambda: self.phase in ("ready", "paused", "running"))
+        number = int(self.last["state"]["input"])
+        self.say(type="run")
+        await self.until(lambda: self.phase == "running")
+        self.next = max([number, *(new["number"] for new in self._waiting)]) + 1
+        for first in range(0, len(self._waiting), MAX_INPUTS):
+            self.say(type="inputs", inputs=self._waiting[first : first + MAX_INPUTS])
+        return number
 
     async def taken(self) -> None:
         """Wait until all inputs are acknowledged."""
@@ -189,9 +206,9 @@ class SimulatedBrowser:
 
     async def leave(self) -> None:
         """End the session, and disconnect."""
-        self.last.pop("over", None)
+        self.last.pop("saved", None)
         self.say(type="leave")
-        await self.until(lambda: "over" in self.last)
+        await self.until(lambda: "saved" in self.last)
         await self.close()
 
     async def _send_all(self) -> None:
@@ -232,7 +249,7 @@ class SimulatedBrowser:
             return
         content = json.loads(message)
         self.last[content["type"]] = content
-        if content["type"] == "state":
+        if content["type"] == "snapshot":
             self.frames.append(SeenFrame(time.perf_counter(), content["input"], 0))
         if content["type"] == "taken":
             self.acknowledged = max(self.acknowledged, content["input"])
@@ -249,7 +266,7 @@ class SimulatedBrowser:
 async def begin_task(browser: SimulatedBrowser) -> None:
     """Skip the training, and start the task."""
     await browser.open("training")
-    await browser.until(lambda: "ready" in browser.last)
+    await browser.until(lambda: browser.phase == "ready")
     await browser.leave()
     await browser.open("task")
-    await browser.ready()
+    await browser.run()

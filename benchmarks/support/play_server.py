@@ -5,7 +5,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -14,19 +13,18 @@ from urllib.parse import urlsplit
 
 import httpx
 
-from experiments.web.journal import JOURNAL
-from experiments.web.visits import JOURNALS, token_hash
+from experiments.record.journal import JOURNAL
+from experiments.web.server.visits import JOURNALS, token_hash
 
-PATIENCE = 120.0  # s; a loaded machine may be slow
+PATIENCE = 400.0  # s; a loaded machine may be slow, and may have to compile all kernels first
 TASK_ALONE = ("--phases", "task")  # words of a server whose visits consist of the task
-IDLE = 0.5  # s without work after which the process that forks workers is taken for warm
 _TICKS = os.sysconf("SC_CLK_TCK")
 
-Say = Callable[[str], None]  # takes a line about what a benchmark does at the moment
+Report = Callable[[str], None]  # takes a line about the progress of a benchmark
 
 
 class PlayProcess:
-    """A server, from entering the context until leaving it. What it says goes into `server.txt` beside its folder.
+    """A server, from entering the context until leaving it. Standard error goes into `server.txt` beside its folder.
 
     Args:
         folder: Where it keeps visits.
@@ -55,9 +53,9 @@ class PlayProcess:
             raise ChildProcessError(self.output.read_text())
 
     def kill(self) -> None:
-        """`kill -9`; its workers wait for the next one."""
+        """`kill -9`; its workers end with it."""
         self.process.kill()
-        self.process.communicate()
+        self.process.communicate()  # its workers hold its output, too
 
     def begin(self) -> str:
         """Begin a visit; its address."""
@@ -73,15 +71,6 @@ class PlayProcess:
         """Journal of a phase of a visit."""
         return self.visit(address) / JOURNALS / phase / JOURNAL
 
-    def wait_until_warm(self) -> None:
-        """Wait until workers can be forked: house and kernels are loaded.
-
-        Raises:
-            TimeoutError: They are not.
-        """
-        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-        wait_until_idle(int(children[0]))
-
     def __enter__(self) -> "PlayProcess":
         self.start()
         return self
@@ -96,23 +85,8 @@ class PlayProcess:
             self.kill()
 
 
-def wait_until_idle(pid: int) -> None:
-    """Wait until a process has nothing to do for a while, as the one that forks workers once all is loaded.
-
-    Raises:
-        TimeoutError: It always has.
-    """
-    until = time.monotonic() + PATIENCE
-    while time.monotonic() < until:
-        before = processor_time(pid)
-        time.sleep(IDLE)
-        if processor_time(pid) == before:
-            return
-    raise TimeoutError(f"process {pid} has something to do all the time")
-
-
 def fill_disk(worker: int, journal: Path, room: int) -> None:
-    """Let a worker write only so many bytes more to its journal, as if the disk was full then."""
+    """Let a worker write only `room` more bytes to its journal, as if the disk was full then."""
     size = journal.stat().st_size + room
     resource.prlimit(worker, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
 
@@ -136,7 +110,7 @@ def processor_time(pid: int | str) -> float:
 
 
 def parent_of(pid: int) -> int:
-    """The process that started a process; of a worker, the one that forks them."""
+    """The process that started a process; of a worker, the fork server."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return int(fields[1])
 

@@ -5,54 +5,51 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.runs.records import EventLog
+from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
-from mjsim.actions import Action
+from mjsim.actions import Action, Move
 from mjsim.episode import POINTS
 from mjsim.model.sampling import sample_episode
 from mjsim.model.scene import Scene, compose
 from mjsim.observation import Observation
 from mjsim.options import WorldOptions
-from mjsim.rollout import Rollout
-from mjsim.world import StepResult, World
+from mjsim.world import MAX_STEPS, StepResult, World
 from mjsim.world_state import WorldState
 
-Call = tuple[str, Any]  # method of the world and its argument
+Call = tuple[str, Any]  # `step` with an action and a limit, or `restore`
 
 
 class RecordingWorld(World):
     """A world that records how it is called.
 
     Attributes:
-        calls: `step`, `walk`, `finish` and `restore` so far, each with its argument or None.
+        calls: `step` and `restore` so far.
+        single_steps: The same, with each control step of an action as a call of its own.
     """
 
-    def __init__(self, scene: Scene, options: WorldOptions | None = None) -> None:
-        super().__init__(scene, options)
+    def __init__(self, scene: Scene, options: WorldOptions | None = None, *, walls: Any = None) -> None:
+        super().__init__(scene, options, walls=walls)
         self.calls: list[Call] = []
+        self.single_steps: list[Call] = []
 
-    def step(self, action: Action) -> StepResult:
+    def step(self, action: Action, limit: int = MAX_STEPS) -> StepResult:
         """See `World.step`."""
-        self.calls.append(("step", action))
-        return super().step(action)
-
-    def walk(self, moves: ArrayLike) -> Rollout:
-        """See `World.walk`."""
-        self.calls.append(("walk", moves))
-        return super().walk(moves)
-
-    def finish(self) -> Rollout:
-        """See `World.finish`."""
-        self.calls.append(("finish", None))
-        return super().finish()
+        self.calls.append(("step", (action, limit)))
+        result = super().step(action, limit)
+        taken = result.steps.actions
+        actions = [Move(*row) for row in taken.tolist()] if isinstance(taken, np.ndarray) else [taken]
+        self.single_steps += [("step", (action, 1)) for action in actions]
+        return result
 
     def restore(self, state: WorldState) -> Observation:
         """See `World.restore`."""
         self.calls.append(("restore", None))
+        self.single_steps.append(("restore", None))
         return super().restore(state)
 
 
@@ -63,20 +60,24 @@ class RecordedTrial:
     Attributes:
         scene: The scene of the trial.
         fidelity: The tier.
-        calls: `step`, `walk`, `finish`, and `restore` at every checkpoint.
+        walls: Outline of the navigable floor, as `World` takes it, m, shape (e, 4).
+        calls: `step` with an action and a limit, and `restore` at every checkpoint.
+        single_steps: The same, with each control step as a call of its own.
     """
 
     scene: Scene
     fidelity: str
+    walls: NDArray[np.float64]
     calls: tuple[Call, ...]
+    single_steps: tuple[Call, ...]
 
     def world(self) -> World:
         """A new world to play the calls in."""
-        return World(self.scene, WorldOptions(fidelity=self.fidelity))
+        return World(self.scene, WorldOptions(fidelity=self.fidelity), walls=self.walls)
 
     def actions(self, seconds: float) -> list[Action]:
-        """The first single steps, as many as take `seconds` of simulated time."""
-        steps = [argument for name, argument in self.calls if name == "step"]
+        """The actions of the first control steps, as many as take `seconds` of simulated time."""
+        steps = [argument[0] for name, argument in self.single_steps if name == "step"]
         return steps[: round(seconds / WorldOptions().control_timestep)]
 
 
@@ -101,10 +102,12 @@ def record_trial(
     points = max(objects, POINTS)
     episode = sample_episode(house.catalogue, house.navmesh, objects=objects, seed=seed, points=points)
     scene = compose(episode, house.catalogue, visuals=False)  # as a trial that is not filmed
-    world = RecordingWorld(scene, WorldOptions(fidelity=fidelity))
+    world = RecordingWorld(scene, WorldOptions(fidelity=fidelity), walls=house.navmesh.outline)
     session, _ = prepare_session(config, house, scene, EventLog(), world=world)
     session.run()
-    return RecordedTrial(scene, fidelity, tuple(world.calls))
+    return RecordedTrial(
+        scene, fidelity, house.navmesh.outline, tuple(world.calls), tuple(world.single_steps)
+    )
 
 
 def play(world: World, calls: Sequence[Call]) -> float:
@@ -113,11 +116,7 @@ def play(world: World, calls: Sequence[Call]) -> float:
     start = clock()
     for name, argument in calls:
         if name == "step":
-            world.step(argument)
-        elif name == "walk":
-            world.walk(argument)
-        elif name == "finish":
-            world.finish()
+            world.step(*argument)
         else:
             began = clock()
             world.restore(world.state())

@@ -1,8 +1,8 @@
 """Walking into everything: charges at 1 to 8 m/s into walls, corners, furniture and heaps of objects.
 
-In a session the person runs in random directions, pushes on, then walks away by the shortest path, and stands still
-for a while. Whether the body went through something, got stuck or drifts is decided by its position and the floor plan
-alone, not by the code under test.
+In a session the person runs and pushes in random directions, then walks away by the shortest path, and stops for a
+while. Tunnelling, being stuck and drift are judged by the body's position and the floor plan alone, not by the code
+under test.
 """
 
 import math
@@ -20,9 +20,9 @@ from mjsim.errors import PhysicsError
 from mjsim.model.footprint import footprint
 from mjsim.model.scene import assemble
 from mjsim.person_parameters import PersonParameters
+from mjsim.walking.polyline import point_along
 from mjsim.world import World
 from planner.errors import UnreachableError
-from planner.polyline import point_along
 
 SEED = 2028
 SPEEDS = (1.0, 8.0)  # m/s
@@ -38,7 +38,7 @@ LOOK_AHEAD = 0.3  # m
 
 @dataclass
 class WalkResult:
-    """What a session brought.
+    """Result of a session.
 
     Attributes:
         session: Its number; `run_session` repeats it.
@@ -46,7 +46,7 @@ class WalkResult:
         simulated: Simulated time, s.
         tunnelled: Control steps at which the body's axis was in something solid or had crossed it.
         stuck: Walks away in which the body got no farther than `NOT_STUCK` m from where it was.
-        retreats: Walks away.
+        retreats: Number of walks away.
         drift: How far the body moved in the last second of standing still, m, by occasion.
         turned: How far it turned then, rad, by occasion.
         overlap: Depth of the trunk in walls and furniture at each control step, m.

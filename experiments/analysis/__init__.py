@@ -1,1 +1,4 @@
-"""Pictures and tables made from records."""
+"""Statistics, figures and pages made from records.
+
+Serves `mjsim compare`, `mjsim check` and the analysis of studies.
+"""

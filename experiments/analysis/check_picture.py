@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from mjsim.files import replacing
 from mjsim.model.validation.findings import Finding
 from mjsim.model.validation.report import Report
-from mjsim.model.validation.views import View
+from mjsim.model.validation.views import Drawing
 
 SIDE = 9.0  # inches of the longest side of a drawing
 LINES = 12  # findings below the drawing
@@ -19,12 +19,8 @@ COLOURS = {"error": "#D55E00", "warning": "#E69F00"}
 
 
 def draw_check(path: Path, report: Report) -> None:
-    """Write a PNG with the views of a report and the numbers of its findings, as in its table.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
-    views = report.views or (View("nothing could be compiled", (0, 1), ()),)
+    """Write a PNG with the views of a report and the numbers of its findings, as in its table."""
+    views = report.views or (Drawing("nothing could be compiled", (0, 1), ()),)
     listed = [f"{n}. {f}" for n, f in enumerate(report.findings[:LINES], 1)]
     text = "\n".join(textwrap.fill(line, 130) for line in listed) or "no findings"
     below = 0.3 + 0.17 * (text.count("\n") + 1)
@@ -40,7 +36,7 @@ def draw_check(path: Path, report: Report) -> None:
         figure.savefig(temporary, format="png", metadata={"Software": "mjsim"})
 
 
-def _draw_view(axes: Axes, view: View, findings: tuple[Finding, ...]) -> None:
+def _draw_view(axes: Axes, view: Drawing, findings: tuple[Finding, ...]) -> None:
     for label, corners in view.rooms:
         axes.fill(*corners.T, facecolor="#EEF3F7", edgecolor="#9AA7B2", lw=0.8, zorder=0)
         axes.annotate(label, corners.mean(axis=0), ha="center", va="center", color="#60707C", fontsize=8)

@@ -18,14 +18,13 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.stats import t
 
-from experiments.analysis.statistics.noncentral import t_noncentrality
+from experiments.analysis.statistics.noncentral import t_interval
 from experiments.errors import ConfigError, RecordError
-from experiments.origin import origin_of
+from experiments.record.origin import origin_of
 from experiments.trials.design import counted
 from experiments.trials.table import NAME
 from experiments.trials.trial_config import SEEDS
 
-METRICS = ("completion_time_s", "task_distance_m", "ipl_stand", "nd_feasible", "total_regret_m")
 CIRCUMSTANCES = (
     "objects",
     "user",
@@ -46,53 +45,32 @@ Interval = tuple[float, float] | None
 
 @dataclass(frozen=True)
 class Block:
-    """Trials under the same circumstances: seeds -> row, by assistance condition.
+    """Trials under the same circumstances: seeds -> row, by assistance condition."""
 
-    Attributes:
-        label: What sets it apart from the other blocks of the batch.
-        rows: Condition -> the three seeds and the values of the person -> row.
-    """
-
-    label: str
+    label: str  # its difference from the other blocks of the batch
+    # condition -> the three seeds and the values of the person -> row
     rows: Mapping[str, Mapping[tuple[Any, ...], Row]]
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Two conditions compared in one metric.
+    """Two conditions compared in one metric."""
 
-    Attributes:
-        block: Label of the circumstances.
-        metric: Name of the column.
-        conditions: The two.
-        pairs: Number of pairs in which the metric is known.
-        means: Mean of the pairs under either condition.
-        difference: Mean of second minus first.
-        interval: Its 95 % confidence interval; None for fewer than two pairs.
-        effect: Mean difference in standard deviations of the differences, d_z; None where they do not vary.
-        effect_interval: Its 95 % confidence interval, or None.
-        p: Of the paired t test, two-sided; None where the differences do not vary.
-    """
-
-    block: str
-    metric: str
-    conditions: tuple[str, str]
-    pairs: int
-    means: tuple[float, float]
-    difference: float
-    interval: Interval
+    block: str  # label of the circumstances
+    metric: str  # name of the column
+    conditions: tuple[str, str]  # the two
+    pairs: int  # number of pairs in which the metric is known
+    means: tuple[float, float]  # mean of the pairs under either condition
+    difference: float  # mean of second minus first
+    interval: Interval  # its 95 % confidence interval; None for fewer than two pairs
+    # mean difference in standard deviations of the differences, d_z; None where they do not vary
     effect: float | None
-    effect_interval: Interval
-    p: float | None
+    effect_interval: Interval  # its 95 % confidence interval, or None
+    p: float | None  # of the paired t test, two-sided; None where the differences do not vary
 
 
 def read_blocks(folder: Path) -> list[Block]:
-    """The trials of a batch by circumstances, in the order of its table.
-
-    Raises:
-        RecordError: The folder has no table of trials, or one of another version.
-        ConfigError: It holds one assistance condition only.
-    """
+    """The trials of a batch by circumstances, in the order of its table; errors if they are of one condition only."""
     path = folder / f"{NAME}.parquet"
     try:
         rows = pq.read_table(path).to_pylist()
@@ -103,7 +81,7 @@ def read_blocks(folder: Path) -> list[Block]:
         raise RecordError(f"{path} was written by another version: it has no {', '.join(missing)}")
     if len({row["assistance"] for row in rows}) < 2:
         raise ConfigError(f"{folder} holds fewer than two assistance conditions; there is nothing to compare")
-    # Somebody else with the same seed is no pair.
+    # Two persons with the same seed are no pair.
     identity = (*SEEDS, *(name for name in rows[0] if name.startswith("person_") and name not in SEEDS))
     varying = [name for name in CIRCUMSTANCES if len({row[name] for row in rows}) > 1]
     blocks: dict[str, dict[str, dict[tuple[Any, ...], Row]]] = defaultdict(lambda: defaultdict(dict))
@@ -115,7 +93,7 @@ def read_blocks(folder: Path) -> list[Block]:
 
 
 def batch_origin(blocks: Sequence[Block]) -> str:
-    """Whether the people of a batch were simulated, as in `experiments.origin`."""
+    """Whether the people of a batch were simulated, as in `experiments.record.origin`."""
     rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
     return origin_of(row["user"] for row in rows)
 
@@ -140,7 +118,7 @@ def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
 def unknown_metrics(
     blocks: Sequence[Block], metrics: Sequence[str], differences: Sequence[Difference]
 ) -> Iterator[str]:
-    """A line for every metric that no pair of two conditions knows: there is no row for it."""
+    """A line for every metric that is unknown in all pairs of two conditions."""
     shown = {(d.block, d.metric, d.conditions) for d in differences}
     for block in blocks:
         where = f"{block.label}: " if block.label else ""
@@ -151,12 +129,8 @@ def unknown_metrics(
                 yield f"{where}{metric} is not known in both trials of any pair of {', '.join(lost)}"
 
 
-def compare(blocks: Sequence[Block], metrics: Sequence[str] = METRICS) -> list[Difference]:
-    """Every two conditions in every metric, on the pairs that are complete.
-
-    Raises:
-        ConfigError: A metric is no number of the tables, or there is no pair at all.
-    """
+def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]:
+    """Every two conditions in every metric, on the pairs that are complete; a ConfigError where there are none."""
     first = next(row for block in blocks for rows in block.rows.values() for row in rows.values())
     for name in metrics:
         if name not in first or isinstance(first[name], str | bool):
@@ -222,8 +196,6 @@ def _effect(gaps: NDArray[np.float64]) -> tuple[float | None, Interval, float | 
         return None, None, None
     effect, root = float(gaps.mean()) / spread, math.sqrt(count)
     statistic, freedom = effect * root, count - 1
-    bounds = [
-        t_noncentrality(statistic, freedom, share) for share in (0.5 + CONFIDENCE / 2, 0.5 - CONFIDENCE / 2)
-    ]
-    interval = None if None in bounds else (float(bounds[0] or 0.0) / root, float(bounds[1] or 0.0) / root)
+    found = t_interval(statistic, freedom, CONFIDENCE)
+    interval = None if found is None else (found[0] / root, found[1] / root)
     return effect, interval, float(2 * t.sf(abs(statistic), freedom))

@@ -9,10 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from experiments.analysis.comparison import Block, batch_origin, mean_interval
-from experiments.runs.topdown import mark_origin
 from mjsim.files import replacing
 
-FORMATS = (".png", ".svg", ".pdf")
 PANEL = (2.6, 2.4)  # inches
 PAIR, MEAN = "#9AA5B1", "#0072B2"
 
@@ -63,3 +61,8 @@ def _draw_panel(axes: Axes, block: Block, metric: str) -> None:
     axes.set_xticks(range(len(names)), names, fontsize=8)
     axes.tick_params(axis="y", labelsize=7)
     axes.margins(x=0.2)
+
+
+def mark_origin(figure: Figure, origin: str) -> None:
+    """Say above a figure whether people were simulated."""
+    figure.suptitle(origin, fontsize=8, x=0.99, ha="right", color="#B00020")

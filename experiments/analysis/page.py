@@ -1,60 +1,53 @@
-"""HTML pages of one file: text, tables and figures inside it, no scripts, nothing from elsewhere."""
+"""HTML pages of one file (`page.html.j2`): text, tables and inline figures, no scripts, no external content."""
 
 import math
 from collections.abc import Iterable, Sequence
-from html import escape
+from typing import NamedTuple
 
-STYLE = """\
-body { font: 15px/1.45 system-ui, sans-serif; max-width: 74rem; margin: 2rem auto; padding: 0 1rem; color: #1b1b1b }
-table { border-collapse: collapse; margin: .6rem 0 1.2rem; font-size: 13px }
-th, td { border-bottom: 1px solid #ddd; padding: .2rem .7rem .2rem 0; text-align: left; vertical-align: top }
-td.number { text-align: right; font-variant-numeric: tabular-nums }
-svg { max-width: 100%; height: auto }
-.origin { color: #b00020; font-weight: bold }
-.missing { color: #666 }"""
+import jinja2
+from markupsafe import Markup
 
 
-def page(title: str, origin: str, parts: Iterable[str]) -> str:
-    """A whole page.
+class Paragraph(NamedTuple):
+    """Plain text; `kind` is its class in HTML."""
 
-    Args:
-        title: Its title, plain text.
-        origin: Whether people were simulated; it stands in the title and under every heading.
-        parts: HTML of its sections.
+    text: str
+    kind: str = ""
+
+
+class Table(NamedTuple):
+    """A table; numbers are rounded to three digits."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[object]]
+
+
+Block = Paragraph | Table | Markup  # the last holds a figure
+
+
+def page(title: str, origin: str, sections: Iterable[tuple[str, Iterable[Block]]]) -> str:
+    """A whole page; tables without rows and sections without content are left out.
+
+    `origin` says whether people were simulated; it appears in the title and under every heading.
     """
-    head = f'<meta charset="utf-8"><title>{escape(origin)}: {escape(title)}</title><style>{STYLE}</style>'
-    heading = f"<h1>{escape(title)}</h1>{origin_line(origin)}"
-    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>{heading}\n{"".join(parts)}</body></html>\n'
+    shown_blocks = (
+        (heading, [block for block in blocks if not isinstance(block, Table) or block.rows])
+        for heading, blocks in sections
+    )
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("experiments.analysis", "."), autoescape=True, trim_blocks=True
+    )
+    environment.filters["shown"] = shown
+    environment.tests["paragraph"] = lambda block: isinstance(block, Paragraph)
+    environment.tests["table"] = lambda block: isinstance(block, Table)
+    environment.tests["plain_number"] = lambda v: isinstance(v, int | float) and not isinstance(v, bool)
+    template = environment.get_template("page.html.j2")
+    return template.render(title=title, origin=origin, sections=[s for s in shown_blocks if s[1]])
 
 
-def origin_line(origin: str) -> str:
-    """A line that says whether people were simulated."""
-    return f'<p class="origin">{escape(origin)}</p>\n'
-
-
-def section(title: str, origin: str, *parts: str) -> str:
-    """A heading, the origin of the data, and what follows; nothing where nothing follows."""
-    inside = "".join(parts)
-    return f"<section><h2>{escape(title)}</h2>{origin_line(origin)}{inside}</section>\n" if inside else ""
-
-
-def paragraph(text: str, kind: str = "") -> str:
-    """A paragraph of plain text."""
-    attribute = f' class="{kind}"' if kind else ""
-    return f"<p{attribute}>{escape(text)}</p>\n"
-
-
-def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table; numbers are rounded to three digits. Nothing where there are no rows."""
-    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>\n" for row in rows)
-    head = "".join(f"<th>{escape(name)}</th>" for name in columns)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table>\n" if body else ""
-
-
-def _cell(value: object) -> str:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    attribute = ' class="number"' if number else ""
-    return f"<td{attribute}>{escape(shown(value))}</td>"
+def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
+    """A table of rows that are made one by one."""
+    return Table(columns, list(rows))
 
 
 def shown(value: object) -> str:

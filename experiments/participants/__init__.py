@@ -1,32 +1,34 @@
-"""Simulated participants. One module each; a module is a participant when it defines `build`."""
+"""Simulated participants, one module each, and what they share: percept, decisions, walks.
 
+Serves sessions, and authors of participants: a module of this package with `build` is a choice of `--user`.
+"""
+
+import functools
 import importlib
 import pkgutil
-from typing import cast
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from experiments.errors import ConfigError
-from experiments.participants.base import Guidance, Participant, ParticipantFactory, Percept
 
-__all__ = [
-    "DEFAULT_PARTICIPANT",
-    "Guidance",
-    "Participant",
-    "ParticipantFactory",
-    "Percept",
-    "participant",
-    "participant_names",
-]
+if TYPE_CHECKING:  # options of commands name participants, and must not load the simulator
+    from experiments.participants.base import ParticipantFactory
 
 DEFAULT_PARTICIPANT = "follower"
+_BUILDS = re.compile(r"^(def build\(|build = )", re.MULTILINE)
 
 
+@functools.cache
 def participant_names() -> tuple[str, ...]:
-    """Names of the participants that this package holds, sorted."""
-    modules = sorted(m.name for m in pkgutil.iter_modules(__path__))
-    return tuple(n for n in modules if hasattr(importlib.import_module(f"{__name__}.{n}"), "build"))
+    """Names of the participants that this package holds, sorted; nothing is imported to find them."""
+    folder = Path(__file__).parent
+    sources = [*folder.glob("[!_]*.py"), *folder.glob("*/__init__.py")]
+    found = [path for path in sources if _BUILDS.search(path.read_text(encoding="utf-8"))]
+    return tuple(sorted(path.parent.name if path.stem == "__init__" else path.stem for path in found))
 
 
-def participant(name: str) -> ParticipantFactory:
+def participant(name: str) -> "ParticipantFactory":
     """Find a participant by module name, with its parameter after a colon, or one by `package.module:attribute`.
 
     A module that takes a parameter defines `with_parameter(text)`, which gives the factory.
@@ -38,7 +40,7 @@ def participant(name: str) -> ParticipantFactory:
     if module in participant_names():
         if colon:
             return _with_parameter(module, parameter)
-        return cast(ParticipantFactory, importlib.import_module(f"{__name__}.{module}").build)
+        return cast("ParticipantFactory", importlib.import_module(f"{__name__}.{module}").build)
     if not colon:
         raise ConfigError(
             f"no participant {name!r}; there are {', '.join(participant_names())}, or package.module:attribute"
@@ -46,10 +48,10 @@ def participant(name: str) -> ParticipantFactory:
     return _own_participant(name)
 
 
-def _own_participant(name: str) -> ParticipantFactory:
+def _own_participant(name: str) -> "ParticipantFactory":
     try:
         found = pkgutil.resolve_name(name)
-    except Exception as error:  # whatever the module does when it is imported
+    except Exception as error:  # user code may raise anything on import
         raise ConfigError(
             f"cannot load participant {name!r}: {type(error).__name__}: {error}; "
             "modules are looked for in the current folder and among those installed"
@@ -58,10 +60,10 @@ def _own_participant(name: str) -> ParticipantFactory:
         raise ConfigError(
             f"participant {name!r} is a {type(found).__name__}, not a function of a house and a generator"
         )
-    return cast(ParticipantFactory, found)
+    return cast("ParticipantFactory", found)
 
 
-def _with_parameter(name: str, parameter: str) -> ParticipantFactory:
+def _with_parameter(name: str, parameter: str) -> "ParticipantFactory":
     module = importlib.import_module(f"{__name__}.{name}")
     if not hasattr(module, "with_parameter"):
         raise ConfigError(f"participant {name} takes no parameter, got {parameter!r}")

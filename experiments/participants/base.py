@@ -4,15 +4,14 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hud.state import HudState
-from mjsim.actions import Action, ActionResult, Move, Pick, Place
+from mjsim.actions import Action, ActionResult
 from mjsim.episode import CAPACITY
-from mjsim.errors import ActionError
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.person_parameters import PersonParameters
 from planner.plan import Visit
@@ -22,8 +21,6 @@ if TYPE_CHECKING:  # options of commands name participants, and must not load th
     from mjsim.model.receptacles import ReceptacleGeometry
 
 Point = NDArray[np.float64]
-
-TIME_TOLERANCE = 1e-6  # s; times are sums of many steps, and no decision may depend on their rounding
 
 NEARBY = 1.3  # m
 USUAL_PERSON = PersonParameters()
@@ -167,71 +164,6 @@ def positions_of(seen: Observation, names: Iterable[str]) -> dict[str, Point]:
     return {name: seen.object_positions[seen.object_names.index(name), :2] for name in names}
 
 
-@dataclass(frozen=True, eq=False)
-class WalkAlong:
-    """Walk along a path, sidestep objects on the way, face the goal at its end, and pick or place there.
-
-    The session walks. In the fidelity `full`, and while somebody films, it asks the participant again after every
-    control step, else at the end of the walk. So as long as nothing happens, the answer must stay the same. On a shown
-    path it is not asked in `full` either, unless somebody films, until something happens or an object has moved.
-
-    Attributes:
-        path: Floor points, m, shape (k, 2), k >= 1.
-        goal: What is walked to, m, shape (2,): an object or a receptacle may lie beside the path's end.
-        stop_distance: How near to the goal the walk ends, m; it also ends with the path.
-        then: What to do there, once the person faces the goal; None to do nothing and face nothing.
-        until: Simulated time at which the participant wants to be asked again, s; None for the end of the walk.
-        shown: Whether the path is shown by the HUD, which cuts off what lies behind the person.
-        tolerance: How far the person may leave the path before the participant is asked again, m.
-
-    Raises:
-        ActionError: The path has another shape.
-    """
-
-    path: NDArray[np.float64]
-    goal: Point
-    stop_distance: float
-    then: Pick | Place | None = None
-    until: float | None = None
-    shown: bool = False
-    tolerance: float = 0.4
-
-    def __post_init__(self) -> None:
-        _check_rows("the path of a walk", self.path, 2)
-
-
-@dataclass(frozen=True, eq=False)
-class Moves:
-    """Make these moves, one per control step, unless something happens.
-
-    Attributes:
-        rows: Forward, left (m/s), turn and look (rad/s), shape (n, 4), n >= 1.
-
-    Raises:
-        ActionError: The rows have another shape.
-    """
-
-    rows: NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        _check_rows("moves", self.rows, 4)
-
-
-def _check_rows(what: str, rows: NDArray[np.float64], width: int) -> None:
-    shape = np.shape(rows)
-    if len(shape) != 2 or shape[1] != width or shape[0] < 1:
-        raise ActionError(f"{what} must be an array of shape (n, {width}) with n >= 1, got shape {shape}")
-
-
-class Wait:
-    """Do nothing until the pick or place under way is over; for one control step if none is."""
-
-
-WAIT: Final = Wait()
-Decision = Action | WalkAlong | Moves | Wait
-DECISIONS = (Move, Pick, Place, WalkAlong, Moves, Wait)
-
-
 class Participant(Protocol):
     """A user of the assistance: sees a percept, answers with a decision.
 
@@ -242,8 +174,12 @@ class Participant(Protocol):
 
     needs: frozenset[str]
 
-    def act(self, percept: Percept) -> Decision:
-        """Choose what to do next: an action for the next control step, a walk, or to wait."""
+    def act(self, percept: Percept) -> Action:
+        """Choose the next action.
+
+        A path and a wait take many control steps, unless the session is filmed; then the participant is asked after
+        each. So as long as nothing happens the answer must stay the same.
+        """
         ...
 
 

@@ -1,25 +1,22 @@
-"""Bins that the person has not seen yet: the list in the HUD names their room, the rest is a matter of looking."""
+"""Search for bins that the person has not seen yet; the list in the HUD names their room."""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import NEARBY, TIME_TOLERANCE, Decision, Percept, Point
+from experiments.participants.base import NEARBY, Percept, Point
 from experiments.participants.distances import estimated_distances
 from experiments.participants.looking import FullTurn
+from mjsim.actions import TIME_TOLERANCE, Action
 
 ARRIVED = 0.5  # m from a viewpoint before the look around begins
 
-WalkTo = Callable[[Percept, Point, float], Decision]
+WalkTo = Callable[[Percept, Point, float], Action]
 
 
 class BinSearch:
-    """What the person knows of the bins, and where to look for the others.
-
-    Args:
-        house: What the person knows of the house; `House.seen` of its bins.
-    """
+    """The bins that the person knows, as `House.seen` says, and the search for the others."""
 
     def __init__(self, house: House) -> None:
         self._house = house
@@ -50,11 +47,11 @@ class BinSearch:
         return self._next_look if time is None else min(time, self._next_look)
 
     def likely_place(self, position: Point, key: str) -> Point:
-        """Where to begin to look for a bin: the nearest viewpoint of its room, m, shape (2,)."""
+        """Start of the search for a bin: the nearest viewpoint of its room, m, shape (2,)."""
         points = self._viewpoints(key)
         return points[self._nearest(position, points)]
 
-    def act(self, percept: Percept, key: str, walk_to: WalkTo) -> Decision:
+    def act(self, percept: Percept, key: str, walk_to: WalkTo) -> Action:
         """Go to the viewpoints of the bin's room, the nearest first, and look around at each."""
         if key != self._key:
             self._key, self._left, self._target, self._turn = key, [], None, None
@@ -72,13 +69,13 @@ class BinSearch:
         return self.act(percept, key, walk_to)
 
     def _next_viewpoint(self, position: Point, key: str) -> Point:
-        """The nearest viewpoint that was not searched; once all were, right beside the bin."""
+        """The nearest viewpoint that was not searched; once all were, next to the bin."""
         if not self._left:
             self._left = self._viewpoints(key)
         return self._left.pop(self._nearest(position, self._left))
 
     def _viewpoints(self, key: str) -> list[Point]:
-        """Viewpoints of a bin's room, m, each (2,), and last the place beside it, where nothing hides it."""
+        """Viewpoints of a bin's room, m, each (2,), and last the place next to it, where nothing hides it."""
         room = self._house.catalogue.receptacles[key].room
         return [*self._house.viewpoints.get(room, ()), self._house.approaches[key]]
 

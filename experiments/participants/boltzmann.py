@@ -1,4 +1,4 @@
-"""Knows what every next step would cost, and mostly takes a cheap one: a model of how closely people follow advice.
+"""Knows the cost of every possible next visit, and mostly takes a cheap one: a model of compliance.
 
 A visit that makes the rest of the task r metres longer is chosen with probability proportional to
 exp(-r / temperature). The temperature is the parameter, m: `--user boltzmann:0.5`. Near 0 the visits are optimal; the
@@ -13,30 +13,19 @@ import numpy as np
 
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.participants.base import (
-    WAIT,
-    Choice,
-    Decision,
-    Participant,
-    ParticipantFactory,
-    Percept,
-)
+from experiments.participants.base import Choice, Participant, ParticipantFactory, Percept
 from experiments.participants.visit_executor import VisitExecutor
+from mjsim.actions import WAIT, Action
 from planner.plan import Visit
 
 TEMPERATURE = 0.5  # m
 
 
 def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator) -> Choice:
-    """A choice with probability proportional to exp(-regret / temperature); the best one at 0.
+    """A choice with probability proportional to exp(-regret / temperature), m; the best one at 0.
 
-    Where only a lower bound is known, the exact regret is worked out when such a choice is drawn, and the draw is
+    Where only a lower bound is known, the exact regret is computed when such a choice is drawn, and the draw is
     rejected as often as the bound makes it too likely: so the probabilities are exact, for a few exact regrets.
-
-    Args:
-        choices: At least one.
-        temperature: m, not negative.
-        rng: Source of chance.
     """
     if temperature <= 0:
         return min(choices, key=lambda choice: choice.regret)
@@ -55,13 +44,7 @@ def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator
 
 
 class Boltzmann:
-    """Draws what to do next, and keeps to it once drawn.
-
-    Args:
-        house: What it knows of the house.
-        rng: Its chance.
-        temperature: How little the cost matters, m.
-    """
+    """Draws the next visit, and keeps to it once drawn; the higher the `temperature`, m, the less cost matters."""
 
     needs: frozenset[str] = frozenset()
 
@@ -71,8 +54,8 @@ class Boltzmann:
         self._temperature = temperature
         self._choice: Visit | None = None
 
-    def act(self, percept: Percept) -> Decision:
-        """Do what was drawn; draw anew once that is done or impossible."""
+    def act(self, percept: Percept) -> Action:
+        """Make the visit that was drawn; draw again once it is done or impossible."""
         if percept.busy:
             return WAIT
         choices = {choice.visit: choice for choice in percept.choices}
@@ -85,11 +68,7 @@ class Boltzmann:
 
 
 def with_parameter(text: str) -> ParticipantFactory:
-    """A maker of participants of this temperature.
-
-    Raises:
-        ConfigError: It is not a number, or negative.
-    """
+    """A maker of participants of this temperature; a ConfigError where it is not a number, or negative."""
     try:
         temperature = float(text)
     except ValueError:
@@ -104,5 +83,5 @@ def with_parameter(text: str) -> ParticipantFactory:
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:
-    """Make a participant of the usual temperature."""
+    """Make a participant of the default temperature."""
     return Boltzmann(house, rng, TEMPERATURE)

@@ -1,23 +1,24 @@
-"""One person for all conditions: uses breadcrumbs where they are shown, else flagpoles, else its own eyes."""
+"""One person for all conditions: uses breadcrumbs where they are shown, else flagpoles, else its eyes."""
 
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import WAIT, Decision, Participant, Percept
+from experiments.participants.base import Participant, Percept
 from experiments.participants.nearest import Nearest
 from experiments.participants.searcher import Searcher
 from experiments.participants.visit_executor import VisitExecutor
+from mjsim.actions import WAIT, Action
 
 
 class BreadcrumbFollower:
-    """Walks along the breadcrumbs and does what the current step says."""
+    """Walks along the breadcrumbs and makes the current step."""
 
     needs = frozenset({"breadcrumb"})
 
     def __init__(self, house: House) -> None:
         self._executor = VisitExecutor(house)
 
-    def act(self, percept: Percept) -> Decision:
+    def act(self, percept: Percept) -> Action:
         """Walk along the breadcrumbs; pick or place at their end."""
         if percept.busy or percept.guidance is None:
             return WAIT
@@ -33,8 +34,8 @@ class Follower:
         self._house, self._rng = house, rng
         self._conduct: Participant | None = None
 
-    def act(self, percept: Percept) -> Decision:
-        """Do as the best guidance on display suggests."""
+    def act(self, percept: Percept) -> Action:
+        """Follow the best guidance on display."""
         if self._conduct is None:
             self._conduct = self._choose(percept.shown_roles)
         return self._conduct.act(percept)
@@ -47,5 +48,5 @@ class Follower:
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:
-    """Make a participant that makes the most of what it is shown."""
+    """Make a participant that uses the best guidance on display."""
     return Follower(house, rng)

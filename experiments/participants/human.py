@@ -9,9 +9,5 @@ from experiments.house import House
 
 
 def build(house: House, rng: np.random.Generator) -> Never:  # noqa: ARG001 - the interface of participants
-    """Refuse to simulate a person.
-
-    Raises:
-        ConfigError: Always.
-    """
+    """Refuse to simulate a person."""
     raise ConfigError("user human is a person at the keyboard; start `mjsim play` instead")

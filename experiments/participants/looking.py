@@ -2,8 +2,8 @@
 
 import math
 
-from experiments.participants.base import Decision, Percept
-from mjsim.actions import Move
+from experiments.participants.base import Percept
+from mjsim.actions import Action, Move
 
 TURNING = 0.8  # of the turning speed
 LOOK_GAIN = 4.0  # rad/s per rad of pitch
@@ -11,17 +11,12 @@ FULL_TURN = 2.0 * math.pi
 
 
 class FullTurn:
-    """Turns once around.
-
-    Args:
-        heading: Where the turn begins, rad.
-        level: Whether to look straight ahead meanwhile, for what is far away; else where the gaze happens to be.
-    """
+    """Turns once around from a heading, rad; with `level` the gaze is straight ahead, else the pitch stays."""
 
     def __init__(self, heading: float, *, level: bool = False) -> None:
         self._turned, self._heading, self._level = 0.0, heading, level
 
-    def act(self, percept: Percept) -> Decision | None:
+    def act(self, percept: Percept) -> Action | None:
         """Turn on; None once the turn is complete."""
         step = (percept.heading - self._heading + math.pi) % FULL_TURN - math.pi
         self._turned, self._heading = self._turned + step, percept.heading

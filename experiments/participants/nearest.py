@@ -3,14 +3,15 @@
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Participant, Percept, Point
+from experiments.participants.base import Participant, Percept, Point
 from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor
+from mjsim.actions import TIME_TOLERANCE, WAIT, Action
 from planner.plan import Visit, VisitKind
 
 
 class Nearest:
-    """Greedy: goes to the nearest place where something can be done, and keeps to a decision once made.
+    """Greedy: goes to the nearest possible visit, and keeps to a decision once made.
 
     It turns around once to see all flagpoles, remembers them, and turns again when it knows of none.
     """
@@ -25,7 +26,7 @@ class Nearest:
         self._turn: FullTurn | None = None
         self._next_look = 0.0
 
-    def act(self, percept: Percept) -> Decision:
+    def act(self, percept: Percept) -> Action:
         """Look around at first; then go to the nearest flagpole or bin, and pick or place there."""
         if percept.busy:
             return WAIT
@@ -40,7 +41,7 @@ class Nearest:
         return self._visit(percept)
 
     def _look(self, percept: Percept) -> None:
-        """Learn where flagpoles are; forget those of objects in a hand, and of one that is not where it was."""
+        """Learn where flagpoles are; forget those of objects in a hand, and of those that moved."""
         self._executor.look_for_bins(percept)
         for name in percept.carried:
             self._known.pop(name, None)
@@ -51,7 +52,7 @@ class Nearest:
             self._next_look = percept.time + percept.person.looking_interval
             self._known.update(percept.flagpoles)
 
-    def _visit(self, percept: Percept) -> Decision:
+    def _visit(self, percept: Percept) -> Action:
         feasible = [Visit(VisitKind.PLACE, name) for name in percept.carried]
         if not percept.hands_full:
             feasible += [Visit(VisitKind.PICK, name) for name in self._known]
@@ -62,6 +63,6 @@ class Nearest:
         return self._executor.act(percept, self._choice, self._known)
 
 
-def build(house: House, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it leaves nothing to chance
-    """Make a participant that goes for what is nearest."""
+def build(house: House, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it makes no random choices
+    """Make a participant that goes to the nearest visit."""
     return Nearest(house)

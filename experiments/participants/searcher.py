@@ -1,13 +1,14 @@
-"""Searches room by room with what it can see, and tidies what it finds (condition `none`)."""
+"""Searches room by room by sight, and tidies the objects that it finds (condition `none`)."""
 
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Participant, Percept, Point
+from experiments.participants.base import Participant, Percept, Point
 from experiments.participants.distances import estimated_distances
+from experiments.participants.frontier import Frontier, Place
 from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor
-from mjsim.actions import IDLE
+from mjsim.actions import IDLE, TIME_TOLERANCE, WAIT, Action
 from planner.plan import Visit, VisitKind
 
 SEARCHED = 0.5  # m from a viewpoint before the look around begins
@@ -15,25 +16,24 @@ GONE = 1.2  # m: a remembered object nearer than this and not in view is no long
 
 
 class Searcher:
-    """Picks what it has seen, brings what it carries when both hands are full or nothing else is known,
-    and searches the rest of the present room before it goes on to the nearest unsearched one."""
+    """Picks objects that it has seen, places them when both hands are full or no others are known,
+    and searches the rest of the present room before the nearest unsearched one."""
 
     needs: frozenset[str] = frozenset()
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
         self._house = house
-        self._rng = rng
         self._executor = VisitExecutor(house)
         self._remembered: dict[str, Point] = {}
-        self._unsearched: list[tuple[str, Point]] = []
-        self._target: tuple[str, Point] | None = None
+        self._frontier = Frontier(house, rng)
+        self._target: Place | None = None
         self._room: str | None = None
         self._turn: FullTurn | None = None
         self._next_look = 0.0
         self._choice: Visit | None = None
 
-    def act(self, percept: Percept) -> Decision:
-        """Look and remember; fetch or bring what is known, else search."""
+    def act(self, percept: Percept) -> Action:
+        """Look and remember; fetch or place known objects, else search."""
         if percept.busy:
             return WAIT
         self._look(percept)
@@ -53,7 +53,7 @@ class Searcher:
         self._remembered.update(percept.look())
 
     def _next_visit(self, percept: Percept) -> Visit | None:
-        """What can be done with what is known: fetch the nearest known object, or bring what is carried."""
+        """The next visit with known objects: fetch the nearest one, or place a carried one."""
         bins = [Visit(VisitKind.PLACE, name) for name in percept.carried]
         known = [Visit(VisitKind.PICK, name) for name in sorted(self._remembered)]
         feasible = bins if percept.hands_full else known or bins
@@ -72,47 +72,29 @@ class Searcher:
         near = float(np.linalg.norm(self._remembered[name] - percept.position)) < GONE
         return refused and near and name not in percept.look()
 
-    def _search(self, percept: Percept) -> Decision:
-        if self._turn is not None:
-            return self._look_around(percept, self._turn)
-        room, viewpoint = self._viewpoint(percept)
-        if float(np.linalg.norm(viewpoint - percept.position)) > SEARCHED:
-            return self._executor.walk_to(percept, viewpoint, SEARCHED, until=self._next_look)
-        self._room, self._turn = room, FullTurn(percept.heading)
-        return self._look_around(percept, self._turn)
-
-    def _viewpoint(self, percept: Percept) -> tuple[str, Point]:
-        """Viewpoint to search from next, and its room."""
-        if self._target is None:
-            self._target = self._next_viewpoint(percept.position)
-        return self._target
-
-    def _look_around(self, percept: Percept, turn: FullTurn) -> Decision:
-        turning = turn.act(percept)
+    def _search(self, percept: Percept) -> Action:
+        if self._turn is None:
+            if self._target is None:
+                self._target = self._next_place(percept.position)
+            if float(np.linalg.norm(self._target.point - percept.position)) > SEARCHED:
+                return self._executor.walk_to(percept, self._target.point, SEARCHED, until=self._next_look)
+            self._room, self._turn = self._target.room, FullTurn(percept.heading)
+        turning = self._turn.act(percept)
         if turning is not None:
             return turning
         self._turn = None
         if self._target is not None:
-            self._unsearched = [v for v in self._unsearched if v is not self._target]
+            self._frontier.mark_searched(self._target)
             self._target = None
         return IDLE
 
-    def _next_viewpoint(self, position: Point) -> tuple[str, Point]:
-        if not self._unsearched:
-            self._unsearched = self._all_viewpoints()
-        here = [v for v in self._unsearched if v[0] == self._room] or self._unsearched
-        gaps = estimated_distances(self._house, position, [point for _, point in here])
+    def _next_place(self, position: Point) -> Place:
+        left = self._frontier.places()
+        here = [place for place in left if place.room == self._room] or left
+        gaps = estimated_distances(self._house, position, [place.point for place in here])
         return here[int(np.argmin(gaps))]
-
-    def _all_viewpoints(self) -> list[tuple[str, Point]]:
-        """Every viewpoint, a little elsewhere at each round so that what was hidden once is seen later."""
-        return [
-            (room, self._house.navmesh.snap(point + self._rng.normal(0.0, 0.15, size=2)))
-            for room, points in self._house.viewpoints.items()
-            for point in points
-        ]
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:
-    """Make a participant that knows the house but not where anything lies."""
+    """Make a participant that knows the house but no place of an object."""
     return Searcher(house, rng)

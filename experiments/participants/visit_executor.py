@@ -1,4 +1,4 @@
-"""Carrying out visits: where to walk, how near to go, and what to do there. All simulated participants share it."""
+"""Execution of visits: path, stopping distance and action. All simulated participants share it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Guidance, Percept, Point, WalkAlong
+from experiments.participants.base import Guidance, Percept, Point
 from experiments.participants.bin_search import BinSearch
 from experiments.participants.distances import estimated_distances
-from mjsim.actions import Pick, Place
+from mjsim.actions import TIME_TOLERANCE, WAIT, Action, FollowPath, Pick, Place
+from mjsim.walking.polyline import project
 from planner.plan import Visit, VisitKind
-from planner.polyline import project
 
 STOP_SHARE = 0.72  # of the reach, from the goal: near enough to reach, far enough not to kick it
 CLOSER = 0.12  # m nearer after every refusal
@@ -19,12 +19,9 @@ MIN_STOP_DISTANCE = 0.30  # m
 
 
 class VisitExecutor:
-    """Carries out one visit after the other; goes nearer after a refusal, and takes another path when blocked.
+    """Executes visits; goes nearer after a refusal, and takes another path when blocked.
 
     A bin that the person has not seen is searched for first.
-
-    Args:
-        house: What the participant knows of the house.
     """
 
     def __init__(self, house: House) -> None:
@@ -38,14 +35,10 @@ class VisitExecutor:
 
     def act(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point], *, until: float | None = None
-    ) -> Decision:
-        """Walk the shortest path that the participant knows to a visit, and do it.
+    ) -> Action:
+        """Walk the shortest known path to a visit, and make it.
 
-        Args:
-            percept: What is perceived now.
-            visit: What to do; a new one starts afresh.
-            objects: Where objects are believed to be, m, shape (2,).
-            until: Simulated time at which to ask again, s.
+        `objects` are believed places, m, shape (2,); `until` is the simulated time at which to ask again, s.
         """
         if percept.busy:
             return WAIT
@@ -57,16 +50,16 @@ class VisitExecutor:
             return self._bins.act(percept, percept.targets[visit.object], self.walk_to)
         goal, stand = self._find_places(percept, visit, objects)
         path = self._path_to(percept, stand)
-        return WalkAlong(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
+        return FollowPath(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
 
-    def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Decision:
-        """Walk along the path that is shown, and do what is shown at its end; ask again at `until`, s."""
+    def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Action:
+        """Walk along the shown path and make the shown visit at its end; decide again at `until`, s."""
         if percept.busy:
             return WAIT
         self._take_up(percept, guidance.visit)
         if self._is_reading(percept):
             return WAIT
-        return WalkAlong(
+        return FollowPath(
             guidance.path,
             guidance.goal,
             self._stop_distance,
@@ -78,12 +71,12 @@ class VisitExecutor:
 
     def walk_to(
         self, percept: Percept, goal: Point, stop_distance: float, *, until: float | None = None
-    ) -> Decision:
+    ) -> Action:
         """Walk the shortest known path to a place, m, shape (2,), up to `stop_distance` m from it."""
-        return WalkAlong(self._path_to(percept, goal), goal, stop_distance, until=self._bins.until(until))
+        return FollowPath(self._path_to(percept, goal), goal, stop_distance, until=self._bins.until(until))
 
     def look_for_bins(self, percept: Percept) -> None:
-        """Notice bins that the person has not seen yet; to be called whenever it looks around."""
+        """Notice bins that the person has not seen yet; call it at each look around."""
         self._bins.look(percept)
 
     def nearest_visit(self, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]) -> Visit:
@@ -94,11 +87,11 @@ class VisitExecutor:
         return min(ranked, key=lambda pair: (pair[0], pair[1].kind.value, pair[1].object))[1]
 
     def _knows(self, percept: Percept, visit: Visit) -> bool:
-        """Whether the person knows where a visit takes place."""
+        """Whether the person knows the place of a visit."""
         return visit.kind is VisitKind.PICK or self._bins.knows(percept.targets[visit.object])
 
     def _likely_stand(self, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> Point:
-        """Where the path to a visit ends, or where to begin to look for its bin, m, shape (2,)."""
+        """End of the path to a visit, or start of the search for its bin, m, shape (2,)."""
         if self._knows(percept, visit):
             return places(self._house, percept, visit, objects)[1]
         return self._bins.likely_place(percept.position, percept.targets[visit.object])
@@ -112,7 +105,7 @@ class VisitExecutor:
             self._stop_distance = max(self._stop_distance - CLOSER, MIN_STOP_DISTANCE)
 
     def _is_reading(self, percept: Percept) -> bool:
-        """Whether the person still stands and reads what comes next."""
+        """Whether the person still stands and reads the next step."""
         return percept.time < self._read_until - TIME_TOLERANCE
 
     def _path_to(self, percept: Percept, goal: Point) -> NDArray[np.float64]:
@@ -127,7 +120,7 @@ class VisitExecutor:
     def _find_places(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point]
     ) -> tuple[Point, Point]:
-        """As `places`; worked out anew only for another visit, or when the object has moved."""
+        """As `places`; computed again only for another visit, or when the object has moved."""
         known = self._places
         if known is not None and known[0] == visit:
             _, goal, stand = known
@@ -139,7 +132,7 @@ class VisitExecutor:
 
 
 def places(house: House, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> tuple[Point, Point]:
-    """Where a visit's object or receptacle is, and where the path to it ends, m, both of shape (2,)."""
+    """Place of a visit's object or receptacle, and end of the path to it, m, both of shape (2,)."""
     if visit.kind is VisitKind.PICK:
         goal = objects[visit.object]
         return goal, house.navmesh.snap(goal)
@@ -156,4 +149,4 @@ def _same(one: Point, other: Point) -> bool:
 
 
 def _is_off(path: NDArray[np.float64], percept: Percept) -> bool:
-    return project(path, percept.position[0], percept.position[1])[1] > WalkAlong.tolerance
+    return project(path, percept.position[0], percept.position[1])[1] > FollowPath.tolerance

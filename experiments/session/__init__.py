@@ -1,1 +1,4 @@
-"""One session: the loop, the assistant, what the participant perceives, how it walks, and who watches."""
+"""One session: the loop in which a participant, an assistant and a world take turns, what it perceives, and films.
+
+Serves trials, replays and the browser's worker, which all run the same `Session`.
+"""

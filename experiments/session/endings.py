@@ -4,7 +4,7 @@ ALL_DELIVERED = "all delivered"
 TIME_LIMIT = "time limit"
 INTERRUPTED = "interrupted"
 PHYSICS_ERROR = "physics error"
-ERROR = "error"  # of anything else, such as a participant of one's own
+ERROR = "error"  # anything else, such as an error in a user-supplied participant
 
 COMPLETE = (ALL_DELIVERED, TIME_LIMIT)  # nothing disturbed the session
 BROKEN_OFF = (
@@ -14,4 +14,4 @@ BROKEN_OFF = (
 
 
 class LeaveSession(BaseException):  # not an Exception, as nothing failed
-    """Raised by a participant or a viewer to leave a session; nothing is wrong with it."""
+    """Raised by a participant or a viewer to leave a session early; not a failure."""

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from experiments.errors import ConfigError
 from mjsim.render import PROFILES, RenderProfile
 
+FIRST_PERSON, TOP_DOWN, FREE = CAMERAS = ("first-person", "top-down", "free")  # of a film of a replay
+
 
 @dataclass(frozen=True)
 class FilmConfig:

@@ -100,7 +100,7 @@ class Filming:
 
 
 class TrialFilm:
-    """A viewer that films a trial. A trial is worth more than its film: where filming fails, the trial goes on.
+    """A viewer that films a trial; if filming fails, the trial continues without a film.
 
     Args:
         scene: The scene.

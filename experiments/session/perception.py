@@ -12,9 +12,15 @@ from hud.state import HudState
 from mjsim.actions import ActionResult
 from mjsim.model.drawn_state import drawn_state
 from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.model.sight import (
+    FieldOfView,
+    in_field_of_view,
+    persons_geoms,
+    visible_objects,
+    visible_receptacles,
+    visible_shares,
+)
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.receptacle_visibility import visible_receptacles
-from mjsim.visibility import FieldOfView, in_field_of_view, persons_geoms, visible_objects, visible_shares
 from mjsim.world import World
 
 

@@ -1,4 +1,4 @@
-"""How short a walk could be for somebody who reaches from as far away as the rules allow."""
+"""Lower bound on walking at maximum reach."""
 
 import itertools
 
@@ -10,15 +10,15 @@ from mjsim.model.receptacles import ReceptacleGeometry
 
 
 def reach_bound(tour: float, house: House, episode: Episode) -> float:
-    """Least walk of any order of visits, m.
+    """Lower bound of the walk, m, in any order of visits.
 
-    A tour between the places of the visits is `tour` long at least. Who picks and places from a distance can save that
-    distance on the way to a place and again on the way from it; after the last visit nobody goes on. The objects are
-    taken to stay where they lie, and reaching to go over free floor, not over a piece of furniture.
+    A tour between the places of the visits is `tour` long at least. A person that picks and places from a distance can
+    save that distance on the way to a place and again on the way from it, except after the last visit. Objects are
+    assumed to stay in place, and arms to reach over free floor, not over furniture.
 
     Args:
         tour: A lower bound of all tours between the places, m.
-        house: The house, which knows how far its person reaches.
+        house: The house of a person with some reach.
         episode: The disorganized house.
     """
     reach = house.person.reach

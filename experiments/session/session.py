@@ -1,31 +1,26 @@
-"""The one loop: observe, show, let the user act, step the world. A script, a person and a replay all run in it."""
+"""The one loop: show, perceive, act, step, record. A simulated participant, a person and a replay run in it."""
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from experiments.errors import SessionError, UserCodeError
-from experiments.participants.base import Decision, Participant, Wait, WalkAlong
-from experiments.runs.recording import Recording
-from experiments.runs.trajectory import Trajectory
+from experiments.errors import RecordError, SessionError, UserCodeError
+from experiments.participants.base import Participant
+from experiments.record.reader import Record
+from experiments.record.writer import RecordWriter
 from experiments.session.assistant import Assistant
 from experiments.session.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
-from experiments.session.locomotion import LocomotionController
 from experiments.session.perception import SessionPercept
-from experiments.session.recorded_rollout import roll_out
+from experiments.session.recorded_events import EXTERNAL_EVENTS, catch_up
+from experiments.session.signals import signal_of
 from experiments.session.user_code import decide, describe, needs_of
 from experiments.session.viewer import OnProgress, Progress, Viewer
-from experiments.signals import signal_of
 from hud.state import HudState
-from mjsim.actions import IDLE, Action, ActionResult, WorldEvent
+from mjsim.actions import IDLE, Action, ActionResult, StepAction, WorldEvent
 from mjsim.errors import PhysicsError
 from mjsim.observation import ObjectStatus, Observation
-from mjsim.rollout import Rollout
+from mjsim.steps import Steps
 from mjsim.world import World
 
-FINAL_HOLD = 1.6  # s the session goes on after the last delivery, so that the person sees that all is done
-MAX_MOTION = 30.0  # s; no pick or place takes as long
+FINAL_HOLD = 1.6  # s that the session is shown after the last delivery
 
 
 class Session:
@@ -33,20 +28,12 @@ class Session:
 
     Args:
         world: The physics, freshly made.
-        assistant: Plans and says what the HUD shows.
+        assistant: Plans, and determines what the HUD shows.
         participant: The user.
-        recording: Takes hashes and checkpoints; its log takes the events.
-        walls: Outline of the navigable floor, ends x, y, x, y of its edges, m, shape (e, 4).
+        record: Takes control steps, checkpoints and events.
         time_limit: Simulated time after which the session ends, s.
-        viewer: Sees every control step, or None.
-        rollouts: Take many control steps at once where nobody watches them and they can be foreseen. The run is
-            the same without.
-
-    Attributes:
-        assistant: As above.
-        trajectory: Poses and actions so far.
-        recording: Hashes and checkpoints so far.
-        rollouts: Whether many control steps are taken at once; may be switched off.
+        viewer: Sees every control step, or None. Without one, paths and waits take many control steps at once; the run
+            is the same.
     """
 
     def __init__(
@@ -54,27 +41,20 @@ class Session:
         world: World,
         assistant: Assistant,
         participant: Participant,
-        recording: Recording,
+        record: RecordWriter,
         *,
-        walls: NDArray[np.float64],
         time_limit: float,
         viewer: Viewer | None = None,
-        rollouts: bool = True,
     ) -> None:
         self._world = world
         self.assistant = assistant
         self._participant = participant
-        self._log = recording.log
+        self.record, self._log = record, record.log
         self._time_limit = time_limit
         self._viewer = viewer
-        self.rollouts = rollouts and viewer is None
-        self._controller = LocomotionController(walls, world.scene.person)
         self._answer: ActionResult | None = None
-        self._on_progress: OnProgress = lambda _: None
         self._hud: tuple[Observation, HudState] | None = None
-        self._recorded_until = 0.0
-        self.trajectory = Trajectory(world.scene.index.names)
-        self.recording = recording
+        self._restored_step = -1
 
     def run(self, on_progress: OnProgress = lambda _: None) -> str:
         """Run from the start to the end; returns why it ended: `all delivered`, `time limit` or `interrupted`.
@@ -91,22 +71,19 @@ class Session:
 
         Raises:
             SessionError: The participant needs guidance that the assistance condition does not show.
-            UserCodeError: A condition of somebody's own failed.
+            UserCodeError: A user-supplied condition failed.
         """
         self._now = self._world.reset()
+        self._first_state = self._now, self._world.health_sample, self._world.state_hash()
         try:
             self.assistant.begin(self._now)
         except UserCodeError as error:
             self._log_end(self._now.time, ERROR, error=describe(error))
             raise
-        self.start(self._now)
+        self._start(self._now)
 
-    def start(self, observation: Observation) -> None:
-        """Start from where the world and the assistant are now.
-
-        Raises:
-            SessionError: The participant needs guidance that the assistance condition does not show.
-        """
+    def _start(self, observation: Observation) -> None:
+        """Start in the present state of the world and the assistant."""
         self._now = observation
         self._delivered = len(observation.names_with(ObjectStatus.DELIVERED))
         shown, needs = self.assistant.shown_roles, needs_of(self._participant)
@@ -118,8 +95,7 @@ class Session:
             )
 
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
-        """Go on to the end, once started; returns and raises as `run` does. Whatever ends the session is logged."""
-        self._on_progress = on_progress
+        """Run to the end, once started; returns and raises as `run` does. Whatever ends the session is logged."""
         try:
             while (reason := self.end_reason) is None:
                 self.advance()
@@ -129,8 +105,7 @@ class Session:
             self.end(INTERRUPTED, signal=signal_of(stop).name)
             return INTERRUPTED
         except Exception as error:
-            reason = PHYSICS_ERROR if isinstance(error, PhysicsError) else ERROR
-            self._log_end(self._recorded_until, reason, error=describe(error))
+            self.fail(error)
             raise
         return reason
 
@@ -141,6 +116,16 @@ class Session:
         self.assistant.finish(self._now.time)
         self._log_end(self._now.time, reason, **details)
 
+    def fail(self, error: Exception) -> None:
+        """Log that an error ended the session."""
+        reason = PHYSICS_ERROR if isinstance(error, PhysicsError) else ERROR
+        self._log_end(self.record.time, reason, error=describe(error))
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._now.time
+
     @property
     def progress(self) -> Progress:
         """How far the session has got."""
@@ -148,116 +133,128 @@ class Session:
 
     @property
     def end_reason(self) -> str | None:
-        """Why the session is over; None while it goes on."""
+        """Why the session is over; None while it is not."""
         if self._delivered == len(self._now.object_names):
             return ALL_DELIVERED
         return TIME_LIMIT if self._now.time >= self._time_limit - 1e-9 else None
 
     def advance(self) -> None:
-        """Let the participant decide once, and carry that out: one control step, or a rollout of many.
+        """Let the participant act once: a control step, or as many as a path or a wait takes.
 
         Raises:
             PhysicsError: The physics failed.
         """
-        self._now = self.recording.pass_checkpoint(self._now)
-        self.show()
-        blocked = self._controller.blocked
+        self._observe()
+        world = self._world
         percept = SessionPercept(
-            self._now, self._answer, self._world, self.assistant, self._hud_state, blocked=blocked
+            self._now, self._answer, world, self.assistant, self._hud_state, blocked=world.blocked
         )
-        decision = decide(self._participant, percept)
-        if self.rollouts and self._roll_out(decision):
+        self._step(decide(self._participant, percept), self._step_limit())
+
+    def restore(self, record: Record, step: int | None) -> None:
+        """Continue from the checkpoint before a control step of a record, or from the start if that is None.
+
+        The assistant is told the recorded poses and events before it, as its state is not in the checkpoint.
+
+        Raises:
+            StateError: The checkpoint does not fit the world.
+        """
+        if step is None:
+            self.begin()
             return
-        if self.rollouts and isinstance(decision, WalkAlong) and decision.shown:
-            self._walk_on(decision)
-        else:
-            self._step(self._controller.action(decision, self._now))
+        restored = self._world.restore(record.checkpoint(step))
+        self._now = record.observation(0)
+        self.assistant.begin(self._now)
+        for before in range(step):
+            self._now = record.observation(before + 1)
+            catch_up(self.assistant, self._now, record.events_of(before))
+        self.record.restore(record, step)
+        self._restored_step = step
+        self._start(restored)
+
+    def resume(self, record: Record) -> None:
+        """Continue where the record of an unfinished session ends, from its last checkpoint by its actions.
+
+        Raises:
+            RecordError: It does not lead to the states that it holds.
+        """
+        self.restore(record, max(record.checkpoint_steps, default=None))
+        for step in range(self.record.step, record.steps):
+            self.repeat_events(record, step)
+            self.repeat(record.action(step))
+            if self.record.last_state_hash != record.recording["state_hash"][step]:
+                raise RecordError(
+                    f"the record does not lead to the state that it holds at step {step}; it was made by another "
+                    "version or on another machine"
+                )
+        self.record.restore(record, record.steps)
+
+    def repeat(self, action: StepAction) -> None:
+        """Carry out a recorded action; raises `PhysicsError` if the physics fails."""
+        self._observe()
+        self._step(action, 1)
+
+    def repeat_events(self, record: Record, step: int) -> None:
+        """Repeat events from outside of the simulation before a control step, such as scrolling the task list."""
+        if step == self._restored_step:
+            return
+        first = record.events_before(step - 1) if step else 0
+        for event in record.events[first : record.events_before(step)]:
+            kind, fields = event["event"], {name: event[name] for name in event if name not in ("t", "event")}
+            if kind == "scroll":
+                self.scroll(fields["rows"])
+            elif kind in EXTERNAL_EVENTS:
+                self.note(kind, **fields)
 
     def note(self, event: str, **fields: Any) -> None:
         """Log something from outside of the simulation, in the present state."""
         self._log.append(self._now.time, event, **fields)
 
     def scroll(self, rows: int) -> None:
-        """Scroll the task list by so many rows, positive towards its end; logged for replays."""
+        """Scroll the task list by a number of rows, positive towards its end; logged for replays."""
         self.note("scroll", rows=rows)
         self.assistant.scroll(rows)
         self._hud = None
 
     def _log_end(self, time: float, reason: str, **details: str) -> None:
         """Log the end; a record has one state at least."""
-        if not self.recording.step:
-            self.recording.append()
-        if not len(self.trajectory):
-            self.trajectory.append(self._now, IDLE, self._world.health_sample)
+        if not self.record.step:
+            self.record.append(*self._first_state, Steps(IDLE))
         self._log.append(time, "end", reason=reason, **details)
 
-    def _step(self, action: Action) -> None:
-        """One control step, observed by everybody."""
-        self._note_events(self._recorded_step(action))
+    def _observe(self) -> None:
+        """Pass a checkpoint if one is due, and show the present state."""
+        self._now = self.record.pass_checkpoint(self._world, self._now)
+        self.show()
 
-    def _recorded_step(self, action: Action) -> tuple[WorldEvent, ...]:
-        """One control step, and what happened in it."""
-        self._record(action)
-        step = self._world.step(action)
+    def _step_limit(self) -> int:
+        """How many control steps the next action may take: one if a viewer is attached or a better plan may come."""
+        if self._viewer is not None or self.assistant.expecting:
+            return 1
+        left = int((self._time_limit - self._now.time) / self._world.control_timestep) - 1
+        return max(1, left if self._now.busy else min(left, self.record.steps_to_checkpoint(self._world)))
+
+    def _step(self, action: Action, limit: int) -> None:
+        """Carry out an action, record its control steps, and report what happened."""
+        before = self._now, self._world.health_sample, self._world.state_hash()
+        try:
+            step = self._world.step(action, limit)
+        except PhysicsError as error:
+            self.record.append(*before, error.steps)
+            raise
+        self.record.append(*before, step.steps)
         self._now, self._answer = step.observation, step.result
         if step.result is not None:
             self._note_attempt(step.result)
-        return step.events
-
-    def _walk_on(self, walk: WalkAlong) -> None:
-        """Go on along a shown path without asking again, for as long as the answer would stay the same."""
-        asked, positions = self._now, list[NDArray[np.float64]]()
-        while not (events := self._recorded_step(self._controller.step(walk, self._now))):
-            positions.append(self._now.position)
-            over = self._answer is not None or self.end_reason is not None or self.assistant.expecting
-            if over or not self._controller.keeps_on(walk, asked, self._now):
-                break
-            self._on_progress(self.progress)
-            self._now = self.recording.pass_checkpoint(self._now)
-        if positions:
-            self.assistant.observe_walk(np.array(positions), self._now)
-        self._note_events(events)
-
-    def _roll_out(self, decision: Decision) -> bool:
-        """Carry out many control steps at once, if all of them follow from the decision; whether that was so."""
-        if self.assistant.expecting:
-            return False
-        left = int((self._time_limit - self._now.time) / self._world.control_timestep) - 1
-        if isinstance(decision, Wait):
-            if not self._now.busy or left * self._world.control_timestep <= MAX_MOTION:
-                return False
-            self._note_events(self._recorded(None).events)
-            return True
-        limit = min(left, self.recording.steps_to_checkpoint)
-        moves = self._controller.moves(decision, self._now, self._world.locomotion, limit)
-        if not len(moves):
-            return False
-        rollout = self._recorded(moves)
-        if isinstance(decision, WalkAlong):
-            self._controller.commit(len(rollout))
-        self.assistant.observe_walk(
-            rollout.states.positions[: len(rollout) - bool(rollout.events)], self._now
-        )
-        if rollout.events:
-            self._note_events(rollout.events)
-        return True
-
-    def _recorded(self, moves: NDArray[np.float64] | None) -> Rollout:
-        self._recorded_until = self._now.time
-        rollout = roll_out(self._world, self._now, moves, self.recording, self.trajectory)
-        self._now, self._answer = rollout.observation, None
-        return rollout
-
-    def _record(self, action: Action) -> None:
-        self._recorded_until = self._now.time
-        self.recording.append()
-        self.trajectory.append(self._now, action, self._world.health_sample)
+        if step.steps.passed is not None:
+            self.assistant.observe_walk(step.steps.passed.position, self._now)
+        self._note_events(step.events)
 
     def _record_end(self, reason: str) -> None:
-        """Record the last state; let the viewer see for a moment that all is done. That is not measured."""
+        """Record the last state; show it for a moment, which is not measured."""
         if reason == ALL_DELIVERED:
             self.assistant.show_message("finished", self._now.time)
-        self._record(IDLE)
+        self.record.append(self._now, self._world.health_sample, self._world.state_hash(), Steps(IDLE))
         end = self._now
         while reason == ALL_DELIVERED and self._viewer is not None and self._now.time < end.time + FINAL_HOLD:
             self.show()
@@ -265,7 +262,7 @@ class Session:
         self._now = end
 
     def _note_events(self, events: tuple[WorldEvent, ...]) -> None:
-        """Log what happened in the world and tell the assistant."""
+        """Log the events of the world and pass them to the assistant."""
         for event in events:
             self._log.append(event.time, event.kind.value, object=event.object, receptacle=event.receptacle)
         self.assistant.observe(self._now, events)
@@ -283,7 +280,7 @@ class Session:
             self.assistant.show_message(refusal, time, result.object)
 
     def _hud_state(self) -> HudState:
-        """What the HUD shows now; composed once per state, and only when asked for."""
+        """The present HUD state; composed once per state, when it is first read."""
         if self._hud is None or self._hud[0] is not self._now:
             camera = self._viewer.camera(self._world) if self._viewer is not None else None
             self._hud = self._now, self.assistant.hud_state(self._now, camera)

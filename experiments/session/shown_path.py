@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.walking.polyline import first_off_path, rest_of
 from planner.geodesics import Geodesics
-from planner.polyline import first_off_path, project, rest_of
 
 TOLERANCE = 0.6  # m the person may leave the path before a new one is shown
 MAX_GOAL_SHIFT = 0.25  # m an object may be pushed before a new path to it is shown
@@ -15,14 +15,12 @@ Point = NDArray[np.float64]
 
 
 class ShownPath:
-    """A shortest path that keeps its place on the floor until its goal moves, or the person leaves it.
-
-    It is computed when it is first asked for, which under most conditions it never is.
+    """A shortest path that stays where it is until its goal moves or the person leaves it; computed when it is needed.
 
     Args:
         geodesics: Finds it.
         rerouted: Whether there is a new one from where the person is when the person leaves it. The segment of a plan
-            stays, whoever strays (PAPER section 5).
+            stays (PAPER section 5).
     """
 
     def __init__(self, geodesics: Geodesics, *, rerouted: bool) -> None:
@@ -43,7 +41,7 @@ class ShownPath:
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """All of it, m, shape (k, 2).
+        """The whole path, m, shape (k, 2).
 
         Raises:
             UnreachableError: There is no path.
@@ -53,27 +51,28 @@ class ShownPath:
         return self._points
 
     def ahead(self, position: Point) -> NDArray[np.float64]:
-        """What is left of it from its point nearest to the person, m, shape (k, 2)."""
+        """The path from its point nearest to the person, m, shape (k, 2)."""
         return np.asarray(rest_of(self.points, position[0], position[1]))
 
-    def follow(self, position: Point, target: Point, goal: Point) -> None:
-        """Show a new path if the person has left this one or its goal has moved; all m, shape (2,), as in `begin`."""
-        if self._points is None:
-            return
-        if math.dist(goal, self._goal) > MAX_GOAL_SHIFT:
-            self._renew(position if self._rerouted else self._start, target, goal)
-        elif self._rerouted and project(self._points, position[0], position[1])[1] > TOLERANCE:
-            self._renew(position, target, goal)
+    def follow(self, positions: NDArray[np.float64], target: Point, goal: Point) -> None:
+        """Show a new path where the person left this one.
 
-    def follow_walk(self, positions: NDArray[np.float64], target: Point, goal: Point) -> None:
-        """As `follow` with each of `positions`, m, shape (n, 2), while the goal stays where it is."""
-        first = 0
+        Args:
+            positions: Where the person was, one position after another, m, shape (n, 2).
+            target: As in `begin`.
+            goal: As in `begin`.
+        """
+        off = -1
         while self._rerouted and self._points is not None:
-            off = first_off_path(self._points, positions, first, TOLERANCE)
+            off = first_off_path(self._points, positions, off + 1, TOLERANCE)
             if off < 0:
                 return
             self._renew(positions[off], target, goal)
-            first = off + 1
+
+    def follow_goal(self, position: Point, target: Point, goal: Point) -> None:
+        """Show a new path if the goal has moved; `position` is the person's, m, shape (2,)."""
+        if self._points is not None and math.dist(goal, self._goal) > MAX_GOAL_SHIFT:
+            self._renew(position if self._rerouted else self._start, target, goal)
 
     def _renew(self, position: Point, target: Point, goal: Point) -> None:
         self.begin(position, target, goal)
@@ -81,7 +80,7 @@ class ShownPath:
 
 
 class PathsToNext:
-    """What a condition may show of the way to the next visit.
+    """The paths to the next visit that a condition may show.
 
     Args:
         geodesics: Finds shortest paths.
@@ -101,6 +100,7 @@ class PathsToNext:
         self.path.begin(position, target, goal)
 
     def follow(self, position: Point, target: Point, goal: Point) -> None:
-        """As `ShownPath.follow`."""
-        self.segment.follow(position, target, goal)
-        self.path.follow(position, target, goal)
+        """Show new paths where the person left one or the goal has moved; all m, shape (2,)."""
+        self.segment.follow_goal(position, target, goal)
+        self.path.follow_goal(position, target, goal)
+        self.path.follow(np.array([position]), target, goal)

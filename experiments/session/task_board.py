@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -20,20 +21,13 @@ from planner.plan import Visit, VisitKind
 from planner.regret import Regret
 from planner.route import Route
 
-READING_TIME = 2.0  # s that a message is shown before the announcement of a new plan takes its place
+READING_TIME = 2.0  # s that a message is shown before the announcement of a new plan replaces it
 REPLANNED = "replanned"
 
 
 def task_step(visit: Visit) -> TaskStep:
     """A visit in the terms of the HUD."""
     return TaskStep(visit.kind.value, visit.object)
-
-
-def alternatives(regrets: Mapping[Visit, Regret]) -> tuple[Alternative, ...]:
-    """Regrets of possible next visits in the terms of the HUD."""
-    return tuple(
-        Alternative(*task_step(visit), found.regret, found.capped) for visit, found in regrets.items()
-    )
 
 
 class _Shown(NamedTuple):
@@ -44,64 +38,58 @@ class _Shown(NamedTuple):
     object: str | None = None
 
 
-class PlanShown:
-    """What the planner suggests in one state of the world; worked out when a condition asks for it (`PlanAhead`).
+@dataclass(frozen=True, eq=False)
+class PlanView:
+    """The planner's suggestion in one state of the world, computed when a condition asks for it (`PlanAhead`).
 
-    Args:
+    Attributes:
         board: Describes the task.
         observation: State of the world.
         route: Gives the route.
         paths: Gives the paths to its next visit.
     """
 
-    def __init__(
-        self,
-        board: "TaskBoard",
-        observation: Observation,
-        route: Callable[[], Route | None],
-        paths: Callable[[Visit], PathsToNext],
-    ) -> None:
-        self._board, self._observation, self._paths = board, observation, paths
-        self._route = route
+    board: "TaskBoard"
+    observation: Observation
+    route: Callable[[], Route | None]
+    paths: Callable[[Visit], PathsToNext]
 
     @cached_property
     def steps(self) -> tuple[TaskStep, ...]:
         """Remaining steps in planned order."""
-        route = self._route()
+        route = self.route()
         return () if route is None else tuple(task_step(visit) for visit in route.visits)
 
     @cached_property
     def segment(self) -> NDArray[np.float64] | None:
         """Floor points of the plan's segment to the next visit, m, shape (k, 2)."""
         visit = self._next
-        return None if visit is None else self._paths(visit).segment.points
+        return None if visit is None else self.paths(visit).segment.points
 
     @cached_property
     def path(self) -> NDArray[np.float64] | None:
         """Floor points of the path from the person to the next visit, m, shape (k, 2)."""
         visit = self._next
-        return None if visit is None else self._paths(visit).path.ahead(self._observation.position)
+        return None if visit is None else self.paths(visit).path.ahead(self.observation.position)
 
     @cached_property
     def goal(self) -> Vec3 | None:
         """Where the next visit happens, m."""
         visit = self._next
-        return None if visit is None else self._board.goal(self._observation, visit)
+        return None if visit is None else self.board.goal(self.observation, visit)
 
     @property
     def _next(self) -> Visit | None:
-        route = self._route()
+        route = self.route()
         return None if route is None else route.next
 
 
 class TaskBoard:
     """Describes the state of the task to the conditions, and keeps the message bar and the steps done.
 
-    Attributes:
+    Args:
         house: The house.
         episode: The disorganized house.
-
-    Args:
         order: Object names in this participant's random order (PAPER section 5).
     """
 
@@ -122,9 +110,9 @@ class TaskBoard:
         self._scroll = 0
 
     def scroll(self, rows: int) -> None:
-        """Scroll the task list by so many rows, positive towards its end; it follows the task again from a visit on."""
-        rows_at_most = 2 * len(self.episode.objects)
-        self._scroll = min(max(self._scroll + rows, -rows_at_most), rows_at_most)
+        """Scroll the task list by a number of rows, positive towards its end, until the next visit."""
+        max_rows = 2 * len(self.episode.objects)
+        self._scroll = min(max(self._scroll + rows, -max_rows), max_rows)
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
         """Show a message about an event or refusal from `time` s on; it replaces the one before."""
@@ -134,7 +122,7 @@ class TaskBoard:
         self._latest = _Shown(key, time, object_name)
 
     def announce_replan(self, time: float) -> None:
-        """Show that the plan was changed at `time` s, as soon as there was time to read the latest message."""
+        """Show that the plan was changed at `time` s, once the latest message was shown for `READING_TIME`."""
         self._replanned_at = time
 
     def view(
@@ -171,7 +159,10 @@ class TaskBoard:
             heading=observation.heading,
             bounds=self.house.bounds,
             scroll=self._scroll,
-            alternatives=lambda: alternatives(regrets()),
+            alternatives=lambda: tuple(
+                Alternative(*task_step(visit), found.regret, found.capped)
+                for visit, found in regrets().items()
+            ),
         )
 
     def _message(self, time: float) -> Message | None:
@@ -202,7 +193,7 @@ class TaskBoard:
         return _vec3(self.house.receptacles[self.episode.targets[visit.object]].center)
 
     def _task_objects(self, observation: Observation) -> tuple[TaskObject, ...]:
-        """All objects; those that have not changed since they were last asked for are the same values."""
+        """All objects; those that have not changed since the last call are the same values."""
         positions, statuses = observation.object_positions.tolist(), observation.object_status
         for i, (position, status) in enumerate(zip(positions, statuses, strict=True)):
             known = self._objects.get(i)

@@ -1,19 +1,20 @@
-"""Calling code that is not ours: participants, conditions and planners that users plug in."""
+"""Calls user-supplied participants, conditions and planners, and names the culprit of an error."""
 
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from experiments.errors import ExperimentError, UserCodeError
 from experiments.house import House
 from experiments.participants import participant
-from experiments.participants.base import DECISIONS, Decision, Participant, Percept
+from experiments.participants.base import Participant, Percept
 from hud.conditions import Condition
 from hud.errors import HudError
 from hud.state import HudState
 from hud.task import TaskView
+from mjsim.actions import Action
 from mjsim.errors import MjsimError
 from planner.errors import PlannerError
 
@@ -23,40 +24,40 @@ PACKAGES = ("experiments", "hud", "mjsim", "planner")
 
 @contextmanager
 def user_code(code: object, what: str) -> Iterator[None]:
-    """Turn whatever `code` raises into an error that says whose it is; leave ours as they are.
+    """Wrap exceptions of user-supplied `code` in a `UserCodeError`; errors of this project pass through.
 
     Args:
         code: A function, or an object with methods.
         what: Names it in the message.
 
     Raises:
-        UserCodeError: `code` is no part of this project, and raised something that is no typed error of ours.
+        UserCodeError: `code` is not part of this project and raised something other than this project's errors.
     """
     try:
         yield
     except OUR_ERRORS:
         raise
-    except (Exception, SystemExit) as error:  # somebody's code must not end the process and lose the run
-        if _is_ours(code):
+    except (Exception, SystemExit) as error:  # user code must not end the process and lose the run
+        if _is_of_this_project(code):
             raise
         raise UserCodeError(f"{what} raised {describe(error)}{_place(error)}") from error
 
 
 def describe(error: BaseException) -> str:
-    """An error as one line: what it says, with its type where it is none of ours."""
-    said = " ".join(str(error).split())
+    """An error as one line: its message, preceded by its type unless it is one of this project's errors."""
+    message = " ".join(str(error).split())
     if isinstance(error, OUR_ERRORS):
-        return said
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+        return message
+    return f"{type(error).__name__}: {message}" if message else type(error).__name__
 
 
-def _is_ours(code: object) -> bool:
+def _is_of_this_project(code: object) -> bool:
     module = getattr(code, "__module__", None) or ""
     return module.partition(".")[0] in PACKAGES
 
 
 def _place(error: BaseException) -> str:
-    """Where it was raised, or came out of somebody else's code."""
+    """File and line of the innermost frame outside this project."""
     trace, found = error.__traceback__, ""
     while trace is not None:
         code, module = trace.tb_frame.f_code, str(trace.tb_frame.f_globals.get("__name__", ""))
@@ -73,7 +74,7 @@ def make_participant(
 
     Raises:
         ConfigError: There is no such participant.
-        UserCodeError: It is one of somebody's own that cannot be made, or what is made is no participant.
+        UserCodeError: A user-supplied participant cannot be created, or has no method `act`.
     """
     make = participant(name)
     with user_code(make, f"participant {name!r}"):
@@ -85,10 +86,10 @@ def make_participant(
 
 
 def needs_of(participant: Participant) -> frozenset[str]:
-    """Roles of the markers that a participant cannot do without; one that says nothing needs none.
+    """Roles of the markers that a participant requires; none by default.
 
     Raises:
-        UserCodeError: What it says is no set of names.
+        UserCodeError: `needs` is not a set of names.
     """
     needs: Any = getattr(participant, "needs", frozenset())
     if not isinstance(needs, Set) or not all(isinstance(role, str) for role in needs):
@@ -99,17 +100,17 @@ def needs_of(participant: Participant) -> frozenset[str]:
     return frozenset(needs)
 
 
-def decide(participant: Participant, percept: Percept) -> Decision:
-    """What a participant answers.
+def decide(participant: Participant, percept: Percept) -> Action:
+    """The decision of a participant.
 
     Raises:
-        UserCodeError: It is a participant of somebody's own that failed, or the answer is no decision.
+        UserCodeError: A user-supplied participant failed, or returned something other than a decision.
     """
     name = type(participant).__qualname__
     with user_code(participant, f"participant {name}"):
         decision = participant.act(percept)
-    if not isinstance(decision, DECISIONS):
-        kinds = ", ".join(kind.__name__ for kind in DECISIONS)
+    if not isinstance(decision, Action):
+        kinds = ", ".join(kind.__name__ for kind in get_args(Action))
         raise UserCodeError(
             f"participant {name} answered {decision!r} at {percept.time:.2f} s; act returns one of {kinds}"
         )
@@ -117,10 +118,10 @@ def decide(participant: Participant, percept: Percept) -> Decision:
 
 
 def shown_by(condition: Condition, name: str, view: TaskView) -> HudState:
-    """What an assistance condition shows.
+    """The HUD state of an assistance condition.
 
     Raises:
-        UserCodeError: It is a condition of somebody's own that failed, or the answer is no HUD state.
+        UserCodeError: A user-supplied condition failed, or returned something other than a `HudState`.
     """
     with user_code(condition, f"assistance condition {name!r}"):
         state = condition(view)

@@ -1,4 +1,4 @@
-"""Who watches a session, and how far it has got."""
+"""Viewers of a session, and its progress."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ class Viewer(Protocol):
         ...
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Show the present state, and what the HUD shows in it."""
+        """Show the present state and its HUD."""
         ...
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a session has got, for progress bars."""
+    """Progress of a session, for progress bars."""
 
     time: float
     delivered: int

@@ -1,1 +1,4 @@
-"""Trials and batches of them: what they are, how they are run, and what is kept of them."""
+"""Trials and batches of trials: their settings and designs, how they are run and resumed, and their tables.
+
+Serves `mjsim run` and `mjsim batch`, and studies, which are batches of simulated people.
+"""

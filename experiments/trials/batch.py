@@ -6,58 +6,36 @@ import gc
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.runs.run_directory import TRIALS, check_batch_folder
-from experiments.signals import signals_postponed
+from experiments.record.run_directory import TRIALS, check_batch_folder
+from experiments.session.signals import signals_postponed
 from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import folder_notes, read_trials, trial_key
 from experiments.trials.batch_plan import BatchPlan, plan_batch
 from experiments.trials.design import Design, confounded
-from experiments.trials.ray_workers import ray_cluster
 from experiments.trials.table import write_tables
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import SEEDS, TrialConfig
-from experiments.trials.workers import worker_pool
+from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor
 from mjsim.files import remove_leftovers
 
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
-PROCESSES, RAY = "processes", "ray"
-
-
-class _Pool(Protocol):
-    def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
-
-
-# Who runs trials: name -> context of so many workers.
-EXECUTORS: Mapping[str, Callable[[int], AbstractContextManager[_Pool]]] = {
-    PROCESSES: worker_pool,
-    RAY: ray_cluster,
-}
 
 
 @dataclass(frozen=True)
 class BatchProgress:
-    """Progress of a batch.
+    """Progress of a batch."""
 
-    Attributes:
-        done: Trials done in this call.
-        resumed: Trials that an earlier call had done.
-        failed: Trials that failed in this call.
-        total: Trials of the design.
-        failure: What failed in the latest trial, or None.
-    """
-
-    done: int
-    resumed: int
-    failed: int
-    total: int
-    failure: str | None = None
+    done: int  # trials done in this call
+    resumed: int  # trials that an earlier call had done
+    failed: int  # trials that failed in this call
+    total: int  # trials of the design
+    failure: str | None = None  # what failed in the latest trial, or None
 
 
 def run_batch(
@@ -147,7 +125,7 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
     return [settings[name] for name in ("objects", "assistance", "user", "house", *SEEDS)]
 
 
-def _results(pool: _Pool, jobs: Iterator[tuple[Path, TrialConfig]], workers: int) -> Iterator[str | None]:
+def _results(pool: Executor, jobs: Iterator[tuple[Path, TrialConfig]], workers: int) -> Iterator[str | None]:
     """Submit a few trials at a time; yield None for each one that succeeds, else what went wrong."""
     running: dict[Future[str | None], Path] = {}
     while True:

@@ -2,15 +2,15 @@
 
 import dataclasses
 import functools
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.participants import DEFAULT_PARTICIPANT, participant
-from experiments.runs import records
-from experiments.runs.records import EventLog
+from experiments.record.records import EventLog
 from experiments.trials.fingerprint import Inputs, trial_inputs
 from experiments.trials.setup import draw_behaviour, draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
@@ -26,15 +26,7 @@ Houses = Callable[[str], House]
 
 
 def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
-    """Check that every trial can be run, as far as that shows without running it; what each depends on.
-
-    Raises:
-        ConfigError: There is no such participant, an episode does not fit its trial, or somebody's reach is too short.
-        SessionError: A participant needs guidance that the assistance condition does not show.
-        UserCodeError: A participant or condition of somebody's own fails before the first step.
-        AssetError, EpisodeError, SamplingError: A house or an episode is unusable, or a house too small.
-        PlannerError, HudError: There is no such planner or assistance condition.
-    """
+    """What each trial depends on; raises the error of a trial that cannot be run, as far as that shows beforehand."""
     for check, names in (
         (participant, {trial.user for trial in trials}),
         (condition, {trial.assistance for trial in trials}),
@@ -74,7 +66,7 @@ def _check_episode(trial: TrialConfig, catalogue: Catalogue) -> None:
 
 
 def _check_people(trials: Iterable[TrialConfig], house: Houses) -> None:
-    """Check that everybody reaches every receptacle."""
+    """Check that each person reaches every receptacle."""
     usual = PersonParameters()
     people: dict[str, dict[tuple[float, float], PersonParameters]] = {}
     for trial in trials:
@@ -87,7 +79,7 @@ def _check_people(trials: Iterable[TrialConfig], house: Houses) -> None:
 
 
 def _check_sizes(house: House, sizes: dict[tuple[float, float], PersonParameters]) -> None:
-    """If who is as broad as the broadest and reaches as far as the shortest arm gets along, so do all others."""
+    """If the widest body with the shortest reach fits, everyone does."""
     radii, reaches = zip(*sizes, strict=True)
     try:
         house.for_person(dataclasses.replace(PersonParameters(), body_radius=max(radii), reach=min(reaches)))
@@ -103,10 +95,9 @@ def _may_not_fit(trial: TrialConfig) -> bool:
 
 def _begin(trial: TrialConfig, house: House) -> None:
     """Begin the trial with a single object, so that participant and condition meet; nothing is kept."""
-    small = dataclasses.replace(trial, objects=1, episode=None, live=False)
+    small = replace(trial, objects=1, episode=None, live=False)
     person = draw_person(small)
     house = house.for_person(person)
     scene = compose(trial_episode(small, house), house.catalogue, person=person)
-    with tempfile.TemporaryDirectory() as folder, EventLog(Path(folder) / records.EVENTS) as log:
-        session, _ = prepare_session(small, house, scene, log)
-        session.begin()
+    session, _ = prepare_session(small, house, scene, EventLog())
+    session.begin()

@@ -5,7 +5,6 @@ OUT/outdated/NAME    trials that were run again because something that they depe
 OUT/trials.parquet, OUT/trials.csv    one row per trial
 """
 
-import dataclasses
 import hashlib
 import json
 import re
@@ -15,41 +14,32 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import RecordError
-from experiments.files import read_arrays, read_json
-from experiments.runs import records
-from experiments.runs.checksums import read_checksums, sha256_of
-from experiments.runs.metrics import measure
-from experiments.runs.records import read_events
-from experiments.runs.run_directory import TRIALS
-from experiments.runs.trajectory import HEALTH
+from experiments.record import records
+from experiments.record.checksums import read_checksums, sha256_of
+from experiments.record.columns import HEALTH
+from experiments.record.files import read_arrays, read_json
+from experiments.record.metrics import CIRCUMSTANCES, measure
+from experiments.record.records import read_events
+from experiments.record.run_directory import TRIALS
 from experiments.session.endings import COMPLETE
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.fingerprint import Inputs
-from experiments.trials.trial_config import SEEDS, TrialConfig
+from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConfig
 
 OUTDATED = "outdated"
-NOT_IN_THE_LOG = ("frames_sha256", "renderer", "wall_s")
-LONGEST_NAME = 120  # characters, without seeds and hash
-_SETTINGS = frozenset(field.name for field in dataclasses.fields(TrialConfig))
+MAX_NAME = 120  # characters, without seeds and hash
+_SETTINGS = frozenset(SETTINGS)
 
 
 @dataclass(frozen=True)
 class StoredTrial:
-    """A trial of a batch.
+    """A trial of a batch."""
 
-    Attributes:
-        path: Its run directory.
-        settings: Fields of its configuration by name.
-        inputs: What else it depended on.
-        row: What its log and trajectory say, as in `metrics.json`.
-        as_measured: Whether `metrics.json` says the same.
-    """
-
-    path: Path
-    settings: Mapping[str, Any]
-    inputs: Inputs
-    row: Mapping[str, Any]
-    as_measured: bool
+    path: Path  # its run directory
+    settings: Mapping[str, Any]  # fields of its configuration by name
+    inputs: Inputs  # what else it depended on
+    row: Mapping[str, Any]  # what its log and trajectory say, as in `metrics.json`
+    as_measured: bool  # whether `metrics.json` says the same
 
     @property
     def complete(self) -> bool:
@@ -63,16 +53,12 @@ class StoredTrial:
 
 
 def trial_key(settings: Mapping[str, Any]) -> str:
-    """Equal for equal configurations, wherever the house lies."""
+    """Equal for equal configurations, wherever the files of the house are."""
     return json.dumps({name: settings[name] for name in sorted(settings) if name != "house"})
 
 
 def read_trial(path: Path) -> StoredTrial:
-    """Read a trial of a batch; what it says is worked out anew from its log and trajectory.
-
-    Raises:
-        RecordError: It lacks a file, is not as written, or was made by another version.
-    """
+    """Read a trial of a batch; what it says is worked out anew from its log and trajectory."""
     sums = read_checksums(path)
     for name in (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING):
         if sums.get(name) != sha256_of(path / name):
@@ -84,7 +70,7 @@ def read_trial(path: Path) -> StoredTrial:
     row = measure(events, arrays)
     told = _metrics(path)
     as_measured = all(told.get(name) == value for name, value in json.loads(json.dumps(row)).items())
-    row |= {name: told.get(name) for name in NOT_IN_THE_LOG}
+    row |= {name: told.get(name) for name in CIRCUMSTANCES}
     settings = {name: start[name] for name in _SETTINGS}
     return StoredTrial(path, settings, start["inputs"], row, as_measured)
 
@@ -124,8 +110,8 @@ def trial_name(config: TrialConfig, inputs: Inputs) -> str:
     own_house = config.house.endswith(".toml")
     house = Path(config.house).parent.name if own_house else config.house
     words = [house, f"{config.objects:02d}", config.assistance, config.user]
-    words += [word for word in (config.planner, config.fidelity) if word not in (TrialConfig.planner, "full")]
-    readable = re.sub(r"[^\w.+-]", ".", "-".join(words), flags=re.ASCII)[:LONGEST_NAME]
+    words += [word for word in (config.planner, config.fidelity) if word not in (DEFAULTS["planner"], "full")]
+    readable = re.sub(r"[^\w.+-]", ".", "-".join(words), flags=re.ASCII)[:MAX_NAME]
     seeds = [getattr(config, name) for name in SEEDS]
     numbers = f"{seeds[0]:04d}" if len(set(seeds)) == 1 else "-".join(f"{seed:04d}" for seed in seeds)
     identity = trial_key(config.settings()) + (inputs["house"] if own_house else config.house)
@@ -133,7 +119,7 @@ def trial_name(config: TrialConfig, inputs: Inputs) -> str:
 
 
 def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) -> Iterator[str]:
-    """Lines on what the tables hold or leave out that nobody would expect."""
+    """Lines on unexpected content or gaps of the tables."""
     early = [trial for trial in trials if not trial.complete]
     if early:
         yield (

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.runs.run_directory import TRIALS
+from experiments.record.run_directory import TRIALS
 from experiments.trials.batch_folder import OUTDATED, StoredTrial, put_aside, read_trials, trial_name
 from experiments.trials.design import counted
 from experiments.trials.fingerprint import Inputs, changes
@@ -16,27 +16,15 @@ SHOWN = 3  # names or reasons in a line
 
 @dataclass(frozen=True)
 class BatchPlan:
-    """What is there and what is to be run.
+    """What is there and what is to be run."""
 
-    Attributes:
-        done: Trials of the design that the folder holds, as they would come out now.
-        missing: Folder and configuration of every other trial of the design.
-        notes: Lines that say what is done again, and why.
-    """
-
-    done: tuple[StoredTrial, ...]
-    missing: Mapping[Path, TrialConfig]
-    notes: tuple[str, ...]
+    done: tuple[StoredTrial, ...]  # trials of the design that the folder holds, as they would come out now
+    missing: Mapping[Path, TrialConfig]  # folder and configuration of every other trial of the design
+    notes: tuple[str, ...]  # lines that say what is done again, and why
 
 
 def plan_batch(trials: Sequence[TrialConfig], inputs: Sequence[Inputs], out: Path) -> BatchPlan:
-    """Compare a design with what a folder holds, and put aside what is out of date.
-
-    Args:
-        trials: The design.
-        inputs: What each of them depends on now.
-        out: Folder of the batch.
-    """
+    """Compare a design with what a folder holds, and put aside what is out of date."""
     wanted = dict(zip(trials, inputs, strict=True))
     stored, unusable = read_trials(out)
     by_seed: dict[tuple[int, int, int], list[StoredTrial]] = {}

@@ -7,35 +7,21 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import msgspec
-from msgspec import UNSET, UnsetType
 
 from experiments.errors import ConfigError
-from experiments.participants.behaviour import BehaviourDistribution
-from experiments.trials.person_distribution import PersonDistribution
-from experiments.trials.trial_config import SEEDS, TrialConfig, episode_settings
-
-T = TypeVar("T")
-
-LONGEST_LIST = 1_000_000  # numbers
-PATHS = ("house", "episode", "story")  # relative to the design's file
-# What may differ by accident between the conditions of a comparison.
-CONFOUNDERS = (
-    "user",
-    "objects",
-    "house",
-    "planner",
-    "fidelity",
-    "points",
-    "capacity",
-    "time_limit",
-    "phases",
-    "story",
-    "person",
-    "behaviour",
+from experiments.trials.trial_config import (
+    CONFOUNDERS,
+    PATHS,
+    SEEDS,
+    SETTINGS,
+    TrialConfig,
+    episode_settings,
 )
+
+MAX_NUMBERS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -56,7 +42,7 @@ class Design:
             seeds = ", ".join(f"{name} {getattr(trial, name)}" for name in SEEDS)
             raise ConfigError(
                 f"the design has the same trial {times} times: {trial.objects} objects, {trial.assistance}, "
-                f"{trial.user}, {seeds}; give every person of a cell an own seed"
+                f"{trial.user}, {seeds}; give each person in a cell a distinct seed"
             )
 
 
@@ -68,18 +54,7 @@ def factorial(
     seeds: Sequence[int],
     **same: Any,
 ) -> Design:
-    """Every combination; the seed changes fastest.
-
-    Args:
-        objects: Numbers of misplaced objects.
-        assistance: Assistance conditions.
-        users: Participants.
-        seeds: Seeds.
-        same: Other fields of `TrialConfig`, the same for all trials.
-
-    Raises:
-        ConfigError: A list is empty or names a value twice, or a trial is unusable.
-    """
+    """Every combination; the seed changes fastest. All trials have the `same` other fields of `TrialConfig`."""
     for name, values in (("objects", objects), ("assistance", assistance), ("user", users), ("seeds", seeds)):
         if not values:
             raise ConfigError(f"a batch needs at least one value for --{name}")
@@ -94,121 +69,90 @@ def factorial(
     )
 
 
-_Count = Annotated[int, msgspec.Meta(ge=1)]
-_Text = Annotated[str, msgspec.Meta(min_length=1)]
-_Seeds = int | list[int] | str  # one, several, or a range such as "0:10"
+_Seeds = int | list[int] | str | None  # one, several, or a range such as "0:10"
 
 
-class _Cell(msgspec.Struct, forbid_unknown_fields=True):
-    """People who do the task under the same circumstances."""
+class _People(msgspec.Struct, forbid_unknown_fields=True):
+    """The people of a cell."""
 
-    people: _Count | UnsetType = UNSET
-    seeds: _Seeds | UnsetType = UNSET
-    house_seeds: _Seeds | UnsetType = UNSET
-    person_seeds: _Seeds | UnsetType = UNSET
-    order_seeds: _Seeds | UnsetType = UNSET
-    objects: _Count | UnsetType = UNSET
-    assistance: _Text | UnsetType = UNSET
-    user: _Text | UnsetType = UNSET
-    house: _Text | UnsetType = UNSET
-    episode: _Text | UnsetType = UNSET
-    planner: _Text | UnsetType = UNSET
-    fidelity: _Text | UnsetType = UNSET
-    time_limit: float | UnsetType = UNSET
-    regret: bool | UnsetType = UNSET
-    points: _Count | UnsetType = UNSET
-    capacity: _Count | UnsetType = UNSET
-    phases: list[_Text] | UnsetType = UNSET
-    story: _Text | UnsetType = UNSET
-    person: dict[str, Any] | UnsetType = UNSET
-    behaviour: dict[str, Any] | UnsetType = UNSET
+    people: Annotated[int, msgspec.Meta(ge=1)] | None = None
+    seeds: _Seeds = None
+    house_seeds: _Seeds = None
+    person_seeds: _Seeds = None
+    order_seeds: _Seeds = None
 
-    def given(self) -> dict[str, Any]:
-        """The values that are there, by name."""
-        return {name: v for name in self.__struct_fields__ if (v := getattr(self, name)) is not UNSET}
+    def each(self) -> list[dict[str, int]]:
+        """The three seeds of every person; lists are gone through again for more people."""
+        lists = {name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None}
+        longest = max((len(seeds) for seeds in lists.values()), default=0)
+        people = longest if self.people is None else self.people
+        if people == 0:
+            raise ConfigError("people must be given, or seeds for each of them")
+        if people < longest or people > MAX_NUMBERS:
+            raise ConfigError(f"people is {people}, but there are seeds for {longest}")
+        everyone = lists.pop("seeds", range(people))
+        by_name = {name: lists.get(f"{name}s", everyone) for name in SEEDS}
+        return [{name: seeds[k % len(seeds)] for name, seeds in by_name.items()} for k in range(people)]
+
+
+_SEEDS = ("seeds", *(f"{name}s" for name in SEEDS))
+_IN_A_CELL = {*SETTINGS, "people", *_SEEDS} - {"live", *SEEDS}
 
 
 class _File(msgspec.Struct, forbid_unknown_fields=True):
-    cells: Annotated[list[_Cell], msgspec.Meta(min_length=1)]
-    all_cells: _Cell = msgspec.field(default_factory=_Cell)
+    cells: Annotated[list[dict[str, Any]], msgspec.Meta(min_length=1)]
+    all_cells: dict[str, Any] = msgspec.field(default_factory=dict)
 
 
 def read_design(path: Path) -> Design:
-    """Read a design from a TOML file.
-
-    Raises:
-        ConfigError: It cannot be read, or a value is unusable; the message names file and value.
-        EpisodeError: An episode that it names cannot be read.
-    """
+    """Read a design from a TOML file; a ConfigError names the file and a value that is unusable."""
+    trials: list[TrialConfig] = []
+    reached = None
     try:
         file = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8-sig")), _File)
+        for reached, cell in enumerate(file.cells):  # noqa: B007 - for errors
+            trials += _cell_trials({**file.all_cells, **cell}, path.parent)
+        reached = None
+        return Design(tuple(trials))
     except OSError as error:
         raise ConfigError(f"cannot read design {path}: {error.strerror}") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise ConfigError(f"{path} is not TOML: {error}") from error
-    except msgspec.ValidationError as error:
-        raise ConfigError(f"{path}: {error}; docs/designs.md lists what a design may hold") from error
-    trials: list[TrialConfig] = []
-    for number, cell in enumerate(file.cells):
-        values = {**file.all_cells.given(), **cell.given()}
-        try:
-            trials += _cell_trials(values, path.parent)
-        except ConfigError as error:
-            raise ConfigError(f"{path}: {error} - at `$.cells[{number}]`") from error
-    try:
-        return Design(tuple(trials))
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from error
+    except (msgspec.ValidationError, ConfigError) as error:
+        raise ConfigError(f"{path}: {_located(str(error), reached)}") from error
+
+
+def _located(message: str, cell: int | None) -> str:
+    """A message that says which cell it is about."""
+    if cell is None:
+        return message
+    place = f"`$.cells[{cell}]"
+    return message.replace("`$", place) if "`$" in message else f"{message} - at {place}`"
 
 
 def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
     """The trials of one cell; paths are relative to `folder`."""
-    seeds, settings = _cell_seeds(values), {n: v for n, v in values.items() if n not in _PEOPLE}
+    if unknown := sorted(set(values) - _IN_A_CELL):
+        raise ConfigError(f"unknown field `{unknown[0]}`; docs/designs.md lists what a design may hold")
+    settings = {name: value for name, value in values.items() if name in SETTINGS}
+    people = msgspec.convert({n: v for n, v in values.items() if n not in SETTINGS}, _People).each()
     for name in PATHS:
-        if name in settings and (name != "house" or settings[name].endswith(".toml")):
-            settings[name] = str(folder / settings[name])
+        if isinstance(path := settings.get(name), str) and (name != "house" or path.endswith(".toml")):
+            settings[name] = str(folder / path)
+    if isinstance(settings.get("phases"), list):
+        settings["phases"] = ",".join(map(str, settings["phases"]))
     if "episode" in settings:
         if "objects" in settings or "house_seeds" in values:
             raise ConfigError(
                 "an episode has its own objects and house seed; leave out objects and house_seeds"
             )
         settings = {**episode_settings(Path(settings["episode"])), **settings}
-        seeds = [{n: s for n, s in person.items() if n != "house_seed"} for person in seeds]
-    if "phases" in settings:
-        settings["phases"] = ",".join(settings["phases"])
-    if "person" in settings:
-        settings["person"] = PersonDistribution.of(settings["person"])
-    if "behaviour" in settings:
-        settings["behaviour"] = BehaviourDistribution.of(settings["behaviour"])
-    missing = [name for name in ("objects", "assistance") if name not in settings]
-    if missing:
-        raise ConfigError(f"{' and '.join(missing)} must be given")
-    return [TrialConfig(**{**settings, **person}) for person in seeds]
-
-
-_PEOPLE = ("people", "seeds", *(f"{name}s" for name in SEEDS))
-
-
-def _cell_seeds(values: dict[str, Any]) -> list[dict[str, int]]:
-    """The three seeds of every person of a cell; lists are gone through again for more people."""
-    lists = {name: numbers(values[name]) for name in _PEOPLE[1:] if name in values}
-    longest = max((len(seeds) for seeds in lists.values()), default=0)
-    people = values.get("people", longest)
-    if people == 0:
-        raise ConfigError("people must be given, or seeds for each of them")
-    if people < longest or people > LONGEST_LIST:
-        raise ConfigError(f"people is {people}, but there are seeds for {longest}")
-    everyone = lists.pop("seeds", range(people))
-    by_name = {name: lists.get(f"{name}s", everyone) for name in SEEDS}
-    return [{name: seeds[k % len(seeds)] for name, seeds in by_name.items()} for k in range(people)]
+        people = [{n: s for n, s in seeds.items() if n != "house_seed"} for seeds in people]
+    return [TrialConfig.of({**settings, **seeds}) for seeds in people]
 
 
 def numbers(text: int | list[int] | str) -> list[int]:
-    """Whole numbers: one, several, or as in `6,12` and `0:10` (the end not included), also mixed.
-
-    Raises:
-        ConfigError: It is none of these, too long, or negative.
-    """
+    """Whole numbers: one, several, or as in `6,12` and `0:10` (the end not included), also mixed."""
     if isinstance(text, int):
         text = [text]
     if isinstance(text, list):
@@ -222,8 +166,8 @@ def numbers(text: int | list[int] | str) -> list[int]:
             raise ConfigError(f"{part!r} is neither a number nor a range such as 0:10")
         first = int(found[1])
         end = first + 1 if found[2] is None else int(found[2])
-        if len(values) + end - first > LONGEST_LIST:
-            raise ConfigError(f"{text!r} names more than {LONGEST_LIST} numbers")
+        if len(values) + end - first > MAX_NUMBERS:
+            raise ConfigError(f"{text!r} names more than {MAX_NUMBERS} numbers")
         values.extend(range(first, end))
     if not values:
         raise ConfigError(f"{text!r} names no number; a range's end is not included")

@@ -28,11 +28,7 @@ def _remote(fn: Callable[..., Any]) -> Any:
 
 @contextmanager
 def ray_cluster(count: int) -> Iterator[_Cluster]:  # noqa: ARG001 - the cluster says how many cores it has
-    """The cluster that RAY_ADDRESS names, else the one that runs here, else one of this machine alone.
-
-    Raises:
-        ConfigError: Ray is not installed, or there is no cluster at that address.
-    """
+    """The cluster that RAY_ADDRESS names, else the one that runs here, else one of this machine alone."""
     try:
         import ray
     except ImportError as error:

@@ -9,28 +9,31 @@ from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Participant
-from experiments.runs import records
-from experiments.runs.recording import Recording, provenance
-from experiments.runs.records import EventLog
+from experiments.participants.behaviour import draw
+from experiments.participants.distribution import Distributions
+from experiments.record import records
+from experiments.record.journal import Journal
+from experiments.record.records import EventLog
+from experiments.record.writer import RecordWriter, provenance
 from experiments.session.assistant import Assistant, deliveries
-from experiments.session.regrets import LiveRegrets, Regrets
 from experiments.session.session import Session
 from experiments.session.task_board import TaskBoard
 from experiments.session.user_code import make_participant
 from experiments.session.viewer import Viewer
 from experiments.trials.fingerprint import fingerprint, trial_inputs
-from experiments.trials.person_distribution import PersonDistribution
+from experiments.trials.person import check_person, drawn_person
 from experiments.trials.trial_config import TrialConfig
 from mjsim.episode import Episode
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person_parameters import PersonParameters
 from mjsim.world import World
-from planner.early import EarlyReplanner
 from planner.exact.solver import ExactSolver
-from planner.replanner import Replanner
-from planner.route import RoutePlanner, TaskState
+from planner.regret import RegretEvaluator
+from planner.route import TaskState
+from planner.service import Mode, Planner
 from planner.solver import solver
+from planner.solver_source import SolverSource
 
 _SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
 _LIST_ORDER, _CHANCE, _PERSON, _BEHAVIOUR = range(4)  # purposes of random numbers in a session
@@ -41,37 +44,29 @@ def draw_person(config: TrialConfig) -> PersonParameters:
     """The participant of a trial, drawn by the person's seed.
 
     What `config.person` does not describe is drawn as the participant's factory says in its attribute `person`, a
-    mapping as for `PersonDistribution.of`; what neither describes is usual.
-
-    Raises:
-        ConfigError: There is no such participant, or a value cannot be drawn.
+    mapping as for `Distributions.of`; what neither describes is usual.
     """
     factory = participant(config.user)
     try:
-        of_participant = PersonDistribution.of(getattr(factory, "person", {}))
+        of_participant = Distributions.of(getattr(factory, "person", {}))
+        check_person(of_participant)
     except ConfigError as error:
         raise ConfigError(f"participant {config.user!r}: {error}") from error
-    return of_participant.updated(config.person).draw(_session_rng(config.person_seed, _PERSON))
+    return drawn_person(of_participant.updated(config.person), _session_rng(config.person_seed, _PERSON))
 
 
 def draw_behaviour(config: TrialConfig) -> dict[str, float]:
-    """The values of the participant model in a trial, drawn by the person's seed; empty if it has none.
-
-    Raises:
-        ConfigError: There is no such participant, or it has no such value.
-    """
+    """The values of the participant model in a trial, drawn by the person's seed; empty if it has none."""
     parameters = getattr(participant(config.user), "behaviour", {})
     rng = _session_rng(config.person_seed, _BEHAVIOUR)
-    return config.behaviour.draw(config.user, parameters, rng)
+    values = draw(parameters, config.behaviour, rng, f"participant {config.user!r}")
+    for name, value in values.items():
+        parameters[name].check(name, value)
+    return values
 
 
 def trial_episode(config: TrialConfig, house: House) -> Episode:
-    """The disorganized house of a trial: sampled, or read from its file.
-
-    Raises:
-        ConfigError: The file holds another number of objects than the trial.
-        EpisodeError, SamplingError: There is no such episode.
-    """
+    """The disorganized house of a trial: sampled, or read from its file, which must hold as many objects."""
     if config.episode is None:
         return house.sample_episode(objects=config.objects, seed=config.house_seed, points=config.points)
     episode = Episode.load(Path(config.episode))
@@ -88,18 +83,34 @@ def simulated_user(config: TrialConfig, house: House) -> Participant:
     return make_participant(config.user, house, rng, draw_behaviour(config))
 
 
-def early_replanner(config: TrialConfig, house: House, episode: Episode) -> Replanner | None:
-    """A replanner that makes its first plan while the world is made; None where the planner has to wait for it."""
-    exact = solver(config.planner)
-    if config.live or not isinstance(exact, ExactSolver):
-        return None
-    first = TaskState(
-        position=(episode.start.x, episode.start.y),
-        loose={placed.name: placed.position[:2] for placed in episode.objects},
-        carried=(),
-        deliveries=deliveries(house, episode),
-    )
-    return EarlyReplanner(house.geodesics, exact, first, capacity=config.capacity)
+def solver_source(config: TrialConfig, house: House) -> SolverSource:
+    """Plans of the planner that a trial names."""
+    return SolverSource(house.geodesics, solver(config.planner), capacity=config.capacity)
+
+
+def regret_evaluator(config: TrialConfig, house: House) -> RegretEvaluator:
+    """Finds regrets in a trial."""
+    return RegretEvaluator(house.geodesics, capacity=config.capacity)
+
+
+def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Planner:
+    """The planner of a trial, which has started to plan; close it in the end.
+
+    With the exact planner it works in a thread, as its kernels run without the interpreter's lock. For a live trial all
+    that takes long is done before the clock starts.
+    """
+    mode = Mode.THREAD if isinstance(solver(config.planner), ExactSolver) else Mode.INLINE
+    mode = Mode.LIVE if config.live else mode
+    planner = Planner(solver_source(config, house), regret_evaluator(config, house), mode)
+    if mode is not Mode.INLINE:
+        first = TaskState(
+            position=(episode.start.x, episode.start.y),
+            loose={placed.name: placed.position[:2] for placed in episode.objects},
+            carried=(),
+            deliveries=deliveries(house, episode),
+        )
+        planner.prepare(first, seconds=FAMILIARISATION)
+    return planner
 
 
 def prepare_session(
@@ -108,36 +119,38 @@ def prepare_session(
     scene: Scene,
     log: EventLog,
     viewer: Viewer | None = None,
-    replanner: RoutePlanner | None = None,
+    planner: Planner | None = None,
     *,
     world: World | None = None,
     user: Participant | None = None,
+    journal: Journal | None = None,
 ) -> tuple[Session, World]:
     """Make the world, the assistant and the participant of a trial, ready to run.
 
-    Args:
-        config: The trial.
-        house: The house that it names, for the scene's person (`House.for_person`).
-        scene: The composed episode, with the participant's body.
-        log: Takes the events.
-        viewer: Sees every control step, or None.
-        replanner: Plans for the assistant; None for one whose plans repeat.
-        world: A new world of the scene in the trial's fidelity; None to make one.
-        user: The participant; None to make the one that is named.
+    The house is for the scene's person (`House.for_person`); a given `world` must be new. World, planner and
+    participant are made where none is given; without a journal, the record is kept in memory.
     """
     order_rng = _session_rng(config.order_seed, _LIST_ORDER)
+    planner = planner or Planner(solver_source(config, house), regret_evaluator(config, house))
     order = [scene.index.names[i] for i in order_rng.permutation(len(scene.index.names))]
-    world = world or World(scene, WorldOptions(fidelity=config.fidelity, capacity=config.capacity))
+    options = WorldOptions(fidelity=config.fidelity, capacity=config.capacity)
+    world = world or World(scene, options, walls=house.navmesh.outline)
     behaviour = draw_behaviour(config)
     _log_start(config, house, world, order, log)
     drawn = {"behaviour": behaviour} if behaviour else {}
     log.append(0.0, records.PARTICIPANT, user=config.user, person=scene.person.as_dict(), **drawn)
     session = Session(
         world,
-        _make_assistant(config, TaskBoard(house, scene.episode, order), world, log, replanner),
+        Assistant(
+            TaskBoard(house, scene.episode, order),
+            assistance=config.assistance,
+            planner=planner,
+            log=log,
+            log_regrets=config.regret,
+            options=world.options,
+        ),
         user or simulated_user(config, house),
-        Recording(world, log),
-        walls=house.navmesh.outline,
+        RecordWriter(scene.episode, log, journal),
         time_limit=config.limit,
         viewer=viewer,
     )
@@ -163,27 +176,3 @@ def _log_start(config: TrialConfig, house: House, world: World, order: list[str]
         episode_sha256=hashlib.sha256(episode).hexdigest(),
         order=order,
     )
-
-
-def _make_assistant(
-    config: TrialConfig, board: TaskBoard, world: World, log: EventLog, replanner: RoutePlanner | None
-) -> Assistant:
-    """The assistant of a trial; for a live one, all that takes long is done before the clock starts."""
-    geodesics = board.house.geodesics
-    replanner = replanner or Replanner(geodesics, solver(config.planner), capacity=config.capacity)
-    regrets = (LiveRegrets if config.live else Regrets)(geodesics, config.capacity)
-    assistant = Assistant(
-        board,
-        assistance=config.assistance,
-        planner=replanner,
-        log=log,
-        regrets=regrets,
-        log_regrets=config.regret,
-        options=world.options,
-        background=isinstance(replanner, EarlyReplanner),
-    )
-    if config.live:
-        state = assistant.task_state(world.observation())
-        route = replanner.prepare(state, seconds=FAMILIARISATION)
-        regrets.prepare(state, route.plan)
-    return assistant

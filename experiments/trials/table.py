@@ -14,14 +14,9 @@ NAME = "trials"
 
 
 def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
-    """Write `trials.parquet` and `trials.csv`, a row per trial, each whole or not at all.
+    """Write `trials.parquet` and `trials.csv`, a row per trial, each whole or not at all; their paths in this order.
 
-    Args:
-        folder: Where to write.
-        rows: Metrics per trial; columns are the union of their keys in order of first appearance.
-
-    Returns:
-        The two paths, Parquet first.
+    Columns are the union of the rows' keys in order of first appearance.
     """
     columns = list(dict.fromkeys(key for row in rows for key in row))
     table = pa.table({c: [row.get(c) for row in rows] for c in columns})

@@ -1,42 +1,47 @@
 """One trial: an episode, an assistance condition, a participant and a seed, recorded into a run directory."""
 
 import dataclasses
+import os
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from experiments.errors import UserCodeError
-from experiments.familiarisation.familiarise import Familiarisation, familiarise
 from experiments.house import House
-from experiments.participants.base import Participant
-from experiments.runs import records
-from experiments.runs.phases import TRAINING
-from experiments.runs.records import EventLog
-from experiments.runs.run_directory import run_directory
+from experiments.procedure.familiarise import Familiarisation, familiarise
+from experiments.record import records
+from experiments.record.export import NOTHING_FILMED, save_record
+from experiments.record.origin import origin_of
+from experiments.record.phases import TRAINING
+from experiments.record.reader import Record
+from experiments.record.records import EventLog
+from experiments.record.run_directory import add_files, run_directory
+from experiments.record.topdown import draw_topdown
 from experiments.session.endings import INTERRUPTED
 from experiments.session.film_config import FilmConfig
-from experiments.session.first_person import TrialFilm
+from experiments.session.signals import Stopped, signals_postponed
+from experiments.session.user_code import describe
 from experiments.session.viewer import OnProgress, Progress
-from experiments.signals import Stopped, signals_postponed
 from experiments.trials.setup import (
     draw_person,
-    early_replanner,
     prepare_session,
+    prepared_planner,
     simulated_user,
     trial_episode,
 )
 from experiments.trials.training import training_config
 from experiments.trials.trial_config import TrialConfig
-from experiments.trials.trial_record import NOTHING_FILMED, SessionResult, draw_floor_plan, save_record
 from mjsim.errors import PhysicsError
+from mjsim.files import work_folder
 from mjsim.model.scene import Scene, compose
 from mjsim.person_parameters import PersonParameters
-from planner.live import LiveReplanner
-from planner.route import RoutePlanner
-from planner.solver import solver
+from planner.service import Planner
+
+if TYPE_CHECKING:
+    from experiments.session.first_person import TrialFilm
 
 
 def run_trial(
@@ -59,7 +64,7 @@ def run_trial(
         topdown: Whether to draw the floor plan.
         replace: Whether `out` may take the place of an earlier run.
         house: A loaded house to use again; it must be the one that `config` names.
-        on_progress: Called after every control step.
+        on_progress: Called after every action.
         on_warning: Called with what went wrong without harm to the record: no video, no floor plan.
 
     Returns:
@@ -77,7 +82,7 @@ def run_trial(
             person = draw_person(config)
             house = (house or House.load(config.house)).for_person(person)
             episode = trial_episode(config, house)
-            planner = early_replanner(config, house, episode)
+            planner = prepared_planner(config, house, episode)
             scene = compose(episode, house.catalogue, person=person, visuals=film is not None)
 
             def progress(now: Progress) -> None:
@@ -85,23 +90,36 @@ def run_trial(
                 signals.check()
 
             known = _before_the_task(config, house, person, folder, lambda _: signals.check())
-            result = _Trial(config, house, scene, folder, film, known, planner).run(progress)
-            if result.error is not None and not result.has_steps:
-                raise result.error
+            filming = None if film is None else _make_film(scene, house, film, folder)
+            result = _run_session(config, house, scene, known, progress, filming, planner)
             signals.save()
-            wall = time.perf_counter() - started
-            metrics = save_record(folder, out, scene, result, wall)
+            metrics = result.save(folder, out, time.perf_counter() - started)
         if result.error is not None:
             raise _kept(result.error, out)
     for warning in (
-        result.no_film,
-        draw_floor_plan(out, house, scene, result) if topdown else None,
+        result.film.failure if result.film is not None else None,
+        draw_floor_plan(out, house, result.record) if topdown else None,
     ):
         if warning is not None:
             on_warning(warning)
     if signals.number is not None and metrics["ended"] != INTERRUPTED:
         raise Stopped(signals.number)
     return metrics
+
+
+def draw_floor_plan(run: Path, house: House, record: Record) -> str | None:
+    """Add the floor plan to a run directory; why that was not possible, or None."""
+    if not record.plans:
+        return None
+    try:
+        origin = origin_of([record.start["user"]])
+        with work_folder(Path(os.path.realpath(run)).parent) as folder:
+            walked = record.trajectory["position"]
+            draw_topdown(folder / records.TOPDOWN, house, record.episode, record.plans[0], walked, origin)
+            add_files(folder, run)
+    except Exception as error:  # no picture is worth a record
+        return f"no floor plan: {describe(error)}"
+    return None
 
 
 def _kept(error: Exception, out: Path) -> Exception:
@@ -112,70 +130,54 @@ def _kept(error: Exception, out: Path) -> Exception:
     return error
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """A trial that is about to run in its working folder."""
+@dataclass(frozen=True, eq=False)
+class _Result:
+    """A session that is over: its record, what ended it where that is an error, and its film, if any."""
 
-    config: TrialConfig
-    house: House
-    scene: Scene
-    folder: Path
-    film: FilmConfig | None
-    known: Familiarisation
-    planner: RoutePlanner | None = None
+    record: Record
+    error: Exception | None
+    film: "TrialFilm | None"
 
-    def run(self, on_progress: OnProgress) -> SessionResult:
-        """Run the session; log and video are complete in the folder afterwards."""
-        result = self._run_once(on_progress, rollouts=True)
-        if isinstance(result.error, PhysicsError):
-            # Again, step by step: the run is the same, and the record then leads up to the very step that failed.
-            for path in self.folder.iterdir():
-                if path.is_file():
-                    path.unlink()
-            planner = early_replanner(self.config, self.house, self.scene.episode)
-            result = dataclasses.replace(self, planner=planner)._run_once(on_progress, rollouts=False)
-        return result
-
-    def _run_once(self, on_progress: OnProgress, *, rollouts: bool) -> SessionResult:
-        film = error = None
-        replanner = self.planner
-        with ExitStack() as stack:
-            log = stack.enter_context(EventLog(self.folder / records.EVENTS))
-            if self.film is not None:
-                film = TrialFilm(self.scene, self.house, self.film, self.folder / records.VIDEO)
-                stack.enter_context(film)
-            if self.config.live:
-                planner = solver(self.config.planner)
-                live = LiveReplanner(self.house.geodesics, planner, capacity=self.config.capacity)
-                replanner = stack.enter_context(live)
-            session, _ = prepare_session(
-                self.config,
-                self.house,
-                self.scene,
-                log,
-                film,
-                replanner,
-                user=self._make_user(),
-            )
-            session.rollouts = session.rollouts and rollouts
-            self.known.log(log)
-            try:
-                session.run(on_progress)
-            except Exception as failure:
-                error = failure
-        if film is None:
-            return SessionResult.of_session(session, error)
-        return SessionResult.of_session(
-            session,
-            error,
-            frames_sha256=film.frames_sha256,
-            renderer=film.renderer_name or NOTHING_FILMED,
-            no_film=film.failure,
+    def save(self, folder: Path, out: Path, wall: float) -> dict[str, Any]:
+        """Write the run directory that will appear at `out`; raises the error if there is nothing to keep."""
+        if self.error is not None and not self.record.steps:
+            raise self.error
+        if self.film is None:
+            return save_record(folder, out, self.record, wall)
+        renderer = self.film.renderer_name or NOTHING_FILMED
+        return save_record(
+            folder, out, self.record, wall, frames_sha256=self.film.frames_sha256, renderer=renderer
         )
 
-    def _make_user(self) -> Participant:
-        house, seen = self.house, self.known.seen
-        return simulated_user(self.config, house if seen is None else dataclasses.replace(house, seen=seen))
+
+def _run_session(
+    config: TrialConfig,
+    house: House,
+    scene: Scene,
+    known: Familiarisation,
+    on_progress: OnProgress,
+    film: "TrialFilm | None" = None,
+    planner: Planner | None = None,
+) -> _Result:
+    """Run the session of a trial; its film is complete afterwards."""
+    error, log = None, EventLog()
+    planner = planner or prepared_planner(config, house, scene.episode)
+    known_house = house if known.seen is None else dataclasses.replace(house, seen=known.seen)
+    with closing(planner), film or nullcontext():
+        user = simulated_user(config, known_house)
+        session, _ = prepare_session(config, house, scene, log, film, planner, user=user)
+        known.log(log)
+        try:
+            session.run(on_progress)
+        except Exception as failure:
+            error = failure
+    return _Result(session.record.record(), error, film)
+
+
+def _make_film(scene: Scene, house: House, config: FilmConfig, folder: Path) -> "TrialFilm":
+    from experiments.session.first_person import TrialFilm  # OpenGL and FFmpeg take a while to load
+
+    return TrialFilm(scene, house, config, folder / records.VIDEO)
 
 
 def _before_the_task(
@@ -189,8 +191,6 @@ def _before_the_task(
     place = folder / records.TRAINING
     place.mkdir()
     scene = compose(trial_episode(training, house), house.catalogue, person=person, visuals=False)
-    result = _Trial(training, house, scene, place, None, Familiarisation((), known.seen)).run(on_progress)
-    if result.error is not None and not result.has_steps:
-        raise result.error
-    save_record(place, place, scene, result, time.perf_counter() - started)
-    return known.trained(result.log.events)
+    result = _run_session(training, house, scene, Familiarisation((), known.seen), on_progress)
+    result.save(place, place, time.perf_counter() - started)
+    return known.trained(result.record.events)

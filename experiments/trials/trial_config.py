@@ -1,96 +1,156 @@
-"""What decides how a trial goes."""
+"""The settings of a trial. Options, design files, the start event, columns and docs/data.md are made from this type."""
 
-import dataclasses
 import math
-from dataclasses import InitVar, dataclass, field
+import typing
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
+
+import msgspec
 
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
-from experiments.participants.behaviour import BehaviourDistribution
-from experiments.runs.phases import STORY, TASK, phases_of
-from experiments.trials.person_distribution import PersonDistribution
+from experiments.participants.distribution import Distributions
+from experiments.record.phases import STORY, TASK, phases_of
+from experiments.trials.person import check_person
 from mjsim.episode import CAPACITY, POINTS, Episode
 from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solver import DEFAULT_SOLVER
 
 SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
-SEEDS = {  # name -> seed of what
-    "house_seed": "the house: what lies where, and the start",
-    "person_seed": "the participant's chance",
-    "order_seed": "the order of the list",
-}
-LARGEST_SEED = 2**63 - 1  # tables hold 64 bits
+SEEDS = ("house_seed", "person_seed", "order_seed")
+MAX_SEED = 2**63 - 1  # tables hold 64 bits
+
+
+def _about(description: str, **extra: Any) -> msgspec.Meta:
+    """Description of a setting; `metavar` and `choices` of its option; whether it is a path relative to a design."""
+    return msgspec.Meta(description=description, extra=extra)
+
+
 _AS_SEED = cast(int, None)  # filled in from `seed`
 
 
-@dataclass(frozen=True)
-class TrialConfig:
+class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything that decides how a trial goes; equal configurations give equal records.
 
-    Attributes:
-        objects: How many misplaced objects.
-        assistance: Assistance condition.
-        seed: Those of the three seeds that are not given.
-        user: Participant.
-        house: House name, or path of a catalogue; a path is made absolute.
-        planner: Solver of the routing problem, by name or `package.module:attribute`.
-        time_limit: Simulated time after which the trial ends, s; None for a generous one.
-        live: Plan in real time, with proofs in the background, as for a person. Such a run depends on the machine's
-            speed; a replay shows the plans that were shown.
-        fidelity: How much of the world is physics: `full`, `windows` or `event` (docs/fidelity.md).
-        regret: Log for every visit by how much it makes the rest of the task longer than the best one would.
-        house_seed: What lies where, and the start.
-        person_seed: The chance of the participant.
-        order_seed: The order of the list in the HUD (PAPER section 5).
-        points: Points of the house where objects may lie; levels of difficulty share them (PAPER section 4).
-        capacity: How many objects are carried at most.
-        episode: Path of an episode to run instead of sampling one; it is made absolute.
-        phases: What the participant goes through, in order, joined by commas: `story`, `flythrough` and `training` may
-            come before the `task` (docs/procedure.md). Only with `flythrough` does a simulated participant have to find
-            the bins that it did not see; else it knows them all.
-        story: Path of a text to read instead of the usual story; it is made absolute.
-        person: How speeds, reach, size and senses of the participant are distributed (docs/people.md).
-        behaviour: How the parameters of the participant model are distributed (docs/participants.md).
+    The field `seed` sets those of the three seeds that are not given, and is None afterwards.
 
     Raises:
         ConfigError: A value is unusable.
     """
 
-    objects: int
-    assistance: str
-    seed: InitVar[int | None] = None
-    user: str = DEFAULT_PARTICIPANT
-    house: str = "apartment"
-    planner: str = DEFAULT_SOLVER
-    time_limit: float | None = None
-    live: bool = False
-    fidelity: str = WorldOptions.fidelity
-    regret: bool = True
-    house_seed: int = _AS_SEED
-    person_seed: int = _AS_SEED
-    order_seed: int = _AS_SEED
-    points: int = POINTS
-    capacity: int = CAPACITY
-    episode: str | None = None
-    phases: str = TASK
-    story: str | None = None
-    person: PersonDistribution = field(default_factory=PersonDistribution)
-    behaviour: BehaviourDistribution = field(default_factory=BehaviourDistribution)
+    objects: Annotated[int, _about("Number of misplaced objects, 1 to the number of points.", metavar="N")]
+    assistance: Annotated[str, _about("Assistance condition.", metavar="NAME")]
+    user: Annotated[str, _about("Participant.", metavar="NAME")] = DEFAULT_PARTICIPANT
+    house: Annotated[
+        str, _about("Name of a house, or path of its catalogue.toml.", metavar="NAME", path=True)
+    ] = "apartment"
+    planner: Annotated[str, _about("Solver of the routing problem.", metavar="NAME")] = DEFAULT_SOLVER
+    time_limit: Annotated[
+        float | None,
+        _about(
+            "Simulated time after which a trial ends, s (default: 60, and 150 for each object).", metavar="S"
+        ),
+    ] = None
+    live: Annotated[
+        bool,
+        _about(
+            "Plan in real time, with proofs in the background, as for a person. Such a run depends on the machine's "
+            "speed; a replay shows the plans that were shown."
+        ),
+    ] = False
+    fidelity: Annotated[
+        str,
+        _about(
+            "How much of the world is physics: `full`, everything; `event`, only what falls (docs/fidelity.md).",
+            choices=FIDELITIES,
+        ),
+    ] = WorldOptions.fidelity
+    regret: Annotated[
+        bool,
+        _about(
+            "Log for every visit by how much it makes the rest of the task longer than the best one would; takes up "
+            "to 1 s a trial."
+        ),
+    ] = True
+    house_seed: Annotated[int, _about("Seed of the house: what lies where, and the start.", metavar="S")] = (
+        _AS_SEED
+    )
+    person_seed: Annotated[int, _about("Seed of the participant's chance.", metavar="S")] = _AS_SEED
+    order_seed: Annotated[
+        int, _about("Seed of the order of the list in the HUD (PAPER section 5).", metavar="S")
+    ] = _AS_SEED
+    points: Annotated[
+        int,
+        _about(
+            "Points of the house where objects may lie, at least 1 m apart; fewer fit into a small house. Levels of "
+            "difficulty share them (PAPER section 4).",
+            metavar="N",
+        ),
+    ] = POINTS
+    capacity: Annotated[
+        int, _about("Objects carried at most; with 1, in the right hand.", choices=CAPACITIES)
+    ] = CAPACITY
+    episode: Annotated[
+        str | None,
+        _about(
+            "Path of an episode (an episode.json) to run instead of sampling one; its objects, house and seed apply.",
+            metavar="FILE",
+            path=True,
+        ),
+    ] = None
+    phases: Annotated[
+        str,
+        _about(
+            "Phases of the trial, in order, joined by commas: `story`, `flythrough` and `training` may come before the "
+            "`task` (docs/procedure.md).",
+            metavar="NAME,..",
+        ),
+    ] = TASK
+    story: Annotated[
+        str | None,
+        _about(
+            "Path of a text to read in the phase `story`, instead of the default one.",
+            metavar="FILE",
+            path=True,
+        ),
+    ] = None
+    person: Annotated[
+        Distributions,
+        _about(
+            "Distributions of the person's values, drawn by the person's seed (docs/people.md).",
+            metavar="SPEC",
+        ),
+    ] = Distributions()
+    behaviour: Annotated[
+        Distributions,
+        _about("Distributions of the parameters of the participant model (docs/participants.md)."),
+    ] = Distributions()
+    seed: Annotated[int | None, _about("Those of the three seeds that are not given.", metavar="S")] = None
 
-    def __post_init__(self, seed: int | None) -> None:
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> "TrialConfig":
+        """The trial whose `settings` these are, or a part of them; a ConfigError if a name or a value is unusable."""
+        try:
+            return msgspec.convert(settings, cls, dec_hook=lambda kind, given: kind.of(given))
+        except msgspec.ValidationError as error:
+            raise ConfigError(str(error)) from error
+
+    def __post_init__(self) -> None:
+        seed = self.seed
         for name in SEEDS:
             if getattr(self, name) is None:
-                object.__setattr__(self, name, seed)
+                self._set(name, seed)
             _check_seed(name if getattr(self, name) != seed else "seed", getattr(self, name))
-        if self.house.endswith(".toml"):
-            object.__setattr__(self, "house", str(Path(self.house).absolute()))
-        for name in ("episode", "story"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, str(Path(getattr(self, name)).absolute()))
-        object.__setattr__(self, "phases", ",".join(phases_of(self.phases)))
+        self._set("seed", None)
+        for name in PATHS:
+            if (path := getattr(self, name)) is not None and (name != "house" or path.endswith(".toml")):
+                self._set(name, str(Path(path).absolute()))
+        self._set("phases", ",".join(phases_of(self.phases)))
         self._check()
+
+    def _set(self, name: str, value: object) -> None:
+        msgspec.structs.force_setattr(self, name, value)
 
     def _check(self) -> None:
         if self.fidelity not in FIDELITIES:
@@ -109,6 +169,7 @@ class TrialConfig:
             raise ConfigError(
                 f"there is a story, {self.story}, but no phase to read it in; add story to the phases"
             )
+        check_person(self.person)
 
     @property
     def phase_names(self) -> tuple[str, ...]:
@@ -122,16 +183,31 @@ class TrialConfig:
 
     def settings(self) -> dict[str, Any]:
         """All of it by name, with the time limit filled in; JSON-ready."""
-        described = {"person": self.person.as_dict(), "behaviour": self.behaviour.as_dict()}
-        return {**dataclasses.asdict(self), "time_limit": self.limit, **described}
+        values = {name: getattr(self, name) for name in SETTINGS}
+        return {
+            **values,
+            "time_limit": self.limit,
+            "person": self.person.as_dict(),
+            "behaviour": self.behaviour.as_dict(),
+        }
+
+
+# Description of every setting that a record holds, by name.
+SETTINGS: dict[str, msgspec.Meta] = {
+    name: hint.__metadata__[0]
+    for name, hint in typing.get_type_hints(TrialConfig, include_extras=True).items()
+    if name != "seed"
+}
+DEFAULTS: dict[str, Any] = {f.name: f.default for f in msgspec.structs.fields(TrialConfig)}
+PATHS = tuple(name for name, about in SETTINGS.items() if (about.extra or {}).get("path"))
+# What may differ by accident between the conditions of a comparison.
+CONFOUNDERS = tuple(
+    name for name in SETTINGS if name not in ("assistance", "live", "regret", "episode", *SEEDS)
+)
 
 
 def episode_settings(path: Path) -> dict[str, Any]:
-    """What an episode file decides of a trial, as arguments of `TrialConfig`.
-
-    Raises:
-        EpisodeError: The file cannot be read, or does not describe an episode.
-    """
+    """What an episode file decides of a trial, as arguments of `TrialConfig`; an EpisodeError where it is none."""
     episode = Episode.load(path)
     return {
         "objects": len(episode.objects),
@@ -144,6 +220,6 @@ def episode_settings(path: Path) -> dict[str, Any]:
 def _check_seed(name: str, seed: int | None) -> None:
     if seed is None:
         raise ConfigError(f"a trial needs a seed, or each of {', '.join(SEEDS)}")
-    if not 0 <= seed <= LARGEST_SEED:
-        fault = "not be negative" if seed < 0 else f"be at most {LARGEST_SEED}"
+    if not 0 <= seed <= MAX_SEED:
+        fault = "not be negative" if seed < 0 else f"be at most {MAX_SEED}"
         raise ConfigError(f"{name} must {fault}, got {seed}")

@@ -8,11 +8,11 @@ import math
 import numpy as np
 
 from experiments.house import House
-from experiments.runs.records import EventLog
+from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition_names
-from mjsim.actions import Move, Pick, Place
+from mjsim.actions import WAIT, FollowPath, Move, Pick, Place
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.scene import Scene, compose
 from mjsim.options import FIDELITIES, WorldOptions
@@ -51,12 +51,14 @@ def plan() -> None:
 def act(house: House) -> None:
     """Walk, pick and place in every tier."""
     scene = _before_a_receptacle(house)
+    start = np.array([scene.episode.start.x, scene.episode.start.y])
+    path = FollowPath(np.array([start, start + 1.0]), start + 1.0, 0.5)
     for tier in FIDELITIES:
         world = World(scene, WorldOptions(fidelity=tier))
         for action in (Move(0.2, 0.1, 0.3, 0.1), Pick(), Move(-0.2), Place()):
             world.step(action)
-            world.finish()
-            world.walk([[0.1, 0.0, 0.1, 0.0]] * 3)
+            world.step(WAIT)
+            world.step(path, 3)
 
 
 def play(house: House) -> None:

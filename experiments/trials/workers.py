@@ -1,19 +1,19 @@
-"""Processes that run trials, and end with the process that they work for."""
+"""What runs the trials of a batch: processes of this machine that end with their parent, or a Ray cluster."""
 
 import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from multiprocessing.connection import Connection, wait
 from multiprocessing.synchronize import Semaphore
-from typing import Any
+from typing import Any, Protocol
 
-from experiments.compile_notice import announce_compiling
-from experiments.signals import SIGNALS
+from experiments.session.signals import SIGNALS
+from experiments.trials.ray_workers import ray_cluster
 
 
 class _Pool(ProcessPoolExecutor):
@@ -29,11 +29,7 @@ class _Pool(ProcessPoolExecutor):
 
 @contextmanager
 def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Worker processes. Where the block raises, or this process is killed, they end at once, in the middle of work.
-
-    Raises:
-        ChildProcessError: A worker ended by itself.
-    """
+    """Worker processes. Where the block raises, or this process is killed, they end at once, in the middle of work."""
     # Spawned, not forked: a forked GL context or thread pool does not work.
     context = multiprocessing.get_context("spawn")
     end_of_work, work = context.Pipe(duplex=False)
@@ -43,7 +39,7 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown()
     except BrokenProcessPool as error:
         raise ChildProcessError(
-            "a worker process was killed, perhaps for want of memory; the same command goes on, --workers sets how many"
+            "a worker was killed (out of memory?); run the command again to continue, with fewer --workers"
         ) from error
     finally:
         work.close()  # all workers see it
@@ -53,6 +49,8 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
 
 def _begin(end_of_work: Connection, voice: Semaphore) -> None:
     """Begin to work: one of the workers says it if kernels are compiled, all end with their parent."""
+    from experiments.trials.compile_notice import announce_compiling  # numba takes a while to load
+
     announce_compiling(lambda: voice.acquire(block=False))
     _end_with(end_of_work)
 
@@ -65,3 +63,18 @@ def _end_with(end_of_work: Connection) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+class Executor(Protocol):
+    """Runs calls in the background."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]:
+        """Start a call."""
+
+
+PROCESSES, RAY = "processes", "ray"
+# Name -> context of an executor with a number of workers.
+EXECUTORS: Mapping[str, Callable[[int], AbstractContextManager[Executor]]] = {
+    PROCESSES: worker_pool,
+    RAY: ray_cluster,
+}

@@ -1,7 +1,7 @@
-"""From what a person presses to the action of a control step.
+"""From inputs of a person to the action of a control step.
 
-Inputs come numbered, whenever they come; the control step takes all that have come since the one before, so that a tap
-between two steps counts. The mouse sets a target angle that body and head follow within their limits.
+A control step takes all inputs since the step before, so that a tap between two steps counts. The mouse sets a target
+angle that body and head follow within their limits.
 """
 
 import math
@@ -23,28 +23,18 @@ MAX_TURN_AHEAD = 2.8  # rad that the mouse can be ahead of the body
 
 
 class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What changed at the keyboard, the mouse, a gamepad or a touch screen.
+    """A change at the keyboard, the mouse, a gamepad or a touch screen."""
 
-    Attributes:
-        number: 1 for the first input of a session, then one more each.
-        forward: How fast to walk, from -1 (back) to 1, from now on.
-        left: How fast to walk to the left, from -1 to 1, from now on.
-        turn: How fast to turn, from -1 (right) to 1 (left), from now on.
-        look: How fast to look up, from -1 (down) to 1, from now on.
-        yaw: Add so much to the heading to turn to, rad, counter-clockwise.
-        pitch: Add so much to the pitch to look to, rad, upwards.
-        press: The action key, or a hand's own key, was pressed.
-        scroll: Scroll the task list by so many rows, positive towards its end.
-    """
-
+    # 1 for the first input of a session, then one more each
     number: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
-    forward: Share = 0.0
-    left: Share = 0.0
-    turn: Share = 0.0
-    look: Share = 0.0
-    yaw: Angle = 0.0
-    pitch: Angle = 0.0
-    press: Press | None = None
+    forward: Share = 0.0  # walking from now on: share of the speed, negative to walk back
+    left: Share = 0.0  # stepping to the left from now on
+    turn: Share = 0.0  # turning to the left from now on
+    look: Share = 0.0  # looking up from now on
+    yaw: Angle = 0.0  # added to the heading to turn to, rad, counter-clockwise
+    pitch: Angle = 0.0  # added to the pitch to look to, rad, upwards
+    press: Press | None = None  # the action key, or the key of a hand, was pressed
+    # rows by which the task list is scrolled, positive towards its end
     scroll: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
 
 
@@ -53,14 +43,7 @@ Answer = Callable[[Pick | Place], ActionResult]
 
 @dataclass(frozen=True)
 class Controls:
-    """What is held down, what was pressed, and where body and head turn to.
-
-    Attributes:
-        held: The latest input.
-        heading: Heading to turn to, rad, or None where the mouse asks for none.
-        pitch: Pitch to look to, rad, or None.
-        presses: Keys that were pressed and not yet acted on.
-    """
+    """The latest input, where the mouse points (rad; None if it does not), and presses that are not handled yet."""
 
     held: Input | None = None
     heading: float | None = None
@@ -91,19 +74,11 @@ def control_step(
     person: PersonParameters,
     duration: float,
 ) -> tuple[Action, Controls]:
-    """The action of a control step, and the controls after it.
+    """The action of a control step of `duration` seconds, and the controls after it.
 
-    The action key places what belongs into a receptacle in reach; else it picks the nearest object in reach. The key of
-    a hand places what that hand holds; if it is empty, it picks. What is impossible is attempted all the same, so that
-    the message bar says why.
-
-    Args:
-        before: Controls after the last control step.
-        inputs: What came since then, in order.
-        seen: State of the world.
-        answer: What the world would answer to a pick or place now.
-        person: How fast this person walks, turns and looks.
-        duration: Of the control step, s.
+    The action key places an object that belongs into a receptacle in reach; else it picks the nearest object in reach.
+    The key of a hand places the object in that hand; if it is empty, it picks. The impossible is attempted, so that the
+    message bar gives the reason; `answer` is the world's answer to a pick or place.
     """
     controls = before.take(inputs, seen)
     if not controls.presses:

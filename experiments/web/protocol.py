@@ -1,7 +1,7 @@
-"""What browser and server tell each other on the WebSocket (docs/protocol.md).
+"""The messages between browser, server and worker (docs/protocol.md).
 
-Text messages are JSON; `type` is the name of the class in lower case. A binary message is a frame: `FRAME_HEAD`, then
-the picture.
+A message is an object whose `type` is the name of its class in lower case. Between browser and server messages are JSON
+except for frames, which are binary; between server and worker they are MessagePack. The server forwards most of them.
 """
 
 import struct
@@ -9,124 +9,197 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from experiments.web.messages import (
-    Begin,
-    Blur,
-    Busy,
-    Failed,
-    Frame,
-    Inputs,
-    Leave,
-    Message,
-    Over,
-    Pause,
-    Paused,
-    Ready,
-    Resume,
-    Seen,
-    State,
-    Taken,
-    Text,
-    View,
-)
+from experiments.web.controls import Input
+from experiments.web.state import LOADING, TRANSITIONS, SessionPhase, Trigger
+from hud.state import HudState
 
-VERSION = 1
+VERSION = 1  # of the head of a frame
 MAX_TEXT = 64 * 1024  # bytes of a message from the browser
+MAX_INPUTS = 64  # of one message
 FRAME_HEAD = struct.Struct("<BBBBHHIIQf")
 CODECS = {"jpeg": 1, "h264": 2}
 KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # codes with which the server closes
 
+Codec = Literal["jpeg", "h264", "none"]
+PauseReason = Literal["asked", "hidden", "disconnected", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
+Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # px
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 
 
-class Hello(Message, frozen=True):
-    """First message of a connection.
+class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
+    """A message; `type` is the name of its class in lower case."""
 
-    Attributes:
-        tab: Random name of this page. A page that connects again takes the place of its own old connection.
-        phase: Part of the visit that the page shows: `training` or `task`.
-        view: How it wants to see the session.
-    """
+
+class View(WireMessage, frozen=True):
+    """How a page wants to see the session: size in px, how frames are compressed, whether snapshots are sent."""
+
+    width: Length
+    height: Length
+    codec: Codec = "jpeg"
+    snapshots: bool = False
+
+
+class Hello(WireMessage, frozen=True):
+    """First message of a connection: a random name of the page, which may reconnect, its trial and its view."""
 
     tab: Annotated[str, msgspec.Meta(pattern="^[A-Za-z0-9-]{8,64}$")]
-    phase: Annotated[str, msgspec.Meta(max_length=20)]
+    trial: Annotated[str, msgspec.Meta(max_length=20)]
     view: View
 
 
-class TakeOver(Message, frozen=True):
-    """Go on here with a session that is open elsewhere; the answer to `occupied`."""
+class TakeOver(WireMessage, frozen=True):
+    """Continue here with a session that is open in another page; the answer to `occupied`."""
 
 
-FromBrowser = Hello | TakeOver | Begin | Inputs | View | Seen | Pause | Resume | Blur | Leave
+class Run(WireMessage, frozen=True):
+    """Start the clock, or let it run again."""
 
 
-class Queue(Message, frozen=True):
-    """All places are taken; the session begins by itself when it is its turn.
+class Inputs(WireMessage, frozen=True):
+    """What the person pressed, in order, each once."""
 
-    Attributes:
-        position: 1 for the next one.
+    inputs: Annotated[list[Input], msgspec.Meta(max_length=MAX_INPUTS)]
+
+
+class Seen(WireMessage, frozen=True):
+    """The browser has shown a frame, by its number."""
+
+    frame: Count
+
+
+class Pause(WireMessage, frozen=True):
+    """Stop the clock; the reason is logged."""
+
+    reason: PauseReason
+
+
+class Blur(WireMessage, frozen=True):
+    """The page lost the keyboard to another window, or got it back; this is only logged."""
+
+    away: bool
+
+
+class Leave(WireMessage, frozen=True):
+    """End the trial now."""
+
+
+class Open(WireMessage, frozen=True):
+    """Open a session in a worker: its journal's folder, its run directory, settings, earlier phases of the visit."""
+
+    folder: str
+    run: str
+    config: dict[str, Any]
+    before: list[dict[str, Any]] = []
+
+
+class State(WireMessage, frozen=True):
+    """The state of the session, why it is paused, over or failed, and the number of the last input that it received."""
+
+    phase: SessionPhase = LOADING
+    reason: str = ""
+    input: int = 0
+
+    def after(self, trigger: Trigger, reason: str = "") -> "State":
+        """The state that follows, or the same object where the trigger changes nothing."""
+        phase = TRANSITIONS.get((self.phase, trigger))
+        return self if phase is None else State(phase, reason, self.input)
+
+
+class Taken(WireMessage, frozen=True):
+    """Everything up to this input and control step counts, and is safe on the disk."""
+
+    input: int
+    step: int
+
+
+class Frame(WireMessage, frozen=True):
+    """A frame of a view, by number from 1: the start of a control step, the last input that counts, and the picture.
+
+    H.264 is in Annex B, one access unit; `key` frames can be decoded without earlier ones. `milliseconds` is the time
+    to draw and compress it.
     """
+
+    number: int
+    step: int
+    input: int
+    codec: Codec
+    key: bool
+    width: int
+    height: int
+    milliseconds: float
+    data: bytes
+
+    def packed(self) -> bytes:
+        """The frame as a binary message."""
+        codec, key = CODECS[self.codec], KEY_FLAG if self.key else 0
+        head = (VERSION, codec, key, 0, self.width, self.height, self.number, self.step, self.input)
+        return FRAME_HEAD.pack(*head, self.milliseconds) + self.data
+
+
+class Snapshot(WireMessage, frozen=True):
+    """Poses and HUD at the start of a control step, for clients that draw by themselves.
+
+    `eye` has the position, m, then heading and pitch, rad; `objects` the position (3), m, and orientation wxyz (4) by
+    instance name.
+    """
+
+    step: int
+    input: int
+    time: float
+    eye: list[float]
+    objects: dict[str, list[float]]
+    hud: HudState
+
+
+class Text(WireMessage, frozen=True):
+    """The HUD for screen readers: the message bar, the list's heading, its rows, the hands."""
+
+    message: str
+    title: str
+    rows: list[str]
+    hands: list[str]
+
+
+class Busy(WireMessage, frozen=True):
+    """Whether a pick or place is under way; keys pressed then are handled afterwards."""
+
+    busy: bool
+
+
+class Saved(WireMessage, frozen=True):
+    """The run directory of a session that is over has been written."""
+
+
+class Queue(WireMessage, frozen=True):
+    """All places are taken; the session opens by itself when it is its turn. Position 1 is next."""
 
     position: int
 
 
-class Occupied(Message, frozen=True):
-    """The session is open elsewhere; `takeover` goes on here."""
+class Occupied(WireMessage, frozen=True):
+    """The session is open in another page; `takeover` continues here."""
 
 
-class Replaced(Message, frozen=True):
-    """The session goes on elsewhere; this connection is closed."""
+class Replaced(WireMessage, frozen=True):
+    """Another page took the session over; this connection is closed."""
 
 
-class Recovering(Message, frozen=True):
-    """The session was interrupted and is being restored; `ready` follows."""
-
-
-class Error(Message, frozen=True):
-    """A message was refused; nothing of it counts.
-
-    Attributes:
-        code: What was wrong with it.
-        message: In words.
-    """
+class Error(WireMessage, frozen=True):
+    """A message was refused and does not count: a code, and the reason in words."""
 
     code: ErrorCode
     message: str
 
 
-ToBrowser = (
-    Ready
-    | Taken
-    | State
-    | Text
-    | Busy
-    | Paused
-    | Over
-    | Failed
-    | Queue
-    | Occupied
-    | Replaced
-    | Recovering
-    | Error
-)
+FromBrowser = Hello | TakeOver | Run | Inputs | View | Seen | Pause | Blur | Leave
+ToBrowser = State | Taken | Snapshot | Text | Busy | Saved | Queue | Occupied | Replaced | Error
+ToWorker = Open | Run | Inputs | View | Seen | Pause | Blur | Leave
+FromWorker = State | Taken | Frame | Snapshot | Text | Busy | Saved
 
 decode_from_browser: Any = msgspec.json.Decoder(FromBrowser).decode
-decode_to_browser: Any = msgspec.json.Decoder(ToBrowser).decode
 encode_to_browser = msgspec.json.Encoder().encode
-
-
-def packed_frame(frame: Frame) -> bytes:
-    """A frame as a binary message."""
-    return FRAME_HEAD.pack(
-        VERSION,
-        CODECS[frame.codec],
-        KEY_FLAG if frame.key else 0,
-        0,
-        frame.width,
-        frame.height,
-        frame.number,
-        frame.step,
-        frame.input,
-        frame.milliseconds,
-    ) + bytes(frame.data)
+decode_to_worker: Any = msgspec.msgpack.Decoder(ToWorker).decode
+decode_from_worker: Any = msgspec.msgpack.Decoder(FromWorker).decode
+encode = msgspec.msgpack.Encoder().encode

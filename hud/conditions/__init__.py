@@ -8,14 +8,16 @@ import functools
 import importlib
 import pkgutil
 from collections.abc import Callable
-from typing import cast
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 from hud.errors import ConditionError
 from hud.options import option, option_names
-from hud.state import HudState
-from hud.task import TaskView
 
-Condition = Callable[[TaskView], HudState]
+if TYPE_CHECKING:  # options of commands name conditions, and must not load NumPy
+    from hud.state import HudState
+    from hud.task import TaskView
+
+Condition: TypeAlias = "Callable[[TaskView], HudState]"
 ATTRIBUTE = "hud_state"
 
 
@@ -25,18 +27,14 @@ def condition_names() -> tuple[str, ...]:
 
 
 def condition(name: str) -> Condition:
-    """The condition called `name`: a file of this package, or `package.module:attribute`; `-option` may follow.
-
-    Raises:
-        ConditionError: There is no condition or option of that name, or it cannot be called.
-    """
+    """The condition called `name`: a file of this package, or `package.module:attribute`; `-option` may follow."""
     base, *asked = name.split("-")
     show, options = _plain_condition(base), [option(o) for o in asked]
     if len(set(asked)) != len(asked):
         raise ConditionError(f"condition {name!r} names an option twice; give each once")
 
     @functools.wraps(show)
-    def hud_state(view: TaskView) -> HudState:
+    def hud_state(view: "TaskView") -> "HudState":
         return functools.reduce(lambda state, apply: apply(view, state), options, show(view))
 
     return hud_state if options else show
@@ -44,7 +42,7 @@ def condition(name: str) -> Condition:
 
 def _plain_condition(name: str) -> Condition:
     if name in condition_names():
-        return cast(Condition, getattr(importlib.import_module(f"{__name__}.{name}"), ATTRIBUTE))
+        return cast("Condition", getattr(importlib.import_module(f"{__name__}.{name}"), ATTRIBUTE))
     if ":" not in name:
         raise ConditionError(f"no assistance condition {name!r}; available: {_available()}")
     try:
@@ -56,7 +54,7 @@ def _plain_condition(name: str) -> Condition:
         ) from error
     if not callable(found):
         raise ConditionError(f"condition {name!r} is a {type(found).__name__}, not a function of a task view")
-    return cast(Condition, found)
+    return cast("Condition", found)
 
 
 def _available() -> str:

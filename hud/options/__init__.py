@@ -7,12 +7,15 @@ condition's name, `optimal-xray-minimap`, and apply in that order.
 import importlib
 import pkgutil
 from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeAlias
 
 from hud.errors import ConditionError
-from hud.state import HudState
-from hud.task import TaskView
 
-Option = Callable[[TaskView, HudState], HudState]
+if TYPE_CHECKING:  # options of commands name these, and must not load NumPy
+    from hud.state import HudState
+    from hud.task import TaskView
+
+Option: TypeAlias = "Callable[[TaskView, HudState], HudState]"
 ATTRIBUTE = "apply"
 
 
@@ -22,11 +25,7 @@ def option_names() -> tuple[str, ...]:
 
 
 def option(name: str) -> Option:
-    """The option called `name`.
-
-    Raises:
-        ConditionError: There is none of that name.
-    """
+    """The option called `name`; a ConditionError where there is none."""
     if name not in option_names():
         raise ConditionError(f"no option {name!r} of conditions; available: {', '.join(option_names())}")
     found: Option = getattr(importlib.import_module(f"{__name__}.{name}"), ATTRIBUTE)

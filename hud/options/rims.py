@@ -1,4 +1,4 @@
-"""Rims: a thin white disc around each breadcrumb; who sees no red would lose bare spheres on a brown floor."""
+"""Rims: a thin white disc around each breadcrumb, for people who do not see red on a brown floor."""
 
 import dataclasses
 

@@ -27,39 +27,21 @@ MAX_DRAWS = 10  # seeds tried by `reset_random` where the house has no room for 
 
 @dataclass(frozen=True, eq=False)
 class Transition:
-    """Outcome of one step of the environment.
+    """Outcome of one step of the environment."""
 
-    Attributes:
-        observation: Sensor name -> array.
-        reward: Reward of this step.
-        terminated: Whether everything is delivered.
-        truncated: Whether the episode was cut off by the time limit or by an error of the physics.
-        info: For logging and statistics; not part of the task.
-        steps: Result of each control step that the action took.
-    """
-
-    observation: ObservationDict
+    observation: ObservationDict  # sensor name -> array
     reward: float
-    terminated: bool
-    truncated: bool
-    info: dict[str, Any]
-    steps: tuple[StepResult, ...]
+    terminated: bool  # whether everything is delivered
+    truncated: bool  # whether the episode was cut off by the time limit or by an error of the physics
+    info: dict[str, Any]  # for logging and statistics; not part of the task
+    steps: tuple[StepResult, ...]  # result of each control step that the action took
 
 
 class Rearrangement:
-    """The rearrangement task with observations, actions and rewards.
+    """The rearrangement task: `episodes` compiles one by seed; `sensors` fill the arrays of an observation.
 
-    Args:
-        episodes: Seed -> compiled episode.
-        layout: Sizes and scales of the observation arrays.
-        sensors: Arrays of an observation.
-        control: How actions of the agent become actions of the world.
-        reward: Reward function.
-        truncate_on_physics_error: Truncate the episode where the physics fails, instead of raising.
-
-    Attributes:
-        layout, sensors, control: As above.
-        on_control_step: Called with the world after every control step, or None.
+    `control` turns actions of the agent into those of the world. Where the physics fails, it raises, or truncates
+    the episode with `truncate_on_physics_error`. `on_control_step`, if set, gets the world after every control step.
     """
 
     def __init__(
@@ -102,11 +84,7 @@ class Rearrangement:
 
     @property
     def episode(self) -> CompiledEpisode:
-        """The compiled episode.
-
-        Raises:
-            EnvironmentStateError: Before the first reset.
-        """
+        """The compiled episode; `EnvironmentStateError` before the first reset."""
         if self._episode is None:
             raise EnvironmentStateError("there is no episode yet; call reset first")
         return self._episode
@@ -122,18 +100,11 @@ class Rearrangement:
         return self.world.observation()
 
     def prepare(self, seed: int) -> None:
-        """Compile the episode of a seed before it is reset.
-
-        Raises:
-            SamplingError, AssetError: As for `reset`.
-        """
+        """Compile the episode of a seed before it is reset; raises as `reset`."""
         self._episode, self._is_over = self._episodes.get(seed), True
 
     def reset(self, seed: int) -> tuple[ObservationDict, dict[str, Any]]:
-        """Begin the episode of a seed.
-
-        Returns:
-            The observation and the info.
+        """Begin the episode of a seed; the observation and the info.
 
         Raises:
             SamplingError: The house has no room for this seed's objects.
@@ -146,11 +117,7 @@ class Rearrangement:
         return self._observe(inputs), self._info(inputs, ())
 
     def reset_random(self, rng: np.random.Generator) -> tuple[ObservationDict, dict[str, Any]]:
-        """Begin the episode of a random seed; draws again where the house has no room for the objects.
-
-        Raises:
-            SamplingError: There was no room in `MAX_DRAWS` draws.
-        """
+        """Begin the episode of a random seed; `SamplingError` where none of `MAX_DRAWS` has room for the objects."""
         for _ in range(MAX_DRAWS - 1):
             try:
                 return self.reset(int(rng.integers(MAX_SEED)))

@@ -21,22 +21,14 @@ _COUNT_STREAM = 41  # draws the number of objects independently of what the seed
 
 
 class CompiledEpisode:
-    """A compiled episode and its renderers.
-
-    Attributes:
-        world: The simulation of the episode.
-    """
+    """A compiled episode and its renderers."""
 
     def __init__(self, world: World) -> None:
         self.world = world
         self._renderers: dict[tuple[int, int, str], Renderer] = {}
 
     def renderer(self, width: int, height: int, profile: str) -> Renderer:
-        """The renderer of this size, px, and profile; made on first use.
-
-        Raises:
-            RenderError: No OpenGL context could be made.
-        """
+        """The renderer of this size, px, and profile; made on first use."""
         key = width, height, profile
         if key not in self._renderers:
             self._renderers[key] = Renderer(self.world.model, width=width, height=height, profile=profile)
@@ -67,11 +59,7 @@ def dm_control_physics(world: World) -> Any:
 
 
 def sample(catalogue: Catalogue, navigable: NavigablePoints, objects: tuple[int, int], seed: int) -> Episode:
-    """The episode of a seed, with a number of objects drawn from `objects`, both ends included.
-
-    Raises:
-        SamplingError: The house has no room for this seed's objects.
-    """
+    """The episode of a seed, with a number of objects drawn from `objects`, both ends included."""
     low, high = objects
     count = int(np.random.default_rng([seed, _COUNT_STREAM]).integers(low, high + 1))
     return sample_episode(catalogue, navigable, objects=count, seed=seed)
@@ -80,13 +68,8 @@ def sample(catalogue: Catalogue, navigable: NavigablePoints, objects: tuple[int,
 class EpisodeCache:
     """Seed -> compiled episode. Equal seeds give equal episodes, whatever was asked for before.
 
-    Args:
-        catalogue: The house.
-        make: Seed -> episode.
-        count: Number of different episodes; seeds are taken modulo it. None for no limit.
-        options: Rules of the world.
-        person: Who walks in it.
-        size: How many compiled episodes are kept, about 20 MB each.
+    There are `count` different episodes, of which seeds are taken modulo; None for no limit. `size` compiled episodes
+    are kept, about 20 MB each.
     """
 
     def __init__(
@@ -104,12 +87,7 @@ class EpisodeCache:
         self._compiled: OrderedDict[int, CompiledEpisode] = OrderedDict()
 
     def get(self, seed: int) -> CompiledEpisode:
-        """The compiled episode of a seed, not yet reset.
-
-        Raises:
-            SamplingError: The house has no room for this seed's objects.
-            AssetError: A model is malformed.
-        """
+        """The compiled episode of a seed, not yet reset; raises as `Rearrangement.reset`."""
         key = seed if self._count is None else seed % self._count
         if key not in self._compiled:
             while len(self._compiled) >= self._size:

@@ -109,11 +109,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
 
 
 def to_space(spec: specs.Array) -> spaces.Space[Any]:
-    """The Gymnasium space of a dm_env spec.
-
-    Raises:
-        EnvironmentConfigError: The spec has no bounds.
-    """
+    """The Gymnasium space of a dm_env spec; `EnvironmentConfigError` where it has no bounds."""
     if isinstance(spec, specs.DiscreteArray):
         return spaces.Discrete(spec.num_values)
     if isinstance(spec, specs.BoundedArray):

@@ -41,25 +41,15 @@ class CameraOptions:
 
 @dataclass(frozen=True, eq=False)
 class ObservationLayout:
-    """Sizes and scales of an environment's observation arrays.
+    """Sizes and scales of an environment's observation arrays."""
 
-    Attributes:
-        slots: Rows of the arrays with a row per object; object i of the episode is in row i.
-        categories: Category keys, in the catalogue's order.
-        receptacles: Receptacle keys, in the catalogue's order.
-        floor: Obstacles and bounds of the floor.
-        camera: Images of the eye camera.
-        max_speed: Velocities are given as a share of this, m/s.
-        time_limit: Simulated time after which an episode is truncated, s.
-    """
-
-    slots: int
-    categories: tuple[str, ...]
-    receptacles: tuple[str, ...]
-    floor: Footprint
-    camera: CameraOptions
-    max_speed: float
-    time_limit: float
+    slots: int  # rows of the arrays with a row per object; object i of the episode is in row i
+    categories: tuple[str, ...]  # category keys, in the catalogue's order
+    receptacles: tuple[str, ...]  # receptacle keys, in the catalogue's order
+    floor: Footprint  # obstacles and bounds of the floor
+    camera: CameraOptions  # images of the eye camera
+    max_speed: float  # velocities are given as a share of this, m/s
+    time_limit: float  # simulated time after which an episode is truncated, s
 
     @property
     def scale(self) -> float:

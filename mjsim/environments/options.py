@@ -33,9 +33,9 @@ class EnvironmentOptions:
     Attributes:
         house: Name under `models/houses`, or path of a `catalogue.toml`.
         objects: Number of misplaced objects; or (min, max), from which each episode draws its own.
-        observations: Names of sensors or bundles, or `Sensor` values of your own (docs/environments.md).
-        actions: `continuous`, `discrete` or a `Control` of your own.
-        reward: `time`, `shaped` or a function of your own.
+        observations: Names of sensors or bundles, or custom `Sensor` values (docs/environments.md).
+        actions: `continuous`, `discrete` or a custom `Control`.
+        reward: `time`, `shaped` or a custom function.
         time_limit: Simulated time after which an episode is truncated, s; None for 60 s per object.
         episodes: None for a new house in every episode; a number of different houses that come again and again,
             which makes resets fast; or a list of sampled episodes.
@@ -77,7 +77,7 @@ class EnvironmentOptions:
                 limit is None or (math.isfinite(limit) and limit > 0),
                 f"time_limit must be a positive number of seconds, got {limit}",
             ),
-            (count > 0, "episodes is empty; give at least one, or None to sample without end"),
+            (count > 0, "episodes is empty; give at least one, or None to sample new ones"),
             (self.keep is None or self.keep > 0, f"keep must be at least 1, got {self.keep}"),
             (
                 self.physics_errors in ("raise", "truncate"),
@@ -101,11 +101,7 @@ class EnvironmentOptions:
 
 
 def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
-    """Options from keyword arguments.
-
-    Raises:
-        EnvironmentConfigError: An unknown name, or an unusable value.
-    """
+    """Options from keyword arguments; `EnvironmentConfigError` for an unknown name or an unusable value."""
     known = [f.name for f in fields(EnvironmentOptions)]
     unknown = sorted(set(given) - set(known))
     if unknown:
@@ -168,6 +164,6 @@ def _named(choices: Mapping[str, T], given: str | T, option: str) -> T:
         return given
     if given not in choices:
         raise EnvironmentConfigError(
-            f"no {option} {given!r}; choose from {sorted(choices)}, or pass a value of your own"
+            f"no {option} {given!r}; choose from {sorted(choices)}, or pass a custom value"
         )
     return choices[given]

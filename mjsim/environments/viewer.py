@@ -16,13 +16,8 @@ _REMEDY = "run it where there is a display, or use render_mode='rgb_array', whic
 class InteractiveViewer:
     """dm_control's viewer without its own loop: `show` draws one frame, as Gymnasium's render mode `human` needs it.
 
-    Args:
-        width: Width of the window, px.
-        height: Height of the window, px.
-        realtime: Whether `show` waits until as much time has passed as was simulated.
-
-    Raises:
-        ViewerError: There is no display, or no GLFW.
+    Sizes are those of the window, px; with `realtime`, `show` waits until as much time has passed as was simulated.
+    `ViewerError` without a display or GLFW.
     """
 
     def __init__(self, *, width: int = 1024, height: int = 768, realtime: bool = True) -> None:
@@ -40,11 +35,7 @@ class InteractiveViewer:
         self._last_shown = (0.0, 0.0)  # clock and simulated time, s
 
     def show(self, world: World) -> None:
-        """Draw the present state of a world.
-
-        Raises:
-            ViewerError: The viewer is closed.
-        """
+        """Draw the present state of a world; `ViewerError` where the viewer is closed."""
         if self._window is None:
             raise ViewerError("the viewer is closed; open another")
         if world is not self._world:
@@ -91,10 +82,7 @@ class InteractiveViewer:
 def _load() -> tuple[Any, Any, Any, Any]:
     """dm_control's viewer modules, with GLFW as the OpenGL backend.
 
-    A process has one backend, for windows and off screen alike, fixed by its first use.
-
-    Raises:
-        ViewerError: Another backend is in use, or GLFW cannot be loaded.
+    A process has one backend, for windows and off screen alike, fixed by its first use: `ViewerError` for another.
     """
     if os.environ.get(_BACKEND, "glfw") != "glfw":
         raise ViewerError(

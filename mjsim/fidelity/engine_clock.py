@@ -1,4 +1,4 @@
-"""MuJoCo times the parts of every physics step, which takes a twentieth of a trial; nobody reads those times here."""
+"""Turns off MuJoCo's timers of every physics step, which would take a twentieth of a trial."""
 
 import functools
 from typing import Any
@@ -9,7 +9,7 @@ from mjsim.kernels import c_function
 
 
 def stop_engine_clock() -> None:
-    """Have MuJoCo's timers (`MjData.timer`) read 0 s in this process, unless somebody has set a clock.
+    """Have MuJoCo's timers (`MjData.timer`) read 0 s in this process, unless a clock is set.
 
     `mujoco.set_mjcb_time(None)` brings MuJoCo's own clock back.
     """

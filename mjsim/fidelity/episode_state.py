@@ -16,18 +16,7 @@ Floats = NDArray[np.float64]
 
 
 class EpisodeState:
-    """Bookkeeping of one running world.
-
-    Args:
-        scene: The composed episode.
-        capacity: How many objects are carried at most.
-
-    Attributes:
-        inventory: The two hands.
-        held: Object in the left and the right hand, or None; always the same list.
-        status: Status per object.
-        events: What happened during the present control step.
-    """
+    """Bookkeeping of one running world: hands, status of each object, and events of the present control step."""
 
     def __init__(self, scene: Scene, capacity: int) -> None:
         self._capacity = capacity
@@ -75,12 +64,8 @@ class EpisodeState:
     ) -> Observation:
         """The present state.
 
-        Args:
-            time: Simulated time, s.
-            person: x, y, yaw and pitch of the head, m and rad, shape (4,).
-            velocity: Planar velocity in the house frame, m/s, shape (2,).
-            objects: Origins, m, shape (n, 3), and orientations wxyz, shape (n, 4).
-            busy: Whether a pick or place is under way.
+        `person` is x, y, yaw and pitch of the head, m and rad, (4,); `velocity` that in the house frame, m/s, (2,);
+        `objects` are origins, m, (n, 3), and orientations wxyz, (n, 4).
         """
         x, y, heading, pitch = person.tolist()
         return Observation(
@@ -103,11 +88,7 @@ class EpisodeState:
         return StateDetails(self.inventory.hands, tuple(self.status), health, person)
 
     def restore(self, details: StateDetails) -> None:
-        """Go on from hands and statuses of a world's state.
-
-        Raises:
-            StateError: It is of other objects.
-        """
+        """Continue from hands and statuses of a world's state; `StateError` where it is of other objects."""
         if len(details.status) != len(self._index.names) or not {*details.hands} <= {
             None,
             *self._index.names,

@@ -6,11 +6,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import IDLE, Action, ActionResult, Move, Pick, Place
+from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
 from mjsim.errors import ActionError, StateError
 from mjsim.fidelity.engine_clock import stop_engine_clock
 from mjsim.fidelity.episode_state import EpisodeState
-from mjsim.fidelity.kinematics import LocomotionState
 from mjsim.fidelity.tier import Tier
 from mjsim.health.monitor import HealthMonitor
 from mjsim.health.values import Health, HealthSample
@@ -23,7 +22,7 @@ from mjsim.person.carrying import Carrying
 from mjsim.person.feasibility import resolve_pick, resolve_place
 from mjsim.person.grips import Grips
 from mjsim.person.person import Motion, Person
-from mjsim.person.picking import pick, take
+from mjsim.person.picking import pick
 from mjsim.person.placing import place
 from mjsim.person.rig import Rig
 from mjsim.world_state import PersonState, StateHash, WorldState, set_physics, take_physics
@@ -44,16 +43,7 @@ class _Motion:
 
 
 class Full(Tier):
-    """The tier `full`; other tiers use its parts where they need physics.
-
-    Attributes:
-        data: The state of the physics.
-        scene: The scene.
-        episode_state: Hands, statuses, and the events of the latest control step.
-        person: The body in this physics.
-        carrying: Keeps held objects off the house.
-        monitor: Checks the physics after every control step.
-    """
+    """The tier `full`; other tiers use its parts where they need physics."""
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         stop_engine_clock()
@@ -88,11 +78,6 @@ class Full(Tier):
         """Health of the physics in the latest control step."""
         return self.monitor.sample
 
-    @property
-    def locomotion(self) -> LocomotionState | None:
-        """Physics moves the person."""
-        return None
-
     def reset(self) -> None:
         """Return to the episode's beginning."""
         mujoco.mj_resetData(self.scene.model, self.data)
@@ -105,11 +90,11 @@ class Full(Tier):
         self._end_motion()
         self.episode_state.reset()
 
-    def step(self, action: Action) -> ActionResult | None:
+    def step(self, action: StepAction) -> ActionResult | None:
         """Advance by one control step."""
         result = self.resolve(action, busy=self.busy)
         if result is not None and result.applied:
-            self.begin(result, *self.hand_for(result), self.person.rig.pitch_target)
+            self._begin(result)
         self.advance(action if isinstance(action, Move) else IDLE)
         return result
 
@@ -120,12 +105,8 @@ class Full(Tier):
             raise ActionError(f"expected a Pick or Place, got {action!r}")
         return result
 
-    def resolve(self, action: Action, *, busy: bool) -> ActionResult | None:
-        """Decide on a pick or place from the state of the physics; None for a move.
-
-        Raises:
-            ActionError: `action` is not an action.
-        """
+    def resolve(self, action: StepAction, *, busy: bool) -> ActionResult | None:
+        """Decide on a pick or place from the state of the physics; None for a move."""
         if isinstance(action, Move):
             return None
         if isinstance(action, Pick):
@@ -146,31 +127,18 @@ class Full(Tier):
             return free[0], item
         return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item
 
-    def begin(
-        self, result: ActionResult, hand: int, item: int, pitch: float, *, reached: bool = False
-    ) -> None:
-        """Begin a feasible pick or place; the head looks to `pitch`, rad, afterwards.
-
-        Args:
-            result: The answer to the action.
-            hand: Hand that does it.
-            item: Object.
-            pitch: Where the head looked before, rad.
-            reached: Whether the hand is at the object already, for a pick.
-        """
+    def _begin(self, result: ActionResult) -> None:
+        """Begin a feasible pick or place; the head looks afterwards where it looked before."""
+        hand, item = self.hand_for(result)
+        pitch = self.person.rig.pitch_target
         if isinstance(result.action, Pick):
-            picking = take if reached else pick
-            steps = picking(self.person, hand, item, self.carrying.carry_position, pitch)
+            steps = pick(self.person, hand, item, self.carrying.carry_position, pitch)
         else:
             steps = place(self.person, hand, item, self.scene.receptacles[str(result.receptacle)], pitch)
         self._motion = _Motion(steps, result.action, hand, item, result.receptacle)
 
     def advance(self, move: Move) -> None:
-        """One control step of physics, walking or with the motion under way.
-
-        Raises:
-            PhysicsError: MuJoCo warned or the state is not finite.
-        """
+        """One control step of physics, walking or with the motion under way; `PhysicsError` where it fails."""
         self.episode_state.events = []
         if self._motion is None:
             self.person.walk(move)
@@ -206,11 +174,7 @@ class Full(Tier):
         return WorldState(take_physics(self.scene.model, self.data), details)
 
     def restore(self, state: WorldState) -> None:
-        """Continue from a state.
-
-        Raises:
-            StateError: It does not fit.
-        """
+        """Continue from a state; `StateError` where it does not fit."""
         person, commands = self.person, state.details.person
         if commands is None:
             raise StateError(
@@ -227,7 +191,7 @@ class Full(Tier):
 
     def dislodged(self) -> list[int]:
         """Delivered objects that have left their receptacles."""
-        if self._only_held_awake():
+        if self.is_settled:
             return []
         return [
             item
@@ -235,15 +199,8 @@ class Full(Tier):
             if status is ObjectStatus.DELIVERED and not self.person.asleep(item) and not self._in_place(item)
         ]
 
-    def is_settled(self, speed: float) -> bool:
-        """Whether every object that no hand holds sleeps, or is slower than `speed`, m/s."""
-        if self._only_held_awake():
-            return True
-        gripped = self.person.grips.gripped
-        awake = np.flatnonzero(self.data.tree_awake[self.scene.index.trees])
-        return all(self.person.speed(item) < speed for item in awake.tolist() if item not in gripped)
-
-    def _only_held_awake(self) -> bool:
+    @property
+    def is_settled(self) -> bool:
         """Whether every object sleeps that no hand holds: the person is always awake, and wakes what it holds."""
         return bool(self.data.ntree_awake == 1 + len(self.person.grips.gripped))
 

@@ -15,7 +15,8 @@ from mjsim.model.clearance import ClearanceField
 from mjsim.motion_parameters import CarryingParameters
 from mjsim.person.load_room import BodyMotion
 from mjsim.person.postures import Contacts, Hands, Holding, update_hands
-from mjsim.rollout import RolloutArrays
+from mjsim.steps import States
+from mjsim.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, later_step, next_step
 
 Floats = NDArray[np.float64]
 
@@ -35,50 +36,32 @@ _NO_GEOMS, _NO_FRAMES, _NO_OWNERS = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 
 
 class KinematicState(NamedTuple):
-    """Everything that changes from control step to control step; kernels change it in place.
+    """Everything that changes from control step to control step; kernels change it in place."""
 
-    Attributes:
-        vector: Time, body, hands and grasps, shape (STATE_SIZE,).
-        poses: Poses of the objects, m and wxyz, shape (n, 7).
-    """
-
-    vector: Floats
-    poses: Floats
+    vector: Floats  # time, body, hands and grasps, shape (STATE_SIZE,)
+    poses: Floats  # poses of the objects, m and wxyz, shape (n, 7)
 
 
 class KinematicModel(NamedTuple):
-    """Everything that stays the same.
+    """Everything that stays the same."""
 
-    Attributes:
-        gait: Limits and servos of the body.
-        floor: Outlines that the trunk meets.
-        grips: Pose of an object in the frame of the hand that holds it, by object and grip, shape (n, 2, 7).
-        loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
-        posture_pace: As `Hands.pace`, shape (3,).
-        carrying: How the person carries.
-        postures: Where an empty left hand belongs (`REST`), and one that holds something while walking (`CARRY`),
-            turning (`TUCKED`) or when the other hand reaches (`ASIDE`), m, shape (4, 3).
-        clearance: Clearance at the heights of carried objects.
-        timestep: Of the physics, s.
-        compliance: Compliance offsets of the hands, which touch nothing: all 0, m, shape (2, 2).
-        goals: Scratch space for the goals of the hands, m, shape (2, 3).
-    """
-
-    gait: Gait
-    floor: Floor
-    grips: Floats
-    loads: Floats
-    posture_pace: Floats
-    carrying: CarryingParameters
+    gait: Gait  # limits and servos of the body
+    floor: Floor  # outlines that the trunk meets
+    grips: Floats  # pose of an object in the frame of the hand that holds it, by object and grip, shape (n, 2, 7)
+    loads: Floats  # how far each object reaches sideways and down about its grip, m, shape (n, 2)
+    posture_pace: Floats  # as `Hands.pace`, shape (3,)
+    carrying: CarryingParameters  # how the person carries
+    # where an empty left hand belongs (`REST`), and one that holds something while walking (`CARRY`),
+    # turning (`TUCKED`) or when the other hand reaches (`ASIDE`), m, shape (4, 3)
     postures: Floats
-    clearance: ClearanceField
-    timestep: float
-    compliance: Floats
-    goals: Floats
+    clearance: ClearanceField  # clearance at the heights of carried objects
+    timestep: float  # of the physics, s
+    compliance: Floats  # compliance offsets of the hands, which touch nothing: all 0, m, shape (2, 2)
+    goals: Floats  # scratch space for the goals of the hands, m, shape (2, 3)
 
 
 @kernel
-def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows: RolloutArrays) -> None:
+def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows: States) -> None:
     """One control step per row of moves (n, 4): forward and left, m/s, turn and look, rad/s."""
     body = state.vector[BODY:HANDS]
     for row in range(len(moves)):
@@ -88,14 +71,37 @@ def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows:
 
 
 @kernel
-def control_step(state: KinematicState, posture: int, moving: int, model: KinematicModel) -> None:
-    """One control step with the present commands.
+def follow_rows(
+    walk: Walk, progress: Floats, state: KinematicState, model: KinematicModel, moves: Floats, rows: States
+) -> tuple[int, int]:
+    """Walk along a path until the walk has to stop; fills moves (n, 4) and rows.
 
-    Args:
-        state: Changed in place.
-        posture: Row of `KinematicModel.postures` for hands that hold something.
-        moving: Hand that stays where it was put, or -1.
-        model: Everything that stays the same.
+    Returns the number of control steps made, n at most, and the latest phase of the walk.
+    """
+    body, count = state.vector[BODY:HANDS], 0
+    while True:
+        x, y, heading, time = body[X], body[Y], body[HEADING], state.vector[TIME]
+        if count == 0:
+            phase, forward, left, turn = next_step(walk, x, y, heading, time, progress)
+        else:
+            phase, forward, left, turn = later_step(walk, x, y, heading, time, progress)
+        if phase in (ARRIVED, CHANGED):
+            return count, phase
+        moves[count, 0], moves[count, 1], moves[count, 2], moves[count, 3] = forward, left, turn, 0.0
+        kinematics.command(body, forward, left, turn, 0.0, model.gait)
+        control_step(state, CARRY, -1, model)
+        write_row(count, state, rows)
+        count += 1
+        if phase == BLOCKED or count == len(moves):
+            return count, phase
+
+
+@kernel
+def control_step(state: KinematicState, posture: int, moving: int, model: KinematicModel) -> None:
+    """One control step with the present commands, which changes `state`.
+
+    `posture` is the row of `KinematicModel.postures` for hands that hold something; `moving` is the hand that stays
+    where it was put, or -1.
     """
     vector = state.vector
     body = vector[BODY:HANDS]
@@ -155,15 +161,15 @@ def carry(state: KinematicState, model: KinematicModel) -> None:
 
 
 @kernel
-def write_row(row: int, state: KinematicState, rows: RolloutArrays) -> None:
-    """Write the present state into a row of a rollout."""
+def write_row(row: int, state: KinematicState, rows: States) -> None:
+    """Write the present state into a row."""
     vector = state.vector
-    rows.times[row] = vector[TIME]
-    rows.positions[row, 0], rows.positions[row, 1] = vector[BODY + X], vector[BODY + Y]
-    rows.headings[row], rows.pitches[row] = vector[BODY + HEADING], vector[BODY + PITCH]
-    rows.object_positions[row] = state.poses[:, :3]
-    rows.object_quaternions[row] = state.poses[:, 3:]
-    rows.state_hashes[row] = state_hash(state)
+    rows.time[row] = vector[TIME]
+    rows.position[row, 0], rows.position[row, 1] = vector[BODY + X], vector[BODY + Y]
+    rows.heading[row], rows.pitch[row] = vector[BODY + HEADING], vector[BODY + PITCH]
+    rows.object_position[row] = state.poses[:, :3]
+    rows.object_quaternion[row] = state.poses[:, 3:]
+    rows.state_hash[row] = state_hash(state)
     # Held objects are in line with their hands, and nothing else touches anything.
     rows.health[row, :2], rows.health[row, 6] = 0.0, math.nan
     for hand in range(2):

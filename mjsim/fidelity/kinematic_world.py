@@ -1,7 +1,5 @@
 """Person and objects without physics: their state, walking, and the data that a renderer or a ray needs."""
 
-from collections.abc import Sequence
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +17,11 @@ from mjsim.fidelity.kinematic_steps import (
     KinematicModel,
     KinematicState,
     carry,
+    follow_rows,
     state_hash,
     walk_rows,
 )
-from mjsim.fidelity.kinematics import Gait, LocomotionState
+from mjsim.fidelity.kinematics import Gait
 from mjsim.fidelity.motion_primitives import MotionTrajectory, play_rows
 from mjsim.fidelity.trunk_contact import Floor
 from mjsim.model import avatar
@@ -30,20 +29,19 @@ from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
 from mjsim.options import WorldOptions
 from mjsim.person.grips import AWAKE
-from mjsim.rollout import RolloutArrays
+from mjsim.steps import States
+from mjsim.walking.path_following import Walk
 
 # An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.
 _REST_ACCELERATION = 3.0
+MAX_ROWS = 256  # control steps in one call
 
 
 class KinematicWorld:
     """One person and all objects, moved by `mjsim.fidelity.kinematic_steps`.
 
-    Attributes:
-        state: Everything that changes from step to step.
-        asleep: Sleep state of each kinematic tree, as in `MjData.tree_asleep`, where physics left it at rest.
-        model: Everything that stays the same.
-        person_tree: Kinematic tree of the person.
+    `state` is all that changes from step to step, `model` all that stays the same; `asleep` is the sleep state of each
+    kinematic tree, as in `MjData.tree_asleep`, where physics left it at rest.
     """
 
     def __init__(self, full: Full, options: WorldOptions) -> None:
@@ -67,6 +65,7 @@ class KinematicWorld:
             goals=np.zeros((2, 3)),
         )
         self._body = self.state.vector[BODY:HANDS]
+        self._rows = States.empty(MAX_ROWS, len(scene.index.names))
 
     @property
     def time(self) -> float:
@@ -82,11 +81,6 @@ class KinematicWorld:
     def pitch_target(self) -> float:
         """Commanded pitch of the head, rad."""
         return float(self._body[LOOK])
-
-    @property
-    def locomotion(self) -> LocomotionState:
-        """What walking depends on."""
-        return LocomotionState(self._body, self.model.gait, self.model.floor)
 
     @property
     def grasps(self) -> list[tuple[int, int] | None]:
@@ -111,26 +105,20 @@ class KinematicWorld:
 
     def reset(self, data: mujoco.MjData) -> None:
         """Start from physics that was just reset and brought up to date (`mj_forward`)."""
-        self.continue_from(data, [None, None])
+        rig, body, vector = self._rig, self._body, self.state.vector
+        vector[TIME] = data.time
+        body[:4], body[4:FORWARD] = rig.pose[:4], rig.rates[:4]
+        body[FORWARD:SERVO], body[SERVO:] = rig.motion, rig.get_state().command[:4]
+        vector[HANDS:HAND_SPEEDS] = rig.hand_targets.ravel()
+        vector[HAND_SPEEDS:GRASPS], vector[GRASPS:] = 0.0, -1.0
+        self.state.poses[:] = data.qpos[self._qpos].reshape(-1, 7)
+        self.asleep[:] = data.tree_asleep
         acceleration = np.abs(data.qacc) * self._model.dof_length
         trees = self._model.body_treeid[self._model.dof_bodyid]
         fastest = np.zeros(self._model.ntree)
         np.maximum.at(fastest, trees, acceleration)
         at_rest = (fastest < _REST_ACCELERATION) & (np.arange(len(fastest)) != self.person_tree)
         self.asleep[at_rest] = np.flatnonzero(at_rest)
-
-    def continue_from(self, data: mujoco.MjData, grasps: Sequence[tuple[int, int] | None]) -> None:
-        """Continue from physics; held objects are put in line with their hands, all else stands still."""
-        rig, body, vector = self._rig, self._body, self.state.vector
-        vector[TIME] = data.time
-        body[:4], body[4:FORWARD] = rig.pose[:4], rig.rates[:4]
-        body[FORWARD:SERVO], body[SERVO:] = rig.motion, rig.get_state().command[:4]
-        vector[HANDS:HAND_SPEEDS] = rig.hand_targets.ravel()
-        vector[HAND_SPEEDS:GRASPS] = 0.0
-        vector[GRASPS:] = [-1 if grasp is None else 2 * grasp[0] + grasp[1] for grasp in grasps]
-        self.state.poses[:] = data.qpos[self._qpos].reshape(-1, 7)
-        carry(self.state, self.model)
-        self.asleep[:] = data.tree_asleep
 
     def write(self, data: mujoco.MjData) -> None:
         """Bring poses of bodies, geoms, sites and cameras in step, for rendering and rays."""
@@ -145,17 +133,27 @@ class KinematicWorld:
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
 
-    def walk(self, moves: NDArray[np.float64]) -> RolloutArrays:
-        """One control step per row (n, 4): forward and left, m/s, turn and look, rad/s."""
-        rows = RolloutArrays.empty(len(moves), len(self.state.poses))
-        walk_rows(moves, self.state, self.model, rows)
-        return rows
+    def walk(self, moves: NDArray[np.float64]) -> States | None:
+        """One control step per row (n, 4): forward and left, m/s, turn and look, rad/s; the states between them."""
+        walk_rows(moves, self.state, self.model, self._rows)
+        return self._passed(len(moves))
 
-    def play(self, trajectory: MotionTrajectory, start: int, end: int) -> RolloutArrays:
-        """Go through the control steps `start` to `end` of a trajectory."""
-        rows = RolloutArrays.empty(end - start, len(self.state.poses))
-        play_rows(trajectory, start, end, self.state, rows)
-        return rows
+    def follow(
+        self, walk: Walk, progress: NDArray[np.float64], limit: int
+    ) -> tuple[int, NDArray[np.float64], States | None]:
+        """Walk along a path: the latest phase, the moves made, shape (n, 4), and the states between them."""
+        moves = np.empty((min(limit, MAX_ROWS), 4))
+        count, phase = follow_rows(walk, progress, self.state, self.model, moves, self._rows)
+        return phase, moves[:count], self._passed(count)
+
+    def play(self, trajectory: MotionTrajectory, start: int, end: int) -> States | None:
+        """Go through the control steps `start` to `end` of a trajectory; the states between them."""
+        play_rows(trajectory, start, end, self.state, self._rows)
+        return self._passed(end - start)
+
+    def _passed(self, count: int) -> States | None:
+        """The states between `count` control steps that were just taken."""
+        return None if count < 2 else States._make(column[: count - 1].copy() for column in self._rows)
 
     def state_hash(self) -> int:
         """64 bits that differ whenever the state differs (up to chance)."""
@@ -166,11 +164,7 @@ class KinematicWorld:
         return np.concatenate((self.state.vector, self.state.poses.ravel(), self.asleep))
 
     def unpack(self, values: NDArray[np.float64]) -> None:
-        """Continue from what `pack` gave, shape (STATE_SIZE + 7 n + trees,).
-
-        Raises:
-            StateError: It does not fit.
-        """
+        """Continue from what `pack` gave, shape (STATE_SIZE + 7 n + trees,); `StateError` where it does not fit."""
         vector, poses = self.state
         sizes = (STATE_SIZE, poses.size, len(self.asleep))
         if values.shape != (sum(sizes),) or not np.isfinite(values).all():

@@ -1,18 +1,9 @@
 """Walking without physics: the person's servos and trunk as numba kernels, one control step at a time.
 
-A body is one array of `BODY_SIZE` numbers, laid out by the indices of `body_state`. Any numba kernel may step it:
-
-    @kernel
-    def ten_steps_ahead(body, gait, floor):
-        for _ in range(10):
-            walk(body, 1.4, 0.0, 0.3, 0.0, gait, floor)  # forward m/s, left m/s, turn rad/s, look rad/s
-
-    body = standing(x, y, heading, pitch)
-    ten_steps_ahead(body, Gait.of(scene, WorldOptions()), Floor.of(scene.model, scene.person.body_radius))
-
-`walk` changes `body` in place and returns nothing. It slews the commands as `Person.walk` does, then lets the four
-servos follow them in steps of the physics, with the masses, gains and force limits of the compiled model. The trunk
-is a disc that slides along the outlines of the house and never enters them. Loose objects are no obstacles.
+A body is one array of `BODY_SIZE` numbers, laid out by the indices of `body_state`. `command` slews its commands as
+`Person.walk` does; `advance` lets the four servos follow them in steps of the physics, with the masses, gains and force
+limits of the compiled model. The trunk is a disc that slides along the outlines of the house and never enters them.
+Loose objects are no obstacles.
 """
 
 import math
@@ -37,7 +28,7 @@ from mjsim.fidelity.body_state import (
     X,
     Y,
 )
-from mjsim.fidelity.trunk_contact import Floor, is_free, slide
+from mjsim.fidelity.trunk_contact import Floor, is_clear, slide
 from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
@@ -46,43 +37,31 @@ from mjsim.person import rate_limits
 
 
 class Gait(NamedTuple):
-    """Limits of walking and the servos that carry it out; SI units.
+    """Limits of walking and the servos that carry it out; SI units."""
 
-    Attributes:
-        max_speed, max_turn, max_look, acceleration, turn_acceleration: Those of the person: `fastest_walk`,
-            `turning_speed`, `looking_speed`, `walking_acceleration` and `turning_acceleration`.
-        dt: Control step.
-        substeps: Physics steps in it.
-        mass, walk_gain, walk_force: What x and y move, the gain of their velocity servos, and their force limit.
-        inertia, turn_gain, turn_force: Of the yaw's velocity servo.
-        head_inertia, head_stiffness, head_damping, head_force: Of the head's position servo.
-        lowest, highest: Range of the head's pitch.
-        radius: Radius of the trunk.
-        eye_height, eye_forward: Of the eye above the floor, and in front of the body's axis.
-    """
-
+    # `fastest_walk`, `turning_speed`, `looking_speed`, `walking_acceleration`, `turning_acceleration` of the person
     max_speed: float
     max_turn: float
     max_look: float
     acceleration: float
     turn_acceleration: float
-    dt: float
-    substeps: int
-    mass: float
+    dt: float  # control step
+    substeps: int  # physics steps in it
+    mass: float  # of x and y, with the gain and the force limit of their velocity servos
     walk_gain: float
     walk_force: float
-    inertia: float
+    inertia: float  # of the yaw, with its velocity servo
     turn_gain: float
     turn_force: float
-    head_inertia: float
+    head_inertia: float  # of the head, with its position servo
     head_stiffness: float
     head_damping: float
     head_force: float
-    lowest: float
+    lowest: float  # range of the head's pitch
     highest: float
-    radius: float
-    eye_height: float
-    eye_forward: float
+    radius: float  # of the trunk
+    eye_height: float  # above the floor
+    eye_forward: float  # in front of the body's axis
 
     @classmethod
     def of(cls, scene: Scene, options: WorldOptions) -> "Gait":
@@ -122,29 +101,6 @@ class Gait(NamedTuple):
             eye_height=person.eye_height,
             eye_forward=avatar.EYE_FORWARD,
         )
-
-
-class LocomotionState(NamedTuple):
-    """Everything that walking without physics depends on, for kernels that roll it out.
-
-    Attributes:
-        body: The body now, shape (BODY_SIZE,); copy it before stepping it.
-        gait: Limits and servos.
-        floor: Outlines that the trunk meets.
-    """
-
-    body: NDArray[np.float64]
-    gait: "Gait"
-    floor: "Floor"
-
-
-@kernel
-def walk(
-    body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait, floor: Floor
-) -> None:
-    """One control step of a body, shape (BODY_SIZE,), as `Move(forward, left, turn, look)` asks, m/s and rad/s."""
-    command(body, forward, left, turn, look, gait)
-    advance(body, gait, floor)
 
 
 @kernel
@@ -197,7 +153,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
     # No servo overshoots what it was told before or is told now.
     reach_x = gait.radius + gait.dt * max(abs(body[VX]), abs(body[SERVO]), abs(to_x))
     reach_y = gait.radius + gait.dt * max(abs(body[VY]), abs(body[SERVO + 1]), abs(to_y))
-    free = is_free(body[X], body[Y], reach_x, reach_y, gait.radius, floor)
+    free = is_clear(body[X], body[Y], reach_x, reach_y, gait.radius, floor)
     for k in range(1, gait.substeps + 1):
         push_x = gait.walk_gain * (body[SERVO] + k * ramp_x)
         push_y = gait.walk_gain * (body[SERVO + 1] + k * ramp_y)

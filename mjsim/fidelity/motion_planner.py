@@ -1,18 +1,16 @@
-"""Picks and places worked out without physics, with the times and speeds of `mjsim.person_parameters`.
+"""Picks and places computed without physics, with the times and speeds of `mjsim.person_parameters`.
 
 Only the fall of a released object is physics. Success is decided by the same test as in `mjsim.person.placing`.
 """
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import ActionResult, EventKind, Pick
+from mjsim.actions import ActionResult, EventKind, Place
 from mjsim.fidelity import motion_primitives
 from mjsim.fidelity.body_state import FORWARD, HEADING, X, Y
 from mjsim.fidelity.fall import Fall, drop
@@ -35,17 +33,11 @@ _SEATING = 1  # control step in which a load is drawn into a hand that closes fi
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """A pick or place, or the part of it before physics begins, worked out.
+    """A pick or place, computed in advance."""
 
-    Attributes:
-        trajectory: The state after each control step.
-        success: Whether the hand holds the object, or it rests in its receptacle.
-        incidents: Other events: control step, kind and object.
-    """
-
-    trajectory: MotionTrajectory
-    success: bool = True
-    incidents: tuple[tuple[int, EventKind, int], ...] = ()
+    trajectory: MotionTrajectory  # the state after each control step
+    success: bool = True  # whether the hand holds the object, or it rests in its receptacle
+    incidents: tuple[tuple[int, EventKind, int], ...] = ()  # other events: control step, kind and object
 
     @property
     def length(self) -> int:
@@ -54,97 +46,75 @@ class PlannedMotion:
 
 
 class MotionPlanner:
-    """Works out motions from the present state of a kinematic world, which is left as it was.
+    """Computes motions from the present state of a kinematic world, which is left as it was.
 
-    The data of the physics must be in step with it.
+    The data of the physics must be up to date with it.
     """
 
     def __init__(self, full: Full, kinematic: KinematicWorld) -> None:
-        self._full, self._kinematic = full, kinematic
+        self._full, self._kinematic, self._person = full, kinematic, full.person
+        self._times, self._steps = full.person.motion, full.person.steps
         self._corners: dict[tuple[int, int], Vector] = {}
-
-    def approach(self, result: ActionResult, hand: int, item: int) -> PlannedMotion:
-        """Turn to an object and reach for it, or turn to its receptacle and bring it over."""
-        with self._motion(hand) as motion:
-            if isinstance(result.action, Pick):
-                self._reach(motion, item)
-            else:
-                self._bring_over(motion, item, self._receptacle(result))
-        return PlannedMotion(motion.trajectory)
 
     def plan(self, result: ActionResult, hand: int, item: int) -> PlannedMotion:
         """The whole pick or place."""
-        with self._motion(hand) as motion:
-            if isinstance(result.action, Pick):
-                self._pick(motion, item)
-                planned = PlannedMotion(motion.trajectory)
-            else:
-                planned = self._place(motion, item, self._receptacle(result))
-        return planned
-
-    def _receptacle(self, result: ActionResult) -> ReceptacleGeometry:
-        return self._full.scene.receptacles[str(result.receptacle)]
-
-    @contextmanager
-    def _motion(self, hand: int) -> "Iterator[_Motion]":
-        """Work out a motion from the present state, which comes back afterwards."""
         state = self._kinematic.state
         before = state.vector.copy(), state.poses.copy()
-        yield _Motion(self._full, self._kinematic, hand)
+        self._hand, self._trajectory = hand, MotionTrajectory.empty(_USUAL_STEPS, len(state.poses))
+        if isinstance(result.action, Place):
+            planned = self._place(item, self._full.scene.receptacles[str(result.receptacle)])
+        else:
+            planned = self._pick(item)
         state.vector[:], state.poses[:] = before
+        return planned
 
-    def _pick(self, motion: "_Motion", item: int) -> None:
-        times = self._full.person.motion
-        pitch = self._kinematic.pitch_target
-        grip = self._reach(motion, item)
-        self._kinematic.grasp(motion.hand, item, grip)
-        motion.wait(times.align_time)
-        body = self._kinematic.body
-        body_motion = BodyMotion(body, body[FORWARD:], self._kinematic.model.clearance)
-        goal = self._full.carrying.carry_position(motion.hand, item, body_motion)
-        motion.move(goal, motion.steps(times.lift_time), UP_FIRST, _towards(pitch))
-        motion.move(motion.hand_position, _SEATING)
-        motion.end()
+    def _pick(self, item: int) -> PlannedMotion:
+        kinematic, pitch = self._kinematic, self._kinematic.pitch_target
+        kinematic.grasp(self._hand, item, self._reach(item))
+        self._move(self._hand_position, self._steps(self._times.align_time))
+        body_motion = BodyMotion(kinematic.body, kinematic.body[FORWARD:], kinematic.model.clearance)
+        goal = self._full.carrying.carry_position(self._hand, item, body_motion)
+        self._move(goal, self._steps(self._times.lift_time), UP_FIRST, _towards(pitch))
+        self._move(self._hand_position, _SEATING)
+        self._end()
+        return PlannedMotion(self._trajectory)
 
-    def _place(self, motion: "_Motion", item: int, receptacle: ReceptacleGeometry) -> PlannedMotion:
-        times = self._full.person.motion
+    def _place(self, item: int, receptacle: ReceptacleGeometry) -> PlannedMotion:
         pitch = self._kinematic.pitch_target
-        slot, low = self._bring_over(motion, item, receptacle)
-        motion.wait(times.hover_time)
-        motion.descend(receptacle, _over(slot, slot.fill + times.release_gap - low))
-        fall = drop(self._full, self._kinematic, motion.hand, item, receptacle)
-        released = motion.length
-        motion.withdraw(fall, pitch)
-        motion.end()
+        slot, low = self._bring_over(item, receptacle)
+        self._move(self._hand_position, self._steps(self._times.hover_time))
+        self._descend(receptacle, _over(slot, slot.fill + self._times.release_gap - low))
+        fall = drop(self._full, self._kinematic, self._hand, item, receptacle)
+        released = int(self._trajectory.length[0])
+        self._withdraw(fall, pitch)
+        self._end()
         incidents = tuple((released + step, kind, item) for step, kind, item in fall.incidents)
-        return PlannedMotion(motion.trajectory, fall.success, incidents)
+        return PlannedMotion(self._trajectory, fall.success, incidents)
 
-    def _reach(self, motion: "_Motion", item: int) -> int:
+    def _reach(self, item: int) -> int:
         """Turn to an object and reach for it; the grip that is nearest then."""
-        person = self._full.person
-        center = person.center(item)
-        motion.face(center, math.nan, person.motion.object_tolerance)
+        grips, center = self._person.grips, self._person.center(item)
+        self._face(center, math.nan, self._times.object_tolerance)
         heading = float(self._kinematic.body[HEADING])
-        grip = person.grips.grip_along(item, np.array([math.cos(heading), math.sin(heading), 0.0]))
-        point, steps = person.grips.point(item, grip), motion.steps(person.motion.reach_time)
-        motion.move(point, steps, ACROSS_FIRST, center, in_house=True)
-        motion.move(motion.hand_position, _REACH_LAG)
+        grip = grips.grip_along(item, np.array([math.cos(heading), math.sin(heading), 0.0]))
+        steps = self._steps(self._times.reach_time)
+        self._move(grips.point(item, grip), steps, ACROSS_FIRST, center, in_house=True)
+        self._move(self._hand_position, _REACH_LAG)
         return grip
 
-    def _bring_over(self, motion: "_Motion", item: int, receptacle: ReceptacleGeometry) -> tuple[Slot, float]:
+    def _bring_over(self, item: int, receptacle: ReceptacleGeometry) -> tuple[Slot, float]:
         """Turn to a receptacle and bring the load over it; the slot, and how far below the hand the load ends, m."""
-        person = self._full.person
-        heading = square_heading(person, receptacle)
-        motion.face(receptacle.center, heading, person.motion.receptacle_tolerance)
-        extent = self._load_extent(motion.hand, receptacle)
+        heading = square_heading(self._person, receptacle)
+        self._face(receptacle.center, heading, self._times.receptacle_tolerance)
+        extent = self._load_extent(receptacle)
         low = float(extent.low[2])
-        slot = best_slot(person, item, receptacle, extent)
-        motion.travel(receptacle, _over(slot, hover_height(person, receptacle, slot) - low))
+        slot = best_slot(self._person, item, receptacle, extent)
+        self._travel(receptacle, _over(slot, hover_height(self._person, receptacle, slot) - low))
         return slot, low
 
-    def _load_extent(self, hand: int, receptacle: ReceptacleGeometry) -> LoadExtent:
+    def _load_extent(self, receptacle: ReceptacleGeometry) -> LoadExtent:
         """Extent of a load about the hand that holds it, in the receptacle's axes."""
-        grasp = self._kinematic.grasps[hand]
+        grasp = self._kinematic.grasps[self._hand]
         if grasp is None:  # a place begins only with something in the hand
             return LoadExtent(np.zeros(3), np.zeros(3))
         if grasp not in self._corners:
@@ -163,41 +133,21 @@ class MotionPlanner:
         mujoco.mju_quat2Mat(rotation, pose[3:])
         return np.asarray(corners @ rotation.reshape(3, 3).T + pose[:3])
 
-
-class _Motion:
-    """A motion being worked out: each movement appends its control steps to the trajectory.
-
-    Attributes:
-        hand: Hand that picks or places.
-        trajectory: The control steps so far.
-    """
-
-    def __init__(self, full: Full, kinematic: KinematicWorld, hand: int) -> None:
-        self._person, self._kinematic, self.hand = full.person, kinematic, hand
-        self.trajectory = MotionTrajectory.empty(_USUAL_STEPS, len(kinematic.state.poses))
-        self.steps = full.person.steps
-
     @property
-    def length(self) -> int:
-        """Control steps so far."""
-        return int(self.trajectory.length[0])
-
-    @property
-    def hand_position(self) -> Vector:
+    def _hand_position(self) -> Vector:
         """The hand in the body frame, m, shape (3,)."""
-        first = HANDS + 3 * self.hand
+        first = HANDS + 3 * self._hand
         return self._kinematic.state.vector[first : first + 3].copy()
 
-    def face(self, point: Vector, heading: float, tolerance: float) -> None:
+    def _face(self, point: Vector, heading: float, tolerance: float) -> None:
         """Stand still and turn to a point (3,) m, or to a heading unless that is NaN, rad."""
-        motion, kinematic = self._person.motion, self._kinematic
-        steps = self.steps(motion.turn_timeout)
-        self._make_room(steps)
+        kinematic, steps = self._kinematic, self._steps(self._times.turn_timeout)
+        room = self._room(steps)
         motion_primitives.face(
-            kinematic.state, self.trajectory, point, heading, tolerance, steps, motion, kinematic.model
+            kinematic.state, room, point, heading, tolerance, steps, self._times, kinematic.model
         )
 
-    def move(
+    def _move(
         self,
         goal: Vector,
         steps: int,
@@ -207,57 +157,43 @@ class _Motion:
         in_house: bool = False,
     ) -> None:
         """Move the hand to a goal (3,) m; see `HandMovement`. Without a gaze the head stays as it is."""
-        kinematic = self._kinematic
+        kinematic, room = self._kinematic, self._room(steps)
         gaze = _towards(kinematic.pitch_target) if gaze is None else gaze
-        self._make_room(steps)
-        movement = HandMovement(self.hand, goal, in_house, steps, order, gaze)
-        motion_primitives.move_hand(
-            kinematic.state, self.trajectory, movement, self._person.motion, kinematic.model
-        )
+        movement = HandMovement(self._hand, goal, in_house, steps, order, gaze)
+        motion_primitives.move_hand(kinematic.state, room, movement, self._times, kinematic.model)
 
-    def wait(self, seconds: float) -> None:
-        """Keep the hand where it is."""
-        self.move(self.hand_position, self.steps(seconds))
-
-    def travel(self, receptacle: ReceptacleGeometry, hover: Vector) -> None:
+    def _travel(self, receptacle: ReceptacleGeometry, hover: Vector) -> None:
         """Up to the hover height, then across to the hover position (3,) in the receptacle's axes, m."""
         goal, person = receptacle.center + receptacle.rotation @ hover, self._person
-        start, above = self.hand_position, self._in_body(goal)
+        start, above = self._hand_position, self._in_body(goal)
         up = np.array([start[0], start[1], max(start[2], above[2])])
-        self.move(up, person.travel_steps(float(np.linalg.norm(up - start))), gaze=receptacle.center)
-        distance = float(np.linalg.norm(self._in_body(goal) - self.hand_position))
-        self.move(goal, person.travel_steps(distance), gaze=receptacle.center, in_house=True)
+        self._move(up, person.travel_steps(float(np.linalg.norm(up - start))), gaze=receptacle.center)
+        distance = float(np.linalg.norm(self._in_body(goal) - self._hand_position))
+        self._move(goal, person.travel_steps(distance), gaze=receptacle.center, in_house=True)
 
-    def descend(self, receptacle: ReceptacleGeometry, release: Vector) -> None:
+    def _descend(self, receptacle: ReceptacleGeometry, release: Vector) -> None:
         """Down to the release position (3,) in the receptacle's axes, m, and one step more to see what it touches."""
         goal = self._in_body(receptacle.center + receptacle.rotation @ release)
-        steps = self._person.descent_steps(abs(float(goal[2] - self.hand_position[2])))
-        self.move(goal, steps)
-        self.move(self.hand_position, 1)
+        self._move(goal, self._person.descent_steps(abs(float(goal[2] - self._hand_position[2]))))
+        self._move(self._hand_position, 1)
 
-    def withdraw(self, fall: Fall, pitch: float) -> None:
+    def _withdraw(self, fall: Fall, pitch: float) -> None:
         """Withdraw the hand while the released object falls; the head looks to `pitch`, rad."""
-        kinematic = self._kinematic
-        self._make_room(len(fall.poses))
+        kinematic, room = self._kinematic, self._room(len(fall.poses))
         motion_primitives.withdraw(
-            kinematic.state,
-            self.trajectory,
-            self.hand,
-            fall.poses,
-            pitch,
-            self._person.motion,
-            kinematic.model,
+            kinematic.state, room, self._hand, fall.poses, pitch, self._times, kinematic.model
         )
         kinematic.state.poses[:] = fall.rest
 
-    def end(self) -> None:
+    def _end(self) -> None:
         """The control step in which the motion has ended."""
-        self._make_room(1)
-        motion_primitives.end(self._kinematic.state, self.trajectory, self._kinematic.model)
+        motion_primitives.end(self._kinematic.state, self._room(1), self._kinematic.model)
 
-    def _make_room(self, steps: int) -> None:
-        if self.length + steps > len(self.trajectory.vectors):
-            self.trajectory = self.trajectory.longer(steps)
+    def _room(self, steps: int) -> MotionTrajectory:
+        """The trajectory, with room for more control steps."""
+        if int(self._trajectory.length[0]) + steps > len(self._trajectory.vectors):
+            self._trajectory = self._trajectory.longer(steps)
+        return self._trajectory
 
     def _in_body(self, point: Vector) -> Vector:
         body = self._kinematic.body

@@ -25,23 +25,17 @@ from mjsim.fidelity.kinematics import Gait
 from mjsim.kernels import kernel
 from mjsim.motion_parameters import MotionParameters
 from mjsim.person.hand_path import progress
-from mjsim.rollout import RolloutArrays
+from mjsim.steps import States
 
 Floats = NDArray[np.float64]
 
 
 class MotionTrajectory(NamedTuple):
-    """States of a motion that was worked out before it is played, one per control step.
+    """States of a motion that was worked out before it is played, one per control step."""
 
-    Attributes:
-        vectors: `KinematicState.vector` after each step, shape (max, STATE_SIZE).
-        poses: Poses of the objects, m and wxyz, shape (max, n, 7).
-        length: Number of control steps so far, shape (1,).
-    """
-
-    vectors: Floats
-    poses: Floats
-    length: NDArray[np.int64]
+    vectors: Floats  # `KinematicState.vector` after each step, shape (max, STATE_SIZE)
+    poses: Floats  # poses of the objects, m and wxyz, shape (max, n, 7)
+    length: NDArray[np.int64]  # number of control steps so far, shape (1,)
 
     @classmethod
     def empty(cls, max_steps: int, objects: int) -> "MotionTrajectory":
@@ -60,23 +54,14 @@ class MotionTrajectory(NamedTuple):
 
 
 class HandMovement(NamedTuple):
-    """Where a hand goes, and how.
+    """Where a hand goes, and how."""
 
-    Attributes:
-        hand: The hand.
-        goal: Where it ends, m, shape (3,).
-        in_house: Whether the goal is in the frame of the house, else in that of the body.
-        steps: Control steps that it takes.
-        order: `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST` of `mjsim.person.hand_path`.
-        gaze: Point of the house to glance at, m, shape (3,); or NaN, NaN and the pitch to look to, rad.
-    """
-
-    hand: int
-    goal: Floats
-    in_house: bool
-    steps: int
-    order: int
-    gaze: Floats
+    hand: int  # the hand
+    goal: Floats  # where it ends, m, shape (3,)
+    in_house: bool  # whether the goal is in the frame of the house, else in that of the body
+    steps: int  # control steps that it takes
+    order: int  # `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST` of `mjsim.person.hand_path`
+    gaze: Floats  # point of the house to glance at, m, shape (3,); or NaN, NaN and the pitch to look to, rad
 
 
 @kernel
@@ -89,7 +74,7 @@ def _append(trajectory: MotionTrajectory, state: KinematicState) -> None:
 
 @kernel
 def play_rows(
-    trajectory: MotionTrajectory, start: int, end: int, state: KinematicState, rows: RolloutArrays
+    trajectory: MotionTrajectory, start: int, end: int, state: KinematicState, rows: States
 ) -> None:
     """Take the state through the control steps `start` to `end` of a trajectory."""
     for row in range(start, end):

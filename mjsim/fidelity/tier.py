@@ -1,26 +1,25 @@
 """What all tiers of fidelity have in common."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import IDLE, Action, ActionResult, Move, Pick, Place
+from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
+from mjsim.errors import PhysicsError
 from mjsim.fidelity.episode_state import EpisodeState
 from mjsim.health.values import HealthSample
 from mjsim.observation import Observation
-from mjsim.rollout import Rollout
+from mjsim.steps import States, Steps
+from mjsim.walking.path_following import ARRIVED, BLOCKED, CHANGED, WALKING, Walk, plain, step_from_python
 
 
 class Tier(ABC):
-    """One way to advance the person and the objects by control steps.
+    """One way to advance the person and the objects by control steps."""
 
-    Attributes:
-        episode_state: Hands, statuses, and the events of the latest control step.
-    """
-
-    episode_state: EpisodeState
+    episode_state: EpisodeState  # hands, statuses, and the events of the latest control step
 
     @property
     @abstractmethod
@@ -33,7 +32,7 @@ class Tier(ABC):
         """Health of the physics in the latest control step."""
 
     @abstractmethod
-    def step(self, action: Action) -> ActionResult | None:
+    def step(self, action: StepAction) -> ActionResult | None:
         """Advance by one control step; its events are in `episode_state` afterwards."""
 
     @abstractmethod
@@ -48,26 +47,55 @@ class Tier(ABC):
     def state_hash(self) -> int:
         """64 bits that differ whenever the state differs (up to chance)."""
 
-    def walk(self, moves: NDArray[np.float64]) -> Rollout:
-        """One control step per row (n, 4), until a step brings events; not while busy."""
-        return self.step_each(Move(*row) for row in moves.tolist())
+    def follow(self, walk: Walk, progress: NDArray[np.float64], limit: int) -> tuple[int, Steps | None]:
+        """Walk along a path for up to `limit` control steps, until a step brings events or the walk has to stop.
 
-    def finish(self) -> Rollout:
-        """Idle until no pick or place is under way, or a step brings events."""
-        return self.step_each(iter(lambda: IDLE if self.busy else None, None))
+        Where loose objects may move, a path that no display shows is walked one step at a time: the person looks where
+        it leads. `progress` is that of a `Walker`, shape (2,); updated. Returns the latest phase of the walk, and the
+        steps, None where the person has arrived already.
+        """
+        arguments, phase, first = plain(walk), WALKING, True
 
-    def step_each(self, actions: Iterable[Action]) -> Rollout:
-        """One control step per action, until a step brings events."""
-        observations: list[Observation] = []
-        hashes: list[int] = []
-        health: list[tuple[float, ...]] = []
-        for action in actions:
-            self.step(action)
-            observations.append(self.observation())
-            hashes.append(self.state_hash())
-            health.append(self.health_sample.row)
+        def choose(seen: Observation) -> Move | None:
+            nonlocal phase, first
+            if phase == BLOCKED:
+                return None
+            state = seen.position, seen.heading, seen.time, progress, seen.object_positions
+            phase, *velocities = step_from_python(arguments, *state, first)
+            first = False
+            return None if phase in (ARRIVED, CHANGED) else Move(*velocities)
+
+        steps = self._step_each(choose, limit if walk.shown else 1)
+        return phase, steps
+
+    def wait(self, limit: int) -> Steps:
+        """Idle until no pick or place is under way or a step brings events; one control step if none is."""
+        busy = self.busy
+        steps = self._step_each(lambda _: IDLE if self.busy or not busy else None, limit if busy else 1)
+        return cast(Steps, steps)
+
+    def _step_each(self, choose: Callable[[Observation], Move | None], limit: int) -> Steps | None:
+        """Up to `limit` control steps, until there is no move for the state, or a step brings events."""
+        seen, moves = [self.observation()], list[Move]()
+        hashes, health = list[int](), list[tuple[float, ...]]()
+
+        def steps() -> Steps | None:
+            if len(moves) <= 1:
+                return Steps(moves[0]) if moves else None
+            rows = np.array([(m.forward, m.left, m.turn, m.look) for m in moves])
+            return Steps(rows, States.of(seen[1 : len(moves)], hashes, health))
+
+        while len(moves) < limit and (move := choose(seen[-1])) is not None:
+            if moves:
+                hashes.append(self.state_hash())
+                health.append(self.health_sample.row)
+            moves.append(move)
+            try:
+                self.step(move)
+            except PhysicsError as error:
+                error.steps = steps()
+                raise
+            seen.append(self.observation())
             if self.episode_state.events:
                 break
-        last = observations[-1] if observations else self.observation()
-        events = tuple(self.episode_state.events) if observations else ()
-        return Rollout.of_steps(observations, hashes, health, last, events)
+        return steps()

@@ -21,35 +21,22 @@ _TOUCHING = 1e-7  # m
 
 
 class Floor(NamedTuple):
-    """Outlines of the obstacles of the trunk, with a grid to look up the near ones; for kernels.
+    """Outlines of the obstacles of the trunk, with a grid to look up the near ones; for kernels."""
 
-    Attributes:
-        edges: Edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, shape (e, 5).
-        first: Polygon p has the edges `first[p]` to `first[p + 1]`, shape (p + 1,).
-        boxes: Each polygon's smallest and largest x, and smallest and largest y, m, shape (p, 4).
-        near: Polygons that may touch the trunk, cell by cell.
-        near_first: Cell i, j has the entries of `near` from `near_first[i * columns + j]`, shape (cells + 1,).
-        origin_x, origin_y: Corner of cell 0, 0, m.
-        rows, columns: Cells along x and y.
-    """
-
+    # edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, (e, 5)
     edges: NDArray[np.float64]
-    first: NDArray[np.int64]
-    boxes: NDArray[np.float64]
-    near: NDArray[np.int64]
-    near_first: NDArray[np.int64]
-    origin_x: float
+    first: NDArray[np.int64]  # polygon p has the edges `first[p]` to `first[p + 1]`, (p + 1,)
+    boxes: NDArray[np.float64]  # each polygon's smallest and largest x, and smallest and largest y, m, (p, 4)
+    near: NDArray[np.int64]  # polygons that may touch the trunk, cell by cell
+    near_first: NDArray[np.int64]  # cell i, j has `near` from `near_first[i * columns + j]`, (cells + 1,)
+    origin_x: float  # corner of cell 0, 0, m
     origin_y: float
-    rows: int
-    columns: int
+    rows: int  # cells along x
+    columns: int  # cells along y
 
     @classmethod
     def of(cls, model: mujoco.MjModel, radius: float) -> "Floor":
-        """Outlines of the static geoms at the heights of a trunk of this radius, m.
-
-        Raises:
-            AssetError: The house has no rooms, or a static geom's outline is not known.
-        """
+        """Outlines of the static geoms at the heights of a trunk of this radius, m."""
         low, high = _TRUNK_BAND
         return cls.of_polygons(footprint(model, low=low, high=high).obstacles, radius)
 
@@ -91,7 +78,7 @@ def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @kernel
-def is_free(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
+def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
     """Whether no outline comes within these distances along x and y."""
     if max(reach_x, reach_y) > radius + _MARGIN:
         return False  # farther than a cell covers
@@ -161,17 +148,9 @@ def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int
 def gap_to(
     x: float, y: float, edges: NDArray[np.float64], first: int, last: int
 ) -> tuple[float, float, float]:
-    """Signed distance of a point to a convex polygon, m, and the direction away from it.
+    """Signed distance of a point, m, to a convex polygon, m, negative inside, and the unit vector away from it.
 
-    Args:
-        x: Of the point, m.
-        y: Of the point, m.
-        edges: As in `Floor`, shape (e, 5).
-        first: First edge of the polygon.
-        last: One beyond its last edge.
-
-    Returns:
-        Distance, negative inside, and x and y of the unit vector.
+    `edges` are those of `Floor`, (e, 5), of which the polygon has `first` to `last`, exclusive.
     """
     nearest, near_x, near_y = math.inf, 0.0, 0.0
     depth, out_x, out_y = -math.inf, 0.0, 0.0

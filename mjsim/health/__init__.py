@@ -1,1 +1,4 @@
-"""What the physics is watched for: penetration, weld errors, ejections, tunnelling."""
+"""Health of the physics at every control step: penetration, weld errors, ejections, tunnelling (docs/health.md).
+
+Serves the tiers, which measure it, and the records and benchmarks that report it.
+"""

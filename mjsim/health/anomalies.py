@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mjsim.actions import EventKind
 from mjsim.health.scan import DISPLACED, FAST, OUTSIDE
 from mjsim.health.settle_times import SettlingObject
-from mjsim.model.rays import first_hit
+from mjsim.model.rays import first_hit, moving_geoms
 from mjsim.model.scene import Scene
 
 CHECK_DISTANCE = 0.02  # m from its anchor, beyond which an object's path is checked
@@ -21,19 +21,12 @@ _MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # m
 
 @dataclass(frozen=True, eq=False)
 class AnomalyState:
-    """What an `AnomalyDetector` remembers, as a value.
+    """What an `AnomalyDetector` remembers, as a value."""
 
-    Attributes:
-        anchors: Where each object's centre was when its path was last checked, m, shape (n, 3).
-        ejected: Objects that count as ejected until a hand holds them again.
-        ejections: Number so far.
-        tunnellings: Number so far.
-    """
-
-    anchors: NDArray[np.float64]
-    ejected: tuple[int, ...]
-    ejections: int
-    tunnellings: int
+    anchors: NDArray[np.float64]  # where each object's centre was when its path was last checked, m, (n, 3)
+    ejected: tuple[int, ...]  # objects that count as ejected until a hand holds them again
+    ejections: int  # number so far
+    tunnellings: int  # number so far
 
 
 class AnomalyDetector:
@@ -66,14 +59,7 @@ class AnomalyDetector:
         settling: Mapping[int, SettlingObject],
         gripped: Collection[int],
     ) -> list[tuple[EventKind, int]]:
-        """Ejections and tunnelling in this control step, each with the number of the object.
-
-        Args:
-            data: The state at its end.
-            flags: Flags of each object (`mjsim.health.scan`), shape (n,).
-            settling: Objects that were released and are not at rest.
-            gripped: Objects that are welded to a hand; an ejected object counts again once a hand held it.
-        """
+        """Ejections and tunnelling in this control step, each with the number of the object."""
         found = []
         self._ejected.difference_update(gripped)
         far = {item for item, release in settling.items() if self._flew_off(data, item, release)}
@@ -99,7 +85,7 @@ class AnomalyDetector:
         )
 
     def set_state(self, state: AnomalyState) -> None:
-        """Go on from what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self.anchors[:] = state.anchors.reshape(self.anchors.shape)
         self._ejected = set(state.ejected)
         self.ejections, self.tunnellings = state.ejections, state.tunnellings
@@ -114,7 +100,7 @@ class AnomalyDetector:
         start = self.anchors[item]
         path = data.xipos[body] - start
         distance, geom = first_hit(
-            self._model, data, start, path, ignore=(body,), static_only=True, reach=1.0
+            self._model, data, start, path, through=moving_geoms(self._model), reach=1.0
         )
         return distance < 1.0 and bool(self._model.geom_contype[geom] or self._model.geom_conaffinity[geom])
 

@@ -23,28 +23,21 @@ from mjsim.options import WorldOptions
 from mjsim.person.grips import Grips
 from mjsim.person.rig import Rig
 
-_KICK = 2.0  # times the walking speed: a light object that bounces off somebody who walks into it
+_KICK = 2.0  # times the walking speed: a light object that bounces off a walking person
 _FALL = 5.6  # m/s, from the height at which objects are carried
 _NO_GEOMS, _NO_DISTANCES = np.zeros((0, 2), np.int32), np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
 class HealthState:
-    """What a `HealthMonitor` has accumulated, as a value.
+    """What a `HealthMonitor` has accumulated, as a value."""
 
-    Attributes:
-        extremes: Deepest overlap of an object and of the trunk, m; largest weld error, m and rad; shape (4,).
-        settle_times: See `Health.settle_times`.
-        sample: The latest control step.
-        anomalies: Objects that flew off or passed through something.
-        settling: Objects between release and rest.
-    """
-
+    # Deepest overlap of an object and of the trunk, m; largest weld error, m and rad; shape (4,).
     extremes: NDArray[np.float64]
-    settle_times: tuple[float, ...]
-    sample: HealthSample
-    anomalies: AnomalyState
-    settling: SettleTimerState
+    settle_times: tuple[float, ...]  # see `Health.settle_times`
+    sample: HealthSample  # the latest control step
+    anomalies: AnomalyState  # objects that flew off or passed through something
+    settling: SettleTimerState  # objects between release and rest
 
 
 class HealthMonitor:
@@ -97,13 +90,7 @@ class HealthMonitor:
         self._settling.reset()
 
     def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
-        """Take the latest control step into account.
-
-        Args:
-            held: Object that each hand carries.
-
-        Returns:
-            Ejections and tunnelling, each with the object's number.
+        """Take the latest control step into account; ejections and tunnelling, each with the object's number.
 
         Raises:
             PhysicsError: MuJoCo warned, or a position or velocity is not finite.
@@ -121,7 +108,7 @@ class HealthMonitor:
         return self._anomalies.find(data, self._flags, settling.objects, gripped)
 
     def resume(self) -> None:
-        """Go on after the person and what the hands hold were moved without physics."""
+        """Continue after the person and held objects were moved without physics."""
         self._anomalies.move_anchors(self._rig.data)
 
     def get_state(self) -> HealthState:
@@ -135,7 +122,7 @@ class HealthMonitor:
         )
 
     def set_state(self, state: HealthState) -> None:
-        """Go on from what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self._extremes[:] = state.extremes
         self._settle_times = list(state.settle_times)
         self.sample = state.sample

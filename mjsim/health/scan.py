@@ -44,67 +44,44 @@ def _static_boxes(model: mujoco.MjModel) -> Floats:
 
 
 class ScanArrays(NamedTuple):
-    """What a scan reads and writes, for one simulation: views of its state, its model, and the results.
+    """What a scan reads and writes, for one simulation: views of its state, its model, and the results."""
 
-    Attributes:
-        qpos: Positions, shape (nq,).
-        qvel: Velocities, shape (nv,).
-        xipos: Centres of mass of all bodies, m, shape (nbody, 3).
-        site_xpos: Positions of all sites, m, shape (nsite, 3).
-        site_xmat: Their frames, shape (nsite, 9).
-        warnings: How often MuJoCo has warned, by kind, shape (nwarning,).
-        bodies: Body of each object, shape (n,).
-        dofs: First degree of freedom of each object, shape (n,).
-        geom_owner: Object of each geom, or -1, shape (ngeom,).
-        trunk, foot: The person's trunk and foot, geoms.
-        limits: Squares of the distance from its anchor, m, beyond which an object is `DISPLACED`, of the speed, m/s,
-            beyond which it is `FAST`, and of the speed below which it is `SLOW`, shape (3,).
-        boxes: `static_boxes`.
-        rooms: `RoomMap.rectangles`.
-        grip_sites: `Grips.sites`.
-        anchors: Where each object was when its path was last checked, m, shape (n, 3); moved along where `boxes`
-            show the path to be clear.
-        flags: Flags of each object, shape (n,); overwritten.
-        sample: The deepest overlap of an object with anything but the person, and that of the trunk with the house,
-            both in m and not negative; how far the weld of either hand is stretched, m, and twisted, rad, NaN for a
-            hand that carries nothing; shape (6,), overwritten.
-        extremes: Largest sample so far: overlaps, m, weld error of either hand, m and rad, shape (4,); changed.
-    """
-
-    qpos: Floats
-    qvel: Floats
-    xipos: Floats
-    site_xpos: Floats
-    site_xmat: Floats
-    warnings: Ints
-    bodies: Ints
-    dofs: Ints
-    geom_owner: Ints
-    trunk: int
+    qpos: Floats  # positions, (nq,)
+    qvel: Floats  # velocities, (nv,)
+    xipos: Floats  # centres of mass of all bodies, m, (nbody, 3)
+    site_xpos: Floats  # positions of all sites, m, (nsite, 3)
+    site_xmat: Floats  # their frames, (nsite, 9)
+    warnings: Ints  # how often MuJoCo has warned, by kind, (nwarning,)
+    bodies: Ints  # body of each object, (n,)
+    dofs: Ints  # first degree of freedom of each object, (n,)
+    geom_owner: Ints  # object of each geom, or -1, (ngeom,)
+    trunk: int  # the person's trunk and foot, geoms
     foot: int
+    # Squares of the distance from its anchor, m, beyond which an object is `DISPLACED`, of the speed, m/s, beyond
+    # which it is `FAST`, and of the speed below which it is `SLOW`, (3,).
     limits: Floats
-    boxes: Floats
-    rooms: tuple[Floats, Floats, Floats]
-    grip_sites: NDArray[np.intp]
+    boxes: Floats  # `static_boxes`
+    rooms: tuple[Floats, Floats, Floats]  # `RoomMap.rectangles`
+    grip_sites: NDArray[np.intp]  # `Grips.sites`
+    # Where each object was when its path was last checked, m, (n, 3); moved along where `boxes` show the path to be
+    # clear.
     anchors: Floats
-    flags: NDArray[np.uint8]
+    flags: NDArray[np.uint8]  # flags of each object, (n,); overwritten
+    # The deepest overlap of an object with anything but the person, and that of the trunk with the house, both in m
+    # and not negative; how far the weld of either hand is stretched, m, and twisted, rad, NaN for a hand that carries
+    # nothing; shape (6,), overwritten.
     sample: Floats
-    extremes: Floats
+    extremes: (
+        Floats  # largest sample so far: overlaps, m, weld error of either hand, m and rad, (4,); changed
+    )
 
 
 @kernel
 def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -> int:
-    """Look at the state, all objects, both hands and all contacts once.
+    """Scan the state, objects, hands and contacts once: `NORMAL`, `SUSPECT`, `WARNED` or `NOT_FINITE`.
 
-    Args:
-        fields: Those of `ScanArrays` as a plain tuple, which numba takes from Python in half the time.
-        geoms: Geoms of each contact, shape (ncon, 2).
-        distances: Distance of each contact, m, negative where geoms overlap, shape (ncon,).
-        left: Whether the left hand carries something.
-        right: Whether the right one does.
-
-    Returns:
-        `NORMAL`, `SUSPECT` if any object has to be looked at or is fast, `WARNED` or `NOT_FINITE`.
+    Takes the fields of `ScanArrays` as a plain tuple, which numba accepts from Python in half the time, geoms (ncon, 2)
+    and distances (ncon,), m, of the contacts, and which hands carry something.
     """
     arrays = ScanArrays(*fields)
     for count in arrays.warnings:

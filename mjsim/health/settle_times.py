@@ -14,41 +14,28 @@ from mjsim.options import REST_STEPS
 
 @dataclass
 class SettlingObject:
-    """An object between its release and rest.
+    """An object between its release and rest."""
 
-    Attributes:
-        time: When a hand last held it, s.
-        x, y: Where its centre was then, m.
-        still_steps: Control steps in a row for which it has been slow or asleep.
-        still_since: When the first of them ended, s.
-    """
-
-    time: float
-    x: float
+    time: float  # when a hand last held it, s
+    x: float  # where its centre was then, m
     y: float
-    still_steps: int = 0
-    still_since: float = 0.0
+    still_steps: int = 0  # control steps in a row for which it has been slow or asleep
+    still_since: float = 0.0  # when the first of them ended, s
 
 
 @dataclass(frozen=True)
 class SettleTimerState:
-    """What a `SettleTimer` remembers, as a value.
+    """What a `SettleTimer` remembers, as a value."""
 
-    Attributes:
-        objects: Number and state of each released object that is not at rest.
-        gripped: Number of each held object, when it was last seen in the hand, s, and where its centre was, m, (3,).
-    """
-
-    objects: tuple[tuple[int, SettlingObject], ...]
+    objects: tuple[
+        tuple[int, SettlingObject], ...
+    ]  # number and state of each released object that is not at rest
+    # Number of each held object, when it was last seen in the hand, s, and where its centre was, m, (3,).
     gripped: tuple[tuple[int, float, list[float]], ...]
 
 
 class SettleTimer:
-    """Follows objects from their release until they rest, a hand grips them again, or the person's foot pushes them.
-
-    Attributes:
-        objects: The released objects that are not at rest, by number.
-    """
+    """Follows objects from their release until they rest, a hand grips them again, or the person's foot pushes them."""
 
     def __init__(self, scene: Scene) -> None:
         self._bodies, self._trees = scene.index.bodies.tolist(), scene.index.trees
@@ -60,16 +47,7 @@ class SettleTimer:
         self._gripped: dict[int, tuple[float, list[float]]] = {}  # when and where, last
 
     def update(self, data: mujoco.MjData, gripped: Collection[int], flags: NDArray[np.uint8]) -> list[float]:
-        """Take a control step into account.
-
-        Args:
-            data: The state at its end.
-            gripped: Objects that are welded to a hand.
-            flags: Flags of each object (`mjsim.health.scan`), shape (n,).
-
-        Returns:
-            Settle times, s, of the objects that came to rest with this step.
-        """
+        """Settle times, s, of objects that come to rest with this step; `gripped` ones are welded to a hand."""
         if not (gripped or self._gripped or self.objects):
             return []
         for item, (last, (x, y, _)) in self._gripped.items():
@@ -97,6 +75,6 @@ class SettleTimer:
         return SettleTimerState(objects, tuple((item, *last) for item, last in self._gripped.items()))
 
     def set_state(self, state: SettleTimerState) -> None:
-        """Go on from what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self.objects = {item: replace(settling) for item, settling in state.objects}
         self._gripped = {item: (time, center) for item, time, center in state.gripped}

@@ -59,10 +59,5 @@ class Health:
     tunnellings: int = 0
     warnings: int = 0
 
-    @property
-    def max_settle_time(self) -> float:
-        """Longest time from a release to rest, s; 0 when nothing was released."""
-        return max(self.settle_times, default=0.0)
-
 
 QUIET = HealthSample()

@@ -1,1 +1,18 @@
-"""Objects of one's own: a mesh file becomes an object model that is sampled, carried and placed (docs/import.md)."""
+"""Import of mesh files: each becomes an object model that is sampled, carried and placed like those of the package.
+
+For users of `mjsim import` (docs/import.md); needs the extra `import`.
+"""
+
+from importlib.util import find_spec
+
+from mjsim.errors import AssetError
+
+EXTRA = ("coacd", "fast_simplification", "manifold3d", "networkx", "PIL", "trimesh")
+
+
+def require_extra() -> None:
+    """Check that the libraries of the extra are installed (else `AssetError`); trimesh loads some of them late."""
+    if missing := [name for name in EXTRA if find_spec(name) is None]:
+        raise AssetError(
+            f"importing needs {', '.join(missing)}: pip install 'mjsim[import]' adds what is missing"
+        )

@@ -11,20 +11,15 @@ from mjsim.importing.surface import Floats, Ints
 SIDE = 512  # px
 _GUTTER = 2  # px around a triangle, so that neighbours do not bleed in
 _SHRINK = 0.93  # of the scale, until all triangles fit
-_LEAST = 2  # px across a triangle
+_MIN_SIDE = 2  # px across a triangle
 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Where the triangles lie.
+    """Where the triangles lie."""
 
-    Attributes:
-        shapes: Corners of each triangle in its own block, px, from the block's upper left, shape (n, 3, 2).
-        blocks: Left, upper, width and height of each block, px, shape (n, 4).
-    """
-
-    shapes: Floats
-    blocks: Ints
+    shapes: Floats  # corners of each triangle in its own block, px, from the block's upper left, (n, 3, 2)
+    blocks: Ints  # left, upper, width and height of each block, px, (n, 4)
 
     @classmethod
     def pack(cls, corners: Floats) -> Self:
@@ -86,7 +81,7 @@ def _flattened(corners: Floats) -> Floats:
 def _drawn(flat: Floats, scale: float) -> Floats:
     """Flat triangles (n, 3, 2), m, in pixels; slivers are drawn wider."""
     size = np.ptp(flat, axis=1, keepdims=True)
-    return np.asarray(flat * np.maximum(scale, _LEAST / np.maximum(size, 1e-12)))
+    return np.asarray(flat * np.maximum(scale, _MIN_SIDE / np.maximum(size, 1e-12)))
 
 
 def _shelves(flat: Floats, scale: float) -> Ints | None:

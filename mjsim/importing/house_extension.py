@@ -15,7 +15,7 @@ from mjsim.errors import AssetError
 from mjsim.files import exchange, work_folder, write_text_atomically
 from mjsim.importing.model_writer import MODEL
 from mjsim.importing.surface import Floats
-from mjsim.importing.values import Decision
+from mjsim.importing.values import ImportDecision
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.model.validation.findings import errors, one_line
@@ -23,7 +23,7 @@ from mjsim.model.validation.object_rules import check_object
 
 CATALOGUE = "catalogue.toml"
 HELD = 4  # objects of a kind that a bin has room for, by their boxes
-LONGEST_LABEL = 40
+MAX_LABEL = 40
 _UNNAMED = ".unnamed"  # file in the folder of an object that the catalogue does not name yet
 _WALL_GAP = 0.02  # m, between an object and the walls of its bin
 _HEADER = "# Objects that a house has in addition. Run in it with --house and the path of this file.\nextends = {}\n"
@@ -32,52 +32,32 @@ _ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {mo
 
 @dataclass(frozen=True)
 class Entry:
-    """How a catalogue names an object.
+    """How a catalogue names an object."""
 
-    Attributes:
-        key: Its key and the name of its folder.
-        label: Name shown to the person.
-        category: Category key.
-    """
-
-    key: str
-    label: str
-    category: str
+    key: str  # its key and the name of its folder
+    label: str  # name shown to the person
+    category: str  # category key
 
     @classmethod
     def named(cls, name: str, category: str) -> "Entry":
-        """An entry for a name such as `Toy robot`: the key is made from it.
-
-        Raises:
-            AssetError: The name has no letter or digit, or is too long to be shown.
-        """
+        """An entry for a name such as `Toy robot`, from which the key is made; `AssetError` where it cannot be."""
         label = " ".join(name.replace("_", " ").split())
         plain = unicodedata.normalize("NFKD", label.lower()).encode("ascii", "ignore").decode()
         key = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
-        if not key or len(label) > LONGEST_LABEL or not label.isprintable():
+        if not key or len(label) > MAX_LABEL or not label.isprintable():
             raise AssetError(
-                f"--name {name!r:.60} must have a Latin letter or digit and at most {LONGEST_LABEL} characters"
+                f"--name {name!r:.60} must have a Latin letter or digit and at most {MAX_LABEL} characters"
             )
         return cls(key, label[0].upper() + label[1:], category)
 
 
 class HouseExtension:
-    """A folder with a catalogue and the objects that it adds to a house.
-
-    Attributes:
-        folder: The folder; it need not exist.
-        catalogue: The house with what has been added so far.
-    """
+    """A folder, which need not exist, with a catalogue and the objects that it adds to a house."""
 
     def __init__(self, folder: Path, house: str | None = None) -> None:
-        """Open a folder, or plan one.
+        """Open a folder, or plan one; it extends the same house as before, or `apartment`, unless one is given.
 
-        Args:
-            folder: Where objects are added.
-            house: House to extend; None for the one that the folder extends, else `apartment`.
-
-        Raises:
-            AssetError: It is no folder, its catalogue is unusable or extends another house.
+        `AssetError` where it is no folder, or its catalogue is unusable or extends another house.
         """
         self.folder = folder
         self._file = folder / CATALOGUE
@@ -117,15 +97,14 @@ class HouseExtension:
             )
         abandoned = known is None and (mine / _UNNAMED).exists()  # an import was killed
         if (known is not None or mine.exists()) and not (force or abandoned):
-            raise AssetError(f"{mine} is already there; choose another --name, or say --force to replace it")
+            raise AssetError(f"{mine} is already there; choose another --name, or use --force to replace it")
         if mine.exists() and not (mine / MODEL).is_file():
             raise AssetError(f"{mine} is not an imported object and is not replaced; choose another --name")
 
-    def fit(self, entry: Entry, size: Floats) -> Decision:
+    def fit(self, entry: Entry, size: Floats) -> ImportDecision:
         """How an object with extents (3,), m, fits into the bin of its category.
 
-        Raises:
-            AssetError: It does not, or so many of them would not that a clean-up could fail.
+        `AssetError` where it does not, or so many of them would not that a clean-up could fail.
         """
         receptacle = self.catalogue.receptacles[self.catalogue.categories[entry.category].receptacle]
         room = 2 * compiled_house(self.catalogue).receptacles[receptacle.key].half_size
@@ -136,24 +115,14 @@ class HouseExtension:
         if factor < 1:
             raise AssetError(
                 f"it measures {sides} m, and {HELD} of that do not fit into {receptacle.label!r} ({inside} m); "
-                f"say --scale {0.99 * factor:.2g} on top of what you said, or choose another category"
+                f"use --scale {0.99 * factor:.2g} on top of the present one, or choose another category"
             )
-        return Decision("size", f"{sides} m", f"{receptacle.label} has {inside} m")
+        return ImportDecision("size", f"{sides} m", f"{receptacle.label} has {inside} m")
 
     def add(self, entry: Entry, write: Callable[[Path], None], *, force: bool = False) -> Catalogue:
-        """Add an object, or replace one with `force`; if anything fails all is as before.
+        """Add an object whose files `write` puts into a folder, or replace one with `force`; a failure changes nothing.
 
-        Args:
-            entry: How it is named.
-            write: Writes its files into a folder.
-            force: Whether to replace it.
-
-        Returns:
-            The catalogue with the object.
-
-        Raises:
-            AssetError: As for `check`, or the object breaks a convention of docs/models.md.
-            OSError: Files cannot be written.
+        `AssetError` as for `check`, or where the object breaks a convention of docs/models.md.
         """
         self.check(entry, force=force)
         created = not self.folder.exists()

@@ -13,7 +13,7 @@ from mjsim.importing.atlas import Atlas
 from mjsim.importing.solid import is_closed, simplified
 from mjsim.importing.surface import Floats, Ints, Surface
 
-MOST_TRIANGLES = 1400
+MAX_TRIANGLES = 1400
 _SAMPLES = 200_000  # points of the file's surface among which the nearest is looked for
 _FACING = 0.01  # m; a triangle that faces away counts as this much farther off
 _CREASE = math.radians(40.0)
@@ -24,36 +24,22 @@ _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # of the R2 sequen
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """A surface to draw.
+    """A surface to draw."""
 
-    Attributes:
-        vertices: m, shape (n, 3).
-        faces: Shape (m, 3).
-        normals: Unit normals at the corners of the faces, creased at sharp edges, shape (m, 3, 3).
-        uv: Places of the corners in the picture, from 0 to 1 from the lower left, shape (m, 3, 2); None without one.
-        picture: RGB, shape (height, width, 3), or None.
-        colour: RGB from 0 to 1, where there is no picture.
-        doubled: Whether every face is there twice, since the surface is open and seen from both sides.
-    """
-
-    vertices: Floats
-    faces: Ints
-    normals: Floats
+    vertices: Floats  # m, (n, 3)
+    faces: Ints  # shape (m, 3)
+    normals: Floats  # unit normals at the corners of the faces, creased at sharp edges, (m, 3, 3)
+    # Places of the corners in the picture, from 0 to 1 from the lower left, (m, 3, 2); None without one.
     uv: Floats | None
-    picture: NDArray[np.uint8] | None
-    colour: tuple[float, float, float]
-    doubled: bool
+    picture: NDArray[np.uint8] | None  # RGB, (height, width, 3), or None
+    colour: tuple[float, float, float]  # RGB from 0 to 1, where there is no picture
+    doubled: bool  # whether every face is there twice, since the surface is open and seen from both sides
 
 
 def make_look(surface: Surface, mesh: trimesh.Trimesh) -> Look:
-    """Simplify and bake.
-
-    Args:
-        surface: The triangles of the file, m.
-        mesh: The same, joined.
-    """
+    """Simplify a surface, given also as a joined mesh, and bake its colours."""
     closed = is_closed(mesh)
-    coarse = simplified(mesh, MOST_TRIANGLES if closed else MOST_TRIANGLES // 2)
+    coarse = simplified(mesh, MAX_TRIANGLES if closed else MAX_TRIANGLES // 2)
     closed = closed and is_closed(coarse)
     coarse = coarse.copy()
     coarse.fix_normals(multibody=True)

@@ -9,21 +9,18 @@ from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.model_writer import write_model
 from mjsim.importing.object_import import import_object
 from mjsim.importing.preview import write_preview
-from mjsim.importing.values import Decision, ImportOptions
+from mjsim.importing.values import ImportDecision, ImportOptions
 
 PREVIEW, REPORT = "preview.png", "report.json"
 
 
 def add_mesh(
     path: Path, extension: HouseExtension, entry: Entry, options: ImportOptions, *, force: bool = False
-) -> tuple[Decision, ...]:
+) -> tuple[ImportDecision, ...]:
     """Import a mesh file into a catalogue; returns the report, which is also kept beside the object.
 
-    Without OpenGL there is no preview, and the report says so.
-
-    Raises:
-        AssetError: The file, the entry or the object is unusable; the catalogue is as before.
-        OSError: Files cannot be written; likewise.
+    Without OpenGL there is no preview, and the report says so. The catalogue is as before on `AssetError` (the file,
+    the entry or the object is unusable) and `OSError`.
     """
     extension.check(entry, force=force)
     item = import_object(path, options)
@@ -34,7 +31,7 @@ def add_mesh(
         try:
             write_preview(model, folder / PREVIEW)
         except RenderError as error:
-            decisions.append(Decision("preview", "none", str(error)))
+            decisions.append(ImportDecision("preview", "none", str(error)))
         text = json.dumps([asdict(decision) for decision in decisions], indent=2, ensure_ascii=False)
         (folder / REPORT).write_text(text + "\n", encoding="utf-8")
 

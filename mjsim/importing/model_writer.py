@@ -5,13 +5,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import scipy.spatial
+import trimesh
 from numpy.typing import NDArray
 
 from mjsim.errors import AssetError
 from mjsim.importing.look import Look
 from mjsim.importing.object_import import ImportedObject
-from mjsim.importing.surface import Floats, Ints
+from mjsim.importing.surface import Floats
 
 MODEL = "object.xml"
 _ROLLING = "1 0.02 0.02"  # friction of what would roll: slide, spin, roll
@@ -45,19 +45,13 @@ _MJCF = """\
 
 
 def write_model(item: ImportedObject, folder: Path, *, key: str, label: str, source: str) -> Path:
-    """Write an object into an existing folder; returns its MJCF file.
-
-    Raises:
-        OSError: A file cannot be written.
-        AssetError: The picture cannot be encoded.
-    """
+    """Write an object into an existing folder; returns its MJCF file."""
     (folder / "look.obj").write_text("\n".join(_look_lines(item.look)) + "\n", encoding="utf-8")
     if item.look.picture is not None:
         write_png(folder / "look.png", item.look.picture)
     for number, points in enumerate(item.hulls):
-        hull = scipy.spatial.ConvexHull(points)
-        lines = [*_vertices(points[hull.vertices]), *_faces(_outward(points, hull))]
-        (folder / f"part_{number}.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        text = trimesh.convex.convex_hull(points).export(file_type="obj", digits=6, header=None)
+        (folder / f"part_{number}.obj").write_text(text, encoding="utf-8")
     path = folder / MODEL
     path.write_text(_mjcf(item, key, label, source), encoding="utf-8")
     return path
@@ -95,14 +89,14 @@ def _assets(item: ImportedObject, key: str) -> Iterator[str]:
 
 def _geoms(item: ImportedObject, key: str) -> Iterator[str]:
     """The parts; their masses are shares of the whole by volume, for what looks at parts alone."""
-    volumes = [scipy.spatial.ConvexHull(points).volume for points in item.hulls]
+    volumes = [trimesh.convex.convex_hull(points).volume for points in item.hulls]
     for number, volume in enumerate(volumes):
         mass = item.weight.mass * volume / sum(volumes)
         yield f'<geom class="part" type="mesh" mesh="{key}_part_{number}" mass="{mass:.6g}"/>'
 
 
 def _look_lines(look: Look) -> Iterator[str]:
-    yield from _vertices(look.vertices)
+    yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.round(look.vertices, 6) + 0.0)
     columns = [look.faces + 1]
     if look.uv is not None:
         places, corner = np.unique(np.round(look.uv.reshape(-1, 2), 5), axis=0, return_inverse=True)
@@ -116,32 +110,8 @@ def _look_lines(look: Look) -> Iterator[str]:
         yield "f " + " ".join(join.join(map(str, corner)) for corner in face)
 
 
-def _vertices(points: Floats) -> Iterator[str]:
-    yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.round(points, 6) + 0.0)
-
-
-def _faces(faces: Ints) -> Iterator[str]:
-    yield from (f"f {a} {b} {c}" for a, b, c in faces + 1)
-
-
-def _outward(points: Floats, hull: scipy.spatial.ConvexHull) -> Ints:
-    """Faces (m, 3) of a convex hull, counter-clockwise from outside, numbered among its vertices."""
-    numbers = np.full(len(points), -1)
-    numbers[hull.vertices] = np.arange(len(hull.vertices))
-    corners = points[hull.simplices]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("nd,nd->n", normals, hull.equations[:, :3]) < 0
-    faces = hull.simplices.copy()
-    faces[inward] = faces[inward, ::-1]
-    return np.asarray(numbers[faces])
-
-
 def write_png(path: Path, rgb: NDArray[np.uint8]) -> None:
-    """Write a picture, RGB, shape (height, width, 3).
-
-    Raises:
-        AssetError: It cannot be encoded.
-    """
+    """Write a picture, RGB, shape (height, width, 3)."""
     done, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
     if not done:
         raise AssetError(f"the picture {path} cannot be encoded as PNG")

@@ -12,30 +12,22 @@ from mjsim.importing.parts import Parts, convex_parts, one_part
 from mjsim.importing.reading import missing_colours, read_surface
 from mjsim.importing.resting import STEADY, RestingPose, foot, resting_pose
 from mjsim.importing.scaling import Scaling, scaling
-from mjsim.importing.solid import MOST_TRIANGLES, Solid, close, simplified
+from mjsim.importing.solid import MAX_TRIANGLES, Solid, close, simplified
 from mjsim.importing.surface import Floats, Surface, cleaned
-from mjsim.importing.values import Decision, ImportOptions
+from mjsim.importing.values import ImportDecision, ImportOptions
 from mjsim.importing.weight import Weight, weigh
 from mjsim.model.validation.object_rules import GRIP_REACH, SIZE
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedObject:
-    """An object in its own frame: z up, on the floor at z = 0, the middle of its footprint at the origin.
+    """An object in its own frame: z up, on the floor at z = 0, the middle of its footprint at the origin."""
 
-    Attributes:
-        look: What is drawn.
-        hulls: Vertices of the convex parts that it collides with, m, shape (k, 3) each.
-        weight: Mass, centre of mass, inertia.
-        rolls: Whether it is round, so that it stands on a foot and rolls badly.
-        decisions: The report.
-    """
-
-    look: Look
-    hulls: tuple[Floats, ...]
-    weight: Weight
-    rolls: bool
-    decisions: tuple[Decision, ...]
+    look: Look  # what is drawn
+    hulls: tuple[Floats, ...]  # vertices of the convex parts that it collides with, m, (k, 3) each
+    weight: Weight  # mass, centre of mass, inertia
+    rolls: bool  # whether it is round, so that it stands on a foot and rolls badly
+    decisions: tuple[ImportDecision, ...]  # the report
 
     @property
     def size(self) -> Floats:
@@ -46,9 +38,7 @@ class ImportedObject:
 def import_object(path: Path, options: ImportOptions) -> ImportedObject:
     """Make an object of a mesh file; the same file and options give the same object to the last bit.
 
-    Raises:
-        AssetError: The file cannot be read, or does not describe something that a hand carries; one line that says
-            what to do.
+    `AssetError` where it cannot be read, or is nothing that a hand carries; its one line says what to do.
     """
     _check_options(options)
     raw = read_surface(path)
@@ -75,7 +65,7 @@ def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObje
     if not len(surface):
         raise AssetError(f"none of its {len(raw)} triangles has an area; export it again")
     mesh = surface.mesh()
-    solid = close(simplified(mesh, MOST_TRIANGLES))
+    solid = close(simplified(mesh, MAX_TRIANGLES))
     weight = weigh(solid.mesh, mass=options.mass, density=options.density)
     parts = convex_parts(solid)
     pose = resting_pose(parts.points, weight.centre)
@@ -92,7 +82,7 @@ def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObje
     decisions = (
         *_origin(path, found, raw, dropped),
         _body(solid, len(mesh.faces)),
-        Decision("mass", f"{weight.mass:.3g} kg", weight.reason),
+        ImportDecision("mass", f"{weight.mass:.3g} kg", weight.reason),
         _collision(parts),
         _rest(pose, rolls),
         *_appearance(path, look, len(mesh.faces)),
@@ -101,11 +91,7 @@ def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObje
 
 
 def _longest_side(surface: Surface) -> float:
-    """Longest side of the bounding box, in the file's numbers.
-
-    Raises:
-        AssetError: There is no finite point, or no extent.
-    """
+    """Longest side of the bounding box, in the file's numbers; `AssetError` without finite points or an extent."""
     points = surface.corners.reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=1)]
     longest = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
@@ -146,27 +132,27 @@ def _check_size(points: Floats) -> None:
     if size.max() > SIZE[1] + 1e-3:
         text = " x ".join(f"{side:.2f}" for side in size)
         raise AssetError(
-            f"as it lies it measures {text} m, and a hand carries {SIZE[1]} m; say --scale {SIZE[1] / size.max():.2g}"
+            f"as it lies it measures {text} m, and a hand carries {SIZE[1]} m; use --scale {SIZE[1] / size.max():.2g}"
         )
     if size.max() < SIZE[0] - 1e-3:
         raise AssetError(
-            f"as it lies its longest side is {size.max():.3f} m, less than {SIZE[0]} m; say --scale"
+            f"as it lies its longest side is {size.max():.3f} m, less than {SIZE[0]} m; use --scale"
         )
 
 
-def _origin(path: Path, found: Scaling, raw: Surface, dropped: dict[str, int]) -> tuple[Decision, ...]:
+def _origin(path: Path, found: Scaling, raw: Surface, dropped: dict[str, int]) -> tuple[ImportDecision, ...]:
     gone = ", ".join(f"{count} {kind}" for kind, count in dropped.items() if count)
     return (
-        Decision("file", path.name, f"{len(raw)} triangles" + (f"; left out: {gone}" if gone else "")),
-        Decision("unit", found.unit, found.unit_reason),
-        Decision("up", found.up, found.up_reason),
+        ImportDecision("file", path.name, f"{len(raw)} triangles" + (f"; left out: {gone}" if gone else "")),
+        ImportDecision("unit", found.unit, found.unit_reason),
+        ImportDecision("up", found.up, found.up_reason),
     )
 
 
-def _body(solid: Solid, faces: int) -> Decision:
-    notes = [f"simplified from {faces} triangles"] if faces > MOST_TRIANGLES else []
+def _body(solid: Solid, faces: int) -> ImportDecision:
+    notes = [f"simplified from {faces} triangles"] if faces > MAX_TRIANGLES else []
     if solid.flat:
-        return Decision("body", "flat sheet", "given a thickness of 1 mm")
+        return ImportDecision("body", "flat sheet", "given a thickness of 1 mm")
     notes += [f"{solid.pieces} pieces joined"] * (solid.pieces > 1)
     notes += [f"holes filled in {solid.filled}"] * (solid.filled > 0)
     if solid.hulled:
@@ -174,29 +160,29 @@ def _body(solid: Solid, faces: int) -> Decision:
         notes.append(
             f"{solid.hulled} open ones ({share}) count as their convex hulls: hollows in them are lost"
         )
-    return Decision("body", "repaired" if solid.filled or solid.hulled else "closed", "; ".join(notes))
+    return ImportDecision("body", "repaired" if solid.filled or solid.hulled else "closed", "; ".join(notes))
 
 
-def _collision(parts: Parts) -> Decision:
+def _collision(parts: Parts) -> ImportDecision:
     thick = f"; {parts.thickened} thickened to 15 mm" if parts.thickened else ""
-    return Decision("collision", f"{len(parts.hulls)} convex", parts.reason + thick)
+    return ImportDecision("collision", f"{len(parts.hulls)} convex", parts.reason + thick)
 
 
-def _rest(pose: RestingPose, rolls: bool) -> Decision:
+def _rest(pose: RestingPose, rolls: bool) -> ImportDecision:
     if rolls:
-        return Decision("rests", "as in the file, on a foot", "it is round and would roll away")
+        return ImportDecision("rests", "as in the file, on a foot", "it is round and would roll away")
     degrees = f"tips over at {np.degrees(pose.tilt):.0f} degrees"
     if pose.turned:
-        return Decision(
+        return ImportDecision(
             "rests", "turned", f"on its steadiest side: {degrees}; in the file's pose it falls over"
         )
-    return Decision("rests", "as in the file", degrees)
+    return ImportDecision("rests", "as in the file", degrees)
 
 
-def _appearance(path: Path, look: Look, faces: int) -> tuple[Decision, ...]:
+def _appearance(path: Path, look: Look, faces: int) -> tuple[ImportDecision, ...]:
     how = "picture of all colours" if look.picture is not None else "one colour"
     notes = [f"simplified from {faces} triangles"] if len(look.faces) < faces else []
     notes += ["open: drawn from both sides"] if look.doubled else []
     missing = missing_colours(path)
     notes += [f"not there: {', '.join(missing)}"] if missing else []
-    return (Decision("look", f"{len(look.faces)} triangles, {how}", "; ".join(notes)),)
+    return (ImportDecision("look", f"{len(look.faces)} triangles, {how}", "; ".join(notes)),)

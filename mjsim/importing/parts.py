@@ -11,9 +11,9 @@ from mjsim.importing.solid import Solid, simplified
 from mjsim.importing.surface import Floats
 from mjsim.model.validation.object_rules import THIN
 
-MOST_PARTS = 6
-MOST_VERTICES = 64  # of a part
-LEAST_WIDTH = THIN  # of every part in every direction
+MAX_PARTS = 6
+MAX_VERTICES = 64  # of a part
+MIN_WIDTH = THIN  # of every part in every direction
 _WALL = 0.008  # m; parts thinner than this are walls, and an object of walls collides as its hull
 _CONVEX = 0.9  # share of its convex hull that a convex body fills
 _TRIANGLES = 1000  # of what is decomposed
@@ -23,17 +23,11 @@ _MANY = 8  # pieces
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What an object collides with.
+    """What an object collides with."""
 
-    Attributes:
-        hulls: Vertices of each convex part, m, shape (k, 3) each.
-        reason: How they came about.
-        thickened: How many were made thicker.
-    """
-
-    hulls: tuple[Floats, ...]
-    reason: str
-    thickened: int
+    hulls: tuple[Floats, ...]  # vertices of each convex part, m, (k, 3) each
+    reason: str  # how they came about
+    thickened: int  # how many were made thicker
 
     @property
     def points(self) -> Floats:
@@ -77,7 +71,7 @@ def _decomposed(solid: Solid) -> list[Floats]:
     found = coacd.run_coacd(
         coacd.Mesh(coarse.vertices, coarse.faces),
         threshold=_CONCAVITY if solid.pieces <= _MANY else _COARSE,
-        max_convex_hull=MOST_PARTS,
+        max_convex_hull=MAX_PARTS,
         resolution=500,
         mcts_iterations=20,
         mcts_nodes=10,
@@ -89,17 +83,17 @@ def _decomposed(solid: Solid) -> list[Floats]:
 
 
 def _few_vertices(points: Floats) -> Floats:
-    """Vertices of the hull of points (n, 3), at most `MOST_VERTICES`, with the same bounding box."""
+    """Vertices of the hull of points (n, 3), at most `MAX_VERTICES`, with the same bounding box."""
     hull = trimesh.convex.convex_hull(points)
-    if len(hull.vertices) <= MOST_VERTICES:
+    if len(hull.vertices) <= MAX_VERTICES:
         return np.asarray(hull.vertices)
-    for faces in range(2 * MOST_VERTICES - 4, 8, -8):
+    for faces in range(2 * MAX_VERTICES - 4, 8, -8):
         coarse = hull.simplify_quadric_decimation(face_count=faces).convex_hull
-        if len(coarse.vertices) <= MOST_VERTICES:
+        if len(coarse.vertices) <= MAX_VERTICES:
             break
     else:  # nothing to collapse: the farthest vertices in evenly spread directions
-        turn = np.arange(MOST_VERTICES) + 0.5
-        z, angle = 1 - 2 * turn / MOST_VERTICES, np.pi * (1 + 5**0.5) * turn
+        turn = np.arange(MAX_VERTICES) + 0.5
+        z, angle = 1 - 2 * turn / MAX_VERTICES, np.pi * (1 + 5**0.5) * turn
         level = np.sqrt(1 - z * z)
         directions = np.column_stack((level * np.cos(angle), level * np.sin(angle), z))
         farthest = np.unique((hull.vertices @ directions.T).argmax(axis=0))
@@ -109,12 +103,12 @@ def _few_vertices(points: Floats) -> Floats:
 
 
 def _thickened(points: Floats) -> Floats:
-    """Points (n, 3) whose hull is at least `LEAST_WIDTH` wide, grown alike to both sides where it was not."""
+    """Points (n, 3) whose hull is at least `MIN_WIDTH` wide, grown alike to both sides where it was not."""
     for _ in range(4):
         direction, across = _narrowest(points)
-        if across > LEAST_WIDTH - 1e-6:
+        if across > MIN_WIDTH - 1e-6:
             break
-        step = direction * (LEAST_WIDTH - across) / 2
+        step = direction * (MIN_WIDTH - across) / 2
         points = _few_vertices(np.concatenate((points - step, points + step)))
     return points
 

@@ -23,12 +23,7 @@ _LOOK, _PART = 2, 3  # geom groups of docs/models.md
 
 
 def write_preview(model: Path, out: Path) -> None:
-    """Draw an object's MJCF file, look and parts side by side; the arrows are the grips' x axes, ahead of the hand.
-
-    Raises:
-        AssetError: The file does not compile.
-        RenderError: No OpenGL context can be made.
-    """
+    """Draw an object's MJCF file, look and parts side by side; the arrows are the grips' x axes, ahead of the hand."""
     pictures = []
     for shown in (_LOOK, _PART):
         spec = read_model(model, body="object")

@@ -14,25 +14,21 @@ from mjsim.errors import AssetError
 from mjsim.importing.surface import Floats, Surface, joined
 
 SUFFIXES = (".glb", ".obj", ".stl", ".ply")
-LARGEST_FILE = 500_000_000  # bytes
-MOST_TRIANGLES = 5_000_000
+MAX_FILE = 500_000_000  # bytes
+MAX_TRIANGLES = 5_000_000
 PLAIN = (0.74, 0.72, 0.68)  # RGB of what has no colour
 
 
 def read_surface(path: Path) -> Surface:
-    """All triangles of a mesh file, in its own unit and axes.
-
-    Raises:
-        AssetError: The file is missing, of another format, too large, damaged, or has no triangles.
-    """
+    """All triangles of a mesh file, in its own unit and axes; `AssetError` where there are none that can be read."""
     _check_file(path)
     with _parsing(path):
         geometries = trimesh.load_scene(path, process=False).dump()
     meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
     if not meshes:
         raise AssetError(f"{path} {_what_it_has(geometries)}; export it as a mesh of triangles")
-    if (count := sum(len(mesh.faces) for mesh in meshes)) > MOST_TRIANGLES:
-        raise AssetError(f"{path} has {count} triangles; reduce it to {MOST_TRIANGLES} or fewer")
+    if (count := sum(len(mesh.faces) for mesh in meshes)) > MAX_TRIANGLES:
+        raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
     with _parsing(path):
         return joined([_surface(mesh, linear=path.suffix.lower() == ".glb") for mesh in meshes])
 
@@ -54,17 +50,13 @@ def _check_file(path: Path) -> None:
     size = path.stat().st_size
     if size == 0:
         raise AssetError(f"{path} is empty; export it again")
-    if size > LARGEST_FILE:
-        raise AssetError(f"{path} has {size / 1e6:.0f} MB; reduce it to {LARGEST_FILE / 1e6:.0f} MB or less")
+    if size > MAX_FILE:
+        raise AssetError(f"{path} has {size / 1e6:.0f} MB; reduce it to {MAX_FILE / 1e6:.0f} MB or less")
 
 
 @contextmanager
 def _parsing(path: Path) -> Iterator[None]:
-    """Turn whatever a parser raises on a damaged file into one error, and keep its warnings off the terminal.
-
-    Raises:
-        AssetError: The parser failed.
-    """
+    """Turn whatever a parser raises on a damaged file into an `AssetError`, and keep its warnings off the terminal."""
     log = logging.getLogger("trimesh")
     before = log.level
     log.setLevel(logging.CRITICAL)
@@ -73,10 +65,10 @@ def _parsing(path: Path) -> Iterator[None]:
     except MemoryError as error:
         raise AssetError(f"{path} claims to be larger than the memory; export it again") from error
     except Exception as error:  # the parsers of trimesh raise whatever they come across
-        said = " ".join(str(error).split())[:120] or type(error).__name__
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
         kind = path.suffix.lower()
         raise AssetError(
-            f"cannot read {path} as {kind}: {said}; is it complete, and really a {kind} file?"
+            f"cannot read {path} as {kind}: {reason}; is it complete, and really a {kind} file?"
         ) from error
     finally:
         log.setLevel(before)

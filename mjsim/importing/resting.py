@@ -7,13 +7,13 @@ import numpy as np
 import scipy.spatial
 import trimesh
 
-from mjsim.importing.parts import LEAST_WIDTH
+from mjsim.importing.parts import MIN_WIDTH
 from mjsim.importing.surface import Floats
 
 STEADY = math.radians(12.0)  # an object that tips over when tilted by less does not stand
 _CONTACT = 0.0005  # m above the lowest point that touches the floor
 _FOOT_SLOPE = 0.45  # half width of a foot over the height of the centre of mass
-_MOST_FACES = 300  # faces of the hull that are tried
+_MAX_FACES = 300  # faces of the hull that are tried
 _LOWER = (
     1.2  # times as high above the floor as on the best side, its centre of mass may be in the file's pose
 )
@@ -22,33 +22,22 @@ _SMALLER = 0.95  # share of the footprint's bounding box by which turning has to
 
 @dataclass(frozen=True, eq=False)
 class RestingPose:
-    """How an object lies.
+    """How an object lies."""
 
-    Attributes:
-        rotation: From the file's axes to the object's, shape (3, 3).
-        tilt: Tilt at which it tips over, rad.
-        turned: Whether it was laid on another side than it stands on in the file.
-    """
-
-    rotation: Floats
-    tilt: float
-    turned: bool
+    rotation: Floats  # from the file's axes to the object's, (3, 3)
+    tilt: float  # tilt at which it tips over, rad
+    turned: bool  # whether it was laid on another side than it stands on in the file
 
 
 def resting_pose(points: Floats, centre: Floats) -> RestingPose:
-    """The pose of the file if the object stands in it; else the steadiest one.
-
-    Args:
-        points: Vertices of what collides, m, shape (n, 3), z up.
-        centre: Centre of mass, m, shape (3,).
-    """
+    """The pose of the file if points (n, 3), m, with this centre of mass stand in it, else the steadiest one."""
     down = np.array([0.0, 0.0, -1.0])
     as_it_is = tilt(points, centre, down)
     if as_it_is >= STEADY:
         return RestingPose(_squared(points), as_it_is, turned=False)
     normals = scipy.spatial.ConvexHull(points).equations[:, :3]
     _, first = np.unique(np.round(normals, 2), axis=0, return_index=True)
-    sides = normals[first[np.linspace(0, len(first) - 1, min(len(first), _MOST_FACES)).astype(int)]]
+    sides = normals[first[np.linspace(0, len(first) - 1, min(len(first), _MAX_FACES)).astype(int)]]
     tilts = [tilt(points, centre, side) for side in sides]
     best = int(np.argmax(tilts))
     if tilts[best] < STEADY:  # round: it gets a foot, on the side on which it lies lowest
@@ -61,13 +50,7 @@ def resting_pose(points: Floats, centre: Floats) -> RestingPose:
 
 
 def tilt(points: Floats, centre: Floats, down: Floats) -> float:
-    """Tilt, rad, at which an object that lies on its lowest points tips over; negative if it does so by itself.
-
-    Args:
-        points: Vertices, m, shape (n, 3).
-        centre: Centre of mass, m, shape (3,).
-        down: Unit vector, shape (3,).
-    """
+    """Tilt, rad, at which points (n, 3) that rest in direction `down` tip over; negative if they fall at once."""
     turn = trimesh.geometry.align_vectors(down, [0.0, 0.0, -1.0])[:3, :3]
     placed, mass = points @ turn.T, turn @ centre
     floor = placed[:, 2].min()
@@ -76,19 +59,12 @@ def tilt(points: Floats, centre: Floats, down: Floats) -> float:
 
 
 def foot(points: Floats, centre: Floats) -> Floats:
-    """Corners (8, 3), m, of a low block below an object that would roll away on its own.
-
-    Args:
-        points: Vertices of what collides, m, shape (n, 3); the object lies on the floor below its lowest point.
-        centre: Centre of mass, m, shape (3,).
-    """
+    """Corners (8, 3), m, of a low block below points (n, 3) that would roll away on their own."""
     low, high = points.min(axis=0), points.max(axis=0)
     reach = np.minimum(centre[:2] - low[:2], high[:2] - centre[:2])
-    half = np.clip(
-        _FOOT_SLOPE * (centre[2] - low[2]), LEAST_WIDTH / 2, np.maximum(0.8 * reach, LEAST_WIDTH / 2)
-    )
+    half = np.clip(_FOOT_SLOPE * (centre[2] - low[2]), MIN_WIDTH / 2, np.maximum(0.8 * reach, MIN_WIDTH / 2))
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (0, 1)])
-    block = signs * np.array([*half, min(LEAST_WIDTH + 0.004, high[2] - low[2])])
+    block = signs * np.array([*half, min(MIN_WIDTH + 0.004, high[2] - low[2])])
     return np.asarray(block + np.array([*centre[:2], low[2]]))
 
 

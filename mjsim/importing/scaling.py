@@ -1,4 +1,4 @@
-"""Unit and upward axis of a mesh file: as said, as the format says, or guessed."""
+"""Unit and upward axis of a mesh file: as given, as the format defines it, or guessed."""
 
 from dataclasses import dataclass
 
@@ -9,27 +9,19 @@ from mjsim.importing.surface import Floats
 from mjsim.importing.values import UNITS
 from mjsim.model.validation.object_rules import SIZE
 
-SHORTEST, LONGEST = SIZE
+MIN_SIDE, MAX_SIDE = SIZE
 _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True)
 class Scaling:
-    """How the numbers of a file become metres, z up.
+    """How the numbers of a file become metres, z up."""
 
-    Attributes:
-        unit: Key of `UNITS`.
-        up: `y` or `z`.
-        factor: Metres per number of the file, `--scale` included.
-        unit_reason: Where the unit comes from.
-        up_reason: Where the axis comes from.
-    """
-
-    unit: str
-    up: str
-    factor: float
-    unit_reason: str
-    up_reason: str
+    unit: str  # key of `UNITS`
+    up: str  # `y` or `z`
+    factor: float  # metres per number of the file, `--scale` included
+    unit_reason: str  # where the unit comes from
+    up_reason: str  # where the axis comes from
 
     @property
     def transform(self) -> Floats:
@@ -39,33 +31,25 @@ class Scaling:
 
 
 def scaling(suffix: str, longest: float, *, units: str | None, up: str | None, scale: float) -> Scaling:
-    """Find unit and axis.
+    """Find the unit and the axis of a file by its suffix and its longest side; `units` and `up` are None unless given.
 
-    Args:
-        suffix: Of the file, `.glb` say.
-        longest: Longest side in the file's numbers.
-        units: As the user said, or None.
-        up: Likewise.
-        scale: Factor on top.
-
-    Raises:
-        AssetError: No unit gives a size that a hand carries.
+    `AssetError` where no unit gives a size that a hand carries.
     """
-    unit, unit_reason = (units, "as said") if units else _unit(suffix, longest * scale)
+    unit, unit_reason = (units, "given") if units else _unit(suffix, longest * scale)
     size = longest * scale * UNITS[unit]
-    if not SHORTEST <= size <= LONGEST:
+    if not MIN_SIDE <= size <= MAX_SIDE:
         raise AssetError(_advice(longest * scale, unit, unit_reason))
-    axis, up_reason = (up, "as said") if up else _axis(suffix)
+    axis, up_reason = (up, "given") if up else _axis(suffix)
     return Scaling(unit, axis, scale * UNITS[unit], unit_reason, up_reason)
 
 
 def _unit(suffix: str, longest: float) -> tuple[str, str]:
     if suffix == ".glb":
         return "m", "glTF is in metres"
-    fitting = [unit for unit, metres in UNITS.items() if SHORTEST <= longest * metres <= LONGEST]
+    fitting = [unit for unit, metres in UNITS.items() if MIN_SIDE <= longest * metres <= MAX_SIDE]
     if not fitting:
         return "m", "no unit fits"
-    others = "".join(f"; if it is {o}, say --units {o}" for o in fitting[1:])
+    others = "".join(f"; if it is {o}, use --units {o}" for o in fitting[1:])
     return fitting[0], f"guessed from the size: the longest side is {longest:.4g} {fitting[0]}{others}"
 
 
@@ -73,18 +57,18 @@ def _axis(suffix: str) -> tuple[str, str]:
     if suffix == ".glb":
         return "y", "glTF has y up"
     axis = "y" if suffix == ".obj" else "z"
-    usual = (
+    convention = (
         "most programs write OBJ with y up" if axis == "y" else f"most {suffix[1:].upper()} files have z up"
     )
-    return axis, f"guessed: {usual}; if not, say --up {'z' if axis == 'y' else 'y'}"
+    return axis, f"guessed: {convention}; if not, use --up {'z' if axis == 'y' else 'y'}"
 
 
 def _advice(longest: float, unit: str, reason: str) -> str:
     """One line: how large it is, and what would make it fit."""
-    limits = f"a hand carries {SHORTEST:g} to {LONGEST:g} m"
+    limits = f"a hand carries {MIN_SIDE:g} to {MAX_SIDE:g} m"
     as_unit = "in any unit" if reason == "no unit fits" else f"in {unit} ({reason})"
     size = f"its longest side is {longest:.4g}, which {as_unit} is too {{}}: {limits}"
-    size = size.format("small" if longest * UNITS[unit] < SHORTEST else "large")
-    fitting = [u for u, metres in UNITS.items() if u != unit and SHORTEST <= longest * metres <= LONGEST]
-    remedy = f"if it is in {' or '.join(fitting)}, say --units {fitting[0]}; else " if fitting else ""
-    return f"{size}; {remedy}say --scale {0.2 / (longest * UNITS[unit]):.2g} for a length of 0.2 m"
+    size = size.format("small" if longest * UNITS[unit] < MIN_SIDE else "large")
+    fitting = [u for u, metres in UNITS.items() if u != unit and MIN_SIDE <= longest * metres <= MAX_SIDE]
+    remedy = f"if it is in {' or '.join(fitting)}, use --units {fitting[0]}; else " if fitting else ""
+    return f"{size}; {remedy}use --scale {0.2 / (longest * UNITS[unit]):.2g} for a length of 0.2 m"

@@ -7,31 +7,22 @@ import trimesh
 
 from mjsim.importing.surface import Floats
 
-MOST_TRIANGLES = 20_000  # of what is worked on; finer surfaces are simplified first
-MOST_PIECES = 400  # pieces of a surface that are closed one by one
+MAX_TRIANGLES = 20_000  # of what is worked on; finer surfaces are simplified first
+MAX_PIECES = 400  # pieces of a surface that are closed one by one
 SHEET = 0.001  # m, thickness that a flat sheet is given
 _FLAT = 1e-5  # m
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A closed body.
+    """A closed body."""
 
-    Attributes:
-        mesh: Its surface, m, normals outward; it encloses a positive volume.
-        pieces: How many connected pieces the surface had.
-        filled: How many of them had holes that were filled.
-        hulled: How many were replaced by their convex hull.
-        flat: Whether it is a sheet that was given a thickness.
-        open_share: Share of the surface's area that belongs to pieces replaced by hulls.
-    """
-
-    mesh: trimesh.Trimesh
-    pieces: int
-    filled: int = 0
-    hulled: int = 0
-    flat: bool = False
-    open_share: float = 0.0
+    mesh: trimesh.Trimesh  # its surface, m, normals outward; it encloses a positive volume
+    pieces: int  # how many connected pieces the surface had
+    filled: int = 0  # how many of them had holes that were filled
+    hulled: int = 0  # how many were replaced by their convex hull
+    flat: bool = False  # whether it is a sheet that was given a thickness
+    open_share: float = 0.0  # share of the surface's area that belongs to pieces replaced by hulls
 
 
 def close(mesh: trimesh.Trimesh) -> Solid:
@@ -43,7 +34,7 @@ def close(mesh: trimesh.Trimesh) -> Solid:
     whole = _as_it_is(mesh)
     if whole is not None:
         return Solid(whole, count)
-    if count > MOST_PIECES:
+    if count > MAX_PIECES:
         return Solid(_hull(mesh.vertices), count, hulled=count, open_share=1.0)
     return _piecewise(mesh)
 

@@ -11,26 +11,18 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 WELD_DIGITS = 6  # corners nearer than 1e-6 m are one
-_LEAST_AREA = 1e-13  # m^2; smaller triangles have no direction
+_MIN_AREA = 1e-13  # m^2; smaller triangles have no direction
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles with colours. A point's colour is that of the corners, interpolated, times that of the image.
+    """Triangles with colours. A point's colour is that of the corners, interpolated, times that of the image."""
 
-    Attributes:
-        corners: Corners of the triangles, m, shape (n, 3, 3).
-        colours: Colour at each corner, RGB from 0 to 1, shape (n, 3, 3).
-        uv: Where each corner lies in its image, from 0 to 1 from the lower left, repeating, shape (n, 3, 2).
-        image: Number of each triangle's image, -1 for none, shape (n,).
-        images: RGB from 0 to 1, rows from the top, shape (height, width, 3) each.
-    """
-
-    corners: Floats
-    colours: Floats
-    uv: Floats
-    image: Ints
-    images: tuple[Floats, ...] = ()
+    corners: Floats  # corners of the triangles, m, (n, 3, 3)
+    colours: Floats  # colour at each corner, RGB from 0 to 1, (n, 3, 3)
+    uv: Floats  # where each corner lies in its image, from 0 to 1 from the lower left, repeating, (n, 3, 2)
+    image: Ints  # number of each triangle's image, -1 for none, (n,)
+    images: tuple[Floats, ...] = ()  # RGB from 0 to 1, rows from the top, (height, width, 3) each
 
     def __len__(self) -> int:
         return len(self.corners)
@@ -85,7 +77,7 @@ def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
     edges = np.diff(kept.corners, axis=1)
     _, faces = _welded(kept.corners)
     distinct = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    solid = distinct & (np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) > 2 * _LEAST_AREA)
+    solid = distinct & (np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) > 2 * _MIN_AREA)
     _, first = np.unique(np.sort(faces[solid], axis=1), axis=0, return_index=True)
     result = kept.select(solid).select(np.sort(first))
     counts = {

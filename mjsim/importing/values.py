@@ -1,4 +1,4 @@
-"""What a user says about a mesh file, and what was decided about it."""
+"""Options of an import, and what was decided."""
 
 from dataclasses import dataclass
 
@@ -8,33 +8,19 @@ AXES = ("y", "z")
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What the user says about a mesh; None where it is to be found.
+    """What the user gives; None for what is to be found out."""
 
-    Attributes:
-        units: Key of `UNITS`.
-        up: One of `AXES`.
-        scale: Factor on top of the unit.
-        mass: kg.
-        density: kg/m^3; not with `mass`.
-    """
-
-    units: str | None = None
-    up: str | None = None
-    scale: float = 1.0
-    mass: float | None = None
-    density: float | None = None
+    units: str | None = None  # key of `UNITS`
+    up: str | None = None  # one of `AXES`
+    scale: float = 1.0  # factor on top of the unit
+    mass: float | None = None  # kg
+    density: float | None = None  # kg/m^3; not with `mass`
 
 
 @dataclass(frozen=True)
-class Decision:
-    """One line of the report.
+class ImportDecision:
+    """One line of the report."""
 
-    Attributes:
-        what: What was decided.
-        choice: How.
-        reason: Why, or what to do if it is not what was meant.
-    """
-
-    what: str
-    choice: str
-    reason: str = ""
+    what: str  # what was decided
+    choice: str  # how
+    reason: str = ""  # why, or what to do if it is not what was meant

@@ -6,12 +6,9 @@ from mjsim.errors import AssetError
 
 
 def models_root() -> Path:
-    """Folder that holds `houses/`, `receptacles/` and `objects/`.
+    """Folder that holds `houses/`, `receptacles/` and `objects/`; `AssetError` where there is none.
 
     An installed wheel carries it inside the package; a checkout has it beside the package.
-
-    Raises:
-        AssetError: Neither place has it.
     """
     package = Path(__file__).resolve().parents[1]
     candidates = (package / "models", package.parent / "models")

@@ -91,16 +91,9 @@ def attach_avatar(
     start: tuple[float, float, float],
     person: PersonParameters,
 ) -> None:
-    """Add the person, and inactive welds between each hand and each object.
+    """Add the person at `start` (m, m, rad), and inactive welds between each hand and each object, in place.
 
-    Args:
-        spec: House with objects attached under `<instance>/`; modified in place.
-        object_names: Instance names.
-        start: x and y in m, heading in rad.
-        person: Size and eyes.
-
-    Raises:
-        AssetError: An instance has no body `<instance>/object` or lacks a grip site.
+    `AssetError` where an instance has no body `<instance>/object` or lacks a grip site.
     """
     _set_object_bits(spec, object_names)
     body = _add_body(spec, start, person.body_radius)

@@ -42,15 +42,10 @@ def tighten(model: mujoco.MjModel) -> None:
 def surface_area_tree(
     low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """A binary tree over boxes, split where the surface area heuristic is lowest.
+    """A binary tree over boxes with corners (n, 3), split where the surface area heuristic is lowest.
 
-    Args:
-        low: Lowest corners, (n, 3).
-        high: Highest corners, (n, 3).
-
-    Returns:
-        Per node: its box as centre and half size, shape (2n - 1, 6); its children or -1, (2n - 1, 2); the index of the
-        box if it is a leaf, else -1, (2n - 1,); and its depth, (2n - 1,). Node 0 is the root.
+    Returns for each of 2n - 1 nodes its box as centre and half size, its two children or -1, the index of a leaf's box
+    or -1, and its depth; node 0 is the root.
     """
     count = len(low)
     total = 2 * count - 1

@@ -18,57 +18,34 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class ObjectModel:
-    """A kind of object that can be misplaced.
+    """A kind of object that can be misplaced."""
 
-    Attributes:
-        key: Catalogue key (`mug`).
-        label: Name shown to the person (`Blue mug`).
-        category: Category key it belongs to.
-        path: Its MJCF file.
-    """
-
-    key: str
-    label: str
-    category: str
-    path: Path
+    key: str  # catalogue key (`mug`)
+    label: str  # name shown to the person (`Blue mug`)
+    category: str  # category key it belongs to
+    path: Path  # its MJCF file
 
 
 @dataclass(frozen=True)
 class Receptacle:
-    """A container that takes the objects of one category.
+    """A container that takes the objects of one category."""
 
-    Attributes:
-        key: Catalogue key (`dish_bin`); the house has a site `mount:<key>`.
-        label: Name shown to the person (`Dish bin`).
-        place: Semantic location within the room (`on the counter, beside the sink`).
-        room: Room key.
-        category: Category key it takes.
-        path: Its MJCF file.
-    """
-
-    key: str
-    label: str
-    place: str
-    room: str
-    category: str
-    path: Path
+    key: str  # catalogue key (`dish_bin`); the house has a site `mount:<key>`
+    label: str  # name shown to the person (`Dish bin`)
+    place: str  # semantic location within the room (`on the counter, beside the sink`)
+    room: str  # room key
+    category: str  # category key it takes
+    path: Path  # its MJCF file
 
 
 @dataclass(frozen=True)
 class Category:
-    """Objects that belong into the same receptacle (PAPER section 4).
+    """Objects that belong into the same receptacle (PAPER section 4)."""
 
-    Attributes:
-        key: Catalogue key (`dishes`).
-        label: Name shown to the person (`Dishes`).
-        receptacle: Receptacle key.
-        objects: Object model keys, in the catalogue's order.
-    """
-
-    key: str
-    label: str
-    receptacle: str
-    objects: tuple[str, ...]
+    key: str  # catalogue key (`dishes`)
+    label: str  # name shown to the person (`Dishes`)
+    receptacle: str  # receptacle key
+    objects: tuple[str, ...]  # object model keys, in the catalogue's order
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +79,11 @@ class Catalogue:
 
     def __hash__(self) -> int:
         return hash(self.content)
+
+    @property
+    def is_shipped(self) -> bool:
+        """Whether it comes with the package: it was loaded by a name, not by a path."""
+        return not self.name.endswith(".toml")
 
     @classmethod
     def load(cls, house: str = "apartment") -> "Catalogue":

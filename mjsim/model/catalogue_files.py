@@ -10,11 +10,7 @@ from mjsim.model.assets import models_root
 
 
 def catalogue_path(house: str, folder: Path = Path()) -> Path:
-    """File of a catalogue, given the name of a house, or a path from `folder`.
-
-    Raises:
-        AssetError: There is none.
-    """
+    """File of a catalogue, given the name of a house, or a path from `folder`; `AssetError` where there is none."""
     if house.endswith(".toml"):
         path = folder / house
         if not is_file(path):
@@ -30,17 +26,7 @@ def catalogue_path(house: str, folder: Path = Path()) -> Path:
 
 
 def read_tables(path: Path, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
-    """Tables of a catalogue with those of the one that it extends, and their texts.
-
-    An entry of the extending catalogue replaces one of the same key.
-
-    Args:
-        path: Its file.
-        extended: Catalogues that extend it.
-
-    Raises:
-        AssetError: A file cannot be read, or catalogues extend each other in a circle.
-    """
+    """Tables of a catalogue with those of the one that it extends, whose entries it replaces by key, and texts."""
     try:
         text = path.read_text(encoding="utf-8-sig")
         tables = tomllib.loads(text)

@@ -15,20 +15,13 @@ BORDER = 0.4  # m of grid around the rooms
 
 
 class ClearanceField(NamedTuple):
-    """Signed distance to the static geoms of a band of heights, on a grid; also for kernels.
+    """Signed distance to the static geoms of a band of heights, on a grid; also for kernels."""
 
-    Attributes:
-        distance: Distance of each cell's centre, m, positive outside, shape (nx, ny).
-        gradient: Direction of increasing distance, shape (nx, ny, 2).
-        origin_x, origin_y: Centre of cell (0, 0), m.
-        resolution: Cell size, m.
-    """
-
-    distance: NDArray[np.float64]
-    gradient: NDArray[np.float64]
-    origin_x: float
+    distance: NDArray[np.float64]  # distance of each cell's centre, m, positive outside, (nx, ny)
+    gradient: NDArray[np.float64]  # direction of increasing distance, (nx, ny, 2)
+    origin_x: float  # centre of cell (0, 0), m
     origin_y: float
-    resolution: float
+    resolution: float  # cell size, m
 
     @classmethod
     def from_model(
@@ -40,11 +33,7 @@ class ClearanceField(NamedTuple):
         resolution: float = 0.04,
         border: float = BORDER,
     ) -> "ClearanceField":
-        """Rasterise the static colliding geoms between two heights, m, up to `border` m around the rooms.
-
-        Raises:
-            AssetError: The house has no rooms.
-        """
+        """Rasterise the static colliding geoms between two heights, m, up to `border` m around the rooms."""
         plan = footprint(model, low=low, high=high)
         xmin, ymin, xmax, ymax = plan.bounds
         origin = np.array([xmin - border, ymin - border])

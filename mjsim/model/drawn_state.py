@@ -1,4 +1,4 @@
-"""The state of a scene without visuals, in the model that has them: what somebody who looks around needs."""
+"""The state of a scene without visuals in the model that has them, for looking and drawing."""
 
 from typing import Any
 
@@ -13,16 +13,7 @@ Floats = NDArray[np.float64]
 
 
 def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData]:
-    """Scene and state with what is only drawn, for rays; those given, where that is in them.
-
-    Args:
-        scene: The composed episode.
-        data: Its state.
-
-    Returns:
-        The scene with visuals, and its state, in which bodies and geoms are placed as in `data`, until the next call
-        with a state of the same scene.
-    """
+    """The scene with visuals and its state, placed as in `data` until the next call with a state of the same scene."""
     if scene.visuals:
         return scene, data
     drawn = scene.once("drawn state", lambda: _DrawnState(scene.counterpart(visuals=True)))
@@ -55,12 +46,8 @@ class _DrawnState:
 def place_geoms(geoms: Any, positions: Floats, quaternions: Floats, rotations: Floats) -> None:
     """Place geoms on their bodies, with the operations of MuJoCo in the same order.
 
-    Args:
-        geoms: Ids, (g,); body of each, (g,); positions, m, (g, 3), and quaternions, (g, 4), in the body frame; poses of
-            all geoms as in `MjData`, (ngeom, 3) and (ngeom, 9), changed.
-        positions: Of bodies, m, (nbody, 3).
-        quaternions: Their orientations, (nbody, 4).
-        rotations: Their axes, row by row, (nbody, 9).
+    `geoms` holds ids (g,), bodies (g,), positions (g, 3), m, and quaternions (g, 4) in the body frame, and the poses to
+    write, (ngeom, 3) and (ngeom, 9); the other arrays are poses of bodies, as in `MjData`.
     """
     ids, bodies, local_positions, local_quaternions, geom_xpos, geom_xmat = geoms
     for k in range(len(ids)):

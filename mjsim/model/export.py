@@ -15,14 +15,10 @@ ASSETS = "assets"
 
 
 def export_house(scene: Scene, path: Path) -> None:
-    """Write the scene as a self-contained model whose `qpos0` is the scene's.
+    """Write the scene as a self-contained model, a file that ends in `.xml`, whose `qpos0` is the scene's.
 
     Meshes and textures are copied into the folder `assets` beside the file, named by their content, and referred to by
     relative paths, so that the folder can be moved. The XML file is written last, atomically.
-
-    Args:
-        scene: What to export: the disorganized house, with the person if it has one.
-        path: Where the XML file goes, ending in `.xml`.
 
     Raises:
         AssetError: The path does not end in `.xml`, or an asset file is gone.
@@ -31,7 +27,7 @@ def export_house(scene: Scene, path: Path) -> None:
         raise AssetError(f"cannot export to {path}: MuJoCo reads models from files that end in .xml")
     try:
         root = ET.fromstring(scene.spec.to_xml())
-    except ValueError as error:  # MuJoCo compiles anew, from the files
+    except ValueError as error:  # MuJoCo compiles it again, from the files
         raise AssetError(f"cannot export to {path}: {error}") from error
     for compiler in root.findall("compiler"):
         for folder in ("meshdir", "texturedir", "assetdir"):

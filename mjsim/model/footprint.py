@@ -17,27 +17,17 @@ _GEOM = mujoco.mjtGeom
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Obstacles of a floor, seen from above.
+    """Obstacles of a floor, seen from above."""
 
-    Attributes:
-        obstacles: Convex polygons, counter-clockwise, m, each of shape (k, 2).
-        bounds: Extent of the rooms: (xmin, ymin, xmax, ymax), m.
-    """
-
-    obstacles: tuple[NDArray[np.float64], ...]
-    bounds: tuple[float, float, float, float]
+    obstacles: tuple[NDArray[np.float64], ...]  # convex polygons, counter-clockwise, m, each of shape (k, 2)
+    bounds: tuple[float, float, float, float]  # extent of the rooms: (xmin, ymin, xmax, ymax), m
 
 
 def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) -> Footprint:
-    """Project the static colliding geoms that reach into a band of heights.
+    """Project the static colliding geoms that reach into a band of heights, from `low` to `high`, m.
 
     Floors and rugs end below the band; lintels, lamps and wall cupboards begin above it. A geom that reaches
     into the band counts with its whole outline. Objects and the person move, so they are left out.
-
-    Args:
-        model: Any compiled model that contains the house.
-        low: Lower end of the band, m.
-        high: Upper end of the band, m.
 
     Raises:
         AssetError: The house has no rooms, or a static geom is a height field or a zero-sized shape.
@@ -59,19 +49,9 @@ def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) ->
 def outline_points(
     model: mujoco.MjModel, geom: int, centre: NDArray[np.float64], rotation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Points whose projection along z has a hull that covers the geom's, with its extent in z.
+    """Points (k, 3), m, around `centre` with the geom's extent in z, whose outline from above covers its own.
 
-    Args:
-        model: Compiled model.
-        geom: Geom id.
-        centre: Where it is, m, shape (3,).
-        rotation: Its axes as columns, shape (3, 3).
-
-    Returns:
-        Points in the frame of `centre`, m, shape (k, 3).
-
-    Raises:
-        AssetError: The geom is a plane or a height field.
+    `AssetError` where the geom is a plane or a height field.
     """
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     if kind == _GEOM.mjGEOM_BOX:

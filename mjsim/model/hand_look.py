@@ -11,13 +11,7 @@ _SLEEVE = (0.24, 0.34, 0.47, 1.0)
 
 
 def draw_hand(node: Any, name: str, side: float) -> None:
-    """A cleaning glove and a sleeve, shown in first person only; they collide with nothing.
-
-    Args:
-        node: Body of the hand.
-        name: Begins the names of the geoms.
-        side: 1 for the left hand, -1 for the right one.
-    """
+    """A cleaning glove and a sleeve, which collide with nothing; `side` is 1 for the left, -1 for the right hand."""
 
     def capsule(part: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
         node.add_geom(

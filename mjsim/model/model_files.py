@@ -11,15 +11,7 @@ from mjsim.errors import AssetError
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
-    """Read a model, with its asset files named absolutely, since attaching mixes folders.
-
-    Args:
-        path: MJCF file.
-        body: Top-level body that it has to have.
-
-    Raises:
-        AssetError: The file is malformed or lacks the body.
-    """
+    """Read an MJCF file that has a top-level body, with asset files named absolutely, since attaching mixes folders."""
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:

@@ -41,21 +41,12 @@ class NavigableBuilder(Protocol):
     """Makes the navigable floor of a house."""
 
     def __call__(self, obstacles: Sequence[ArrayLike], bounds: Sequence[float], /) -> NavigableFloor:
-        """Compute where one can walk.
-
-        Args:
-            obstacles: Convex polygons, m, each of shape (vertices, 2).
-            bounds: (x_min, y_min, x_max, y_max), m.
-        """
+        """Compute where one can walk among convex polygons (vertices, 2), m, within (x_min, y_min, x_max, y_max), m."""
         ...
 
 
 def installed_builder(group: str = GROUP) -> NavigableBuilder:
-    """The builder that an installed package registers; of several, the first by name.
-
-    Raises:
-        SamplingError: None is installed, or it cannot be loaded.
-    """
+    """The builder that an installed package registers, of several the first by name; `SamplingError` without one."""
     offers = sorted(entry_points(group=group), key=lambda e: e.name)
     if not offers:
         raise SamplingError(

@@ -12,21 +12,13 @@ from mjsim.errors import AssetError
 
 @dataclass(frozen=True, eq=False)
 class ReceptacleGeometry:
-    """One receptacle in the house frame.
+    """One receptacle in the house frame."""
 
-    Attributes:
-        key: Receptacle key.
-        center: Centre of the delivery volume, m, shape (3,).
-        half_size: Half extents of the volume along its own axes, m, shape (3,).
-        rotation: The volume's axes as columns, shape (3, 3).
-        approach: Floor point (x, y) where a person stands to use it, m, shape (2,).
-    """
-
-    key: str
-    center: NDArray[np.float64]
-    half_size: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    approach: NDArray[np.float64]
+    key: str  # receptacle key
+    center: NDArray[np.float64]  # centre of the delivery volume, m, (3,)
+    half_size: NDArray[np.float64]  # half extents of the volume along its own axes, m, (3,)
+    rotation: NDArray[np.float64]  # the volume's axes as columns, (3, 3)
+    approach: NDArray[np.float64]  # floor point (x, y) where a person stands to use it, m, (2,)
 
     def contains(self, point: ArrayLike, margin: float = 0.005) -> bool:
         """Whether a point (3,), m, lies in the volume grown by `margin` metres."""
@@ -41,13 +33,7 @@ class ReceptacleGeometry:
 
 
 def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:
-    """Read the sites `<key>/volume` and `<key>/approach` of a compiled model.
-
-    Receptacles do not move, so this holds for the whole episode.
-
-    Raises:
-        AssetError: A site is missing, or the volume is not a box.
-    """
+    """Read the sites `<key>/volume`, a box, and `<key>/approach` of a compiled model; receptacles do not move."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     found = {}

@@ -16,32 +16,19 @@ PREFIX = "room:"
 
 @dataclass(frozen=True, eq=False)
 class RoomMap:
-    """Rectangles on the floor, each a room or a part of one.
+    """Rectangles on the floor, each a room or a part of one."""
 
-    Attributes:
-        labels: Room key -> label shown to people ("Kitchen"), in the catalogue's order.
-        keys: Room key per rectangle, length k.
-        centers: Centres, m, shape (k, 2).
-        half_sizes: Half extents along the rectangle's own axes, m, shape (k, 2).
-        axes: Rectangle axes as columns, shape (k, 2, 2).
-    """
-
-    labels: Mapping[str, str]
-    keys: tuple[str, ...]
-    centers: NDArray[np.float64]
-    half_sizes: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    labels: Mapping[str, str]  # room key -> label shown to people ("Kitchen"), in the catalogue's order
+    keys: tuple[str, ...]  # room key per rectangle, length k
+    centers: NDArray[np.float64]  # centres, m, (k, 2)
+    half_sizes: NDArray[np.float64]  # half extents along the rectangle's own axes, m, (k, 2)
+    axes: NDArray[np.float64]  # rectangle axes as columns, (k, 2, 2)
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, labels: Mapping[str, str] | None = None) -> "RoomMap":
-        """Read the box sites `room:<key>` and `room:<key>:<n>` of a compiled house.
+        """Read the box sites `room:<key>` and `room:<key>:<n>` of a compiled house; labels are the keys by default.
 
-        Args:
-            model: Any model that contains the house.
-            labels: Room key -> label, from the catalogue; None takes the keys for labels.
-
-        Raises:
-            AssetError: A room without a site, a site without a room, or a site that is not an upright box.
+        `AssetError` for a room without a site, a site without a room, or a site that is not an upright box.
         """
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
@@ -90,11 +77,7 @@ class RoomMap:
         return self.centers, self.half_sizes, self.axes
 
     def label(self, key: str) -> str:
-        """Label of a room.
-
-        Raises:
-            AssetError: No such room.
-        """
+        """Label of a room; `AssetError` where there is none."""
         if key not in self.labels:
             raise AssetError(f"no room {key!r}; the house has {sorted(self.labels)}")
         return self.labels[key]

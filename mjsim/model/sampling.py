@@ -18,6 +18,7 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigablePoints
 from mjsim.model.settling import settle
+from mjsim.model.validation.validate import require_usable
 
 MIN_DISTANCE = 1.0  # m, between points, and from points to receptacles
 START_CLEARANCE = 0.5  # m, from the start to every object
@@ -49,7 +50,7 @@ def sample_episode(
     """Sample a disorganized house.
 
     Points and their categories follow from the seed alone, so that a level holds the easier ones. The object
-    model of a point is drawn anew at each level; none repeats before all of its category were used.
+    model of a point is drawn again at each level; none repeats before all of its category were used.
 
     Args:
         catalogue: What the house offers.
@@ -69,6 +70,7 @@ def sample_episode(
         PhysicsError: MuJoCo warned while the objects settled.
     """
     _check_arguments(objects, seed, points)
+    require_usable(compiled_house(catalogue))
     if navigable is None:
         navigable = navigable_floor(catalogue)
     pool = house_points(catalogue, navigable, seed=seed, points=points)
@@ -93,11 +95,7 @@ def sample_episode(
 def house_points(
     catalogue: Catalogue, navigable: NavigablePoints, *, seed: int, points: int = POINTS
 ) -> NDArray[np.float64]:
-    """The points of a seed that its levels share, m, shape (points, 2).
-
-    Raises:
-        SamplingError: They do not fit.
-    """
+    """The points of a seed that its levels share, m, shape (points, 2); `SamplingError` where they do not fit."""
     centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
     return sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
 
@@ -110,21 +108,7 @@ def sample_points(
     rng: np.random.Generator,
     min_distance: float = MIN_DISTANCE,
 ) -> NDArray[np.float64]:
-    """Draw navigable points by rejection.
-
-    Args:
-        navigable: The navigable floor.
-        keep_away: Points (k, 2), m, to keep the distance from as well.
-        count: How many points.
-        rng: Random stream.
-        min_distance: Least distance between points, m.
-
-    Returns:
-        Points, m, shape (count, 2).
-
-    Raises:
-        SamplingError: They do not fit.
-    """
+    """Draw navigable points (count, 2), m, by rejection, apart from each other and from `keep_away` (k, 2)."""
     best = 0
     for _ in range(PACKINGS):
         points = _pack(navigable, keep_away, count, rng, min_distance)

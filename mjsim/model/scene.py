@@ -18,6 +18,7 @@ from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 from mjsim.model.validation.episode_rules import check_fit, check_overlaps, check_poses
 from mjsim.model.validation.findings import Finding, errors, one_line
+from mjsim.model.validation.validate import require_usable
 from mjsim.person_parameters import PersonParameters
 
 T = TypeVar("T")
@@ -25,23 +26,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class SceneIndex:
-    """Where each object lives in the model's and the state's arrays, in the episode's order.
+    """Where each object lives in the model's and the state's arrays, in the episode's order."""
 
-    Attributes:
-        names: Instance names.
-        bodies: Body ids, shape (n,).
-        qpos: First `qpos` address of each free joint (3 position, 4 quaternion), shape (n,).
-        dofs: First `qvel` address (3 linear, 3 angular), shape (n,).
-        trees: Kinematic tree ids, for sleep states, shape (n,).
-        geom_owner: Per geom, the position of its object in this order, or -1, shape (ngeom,).
-    """
-
-    names: tuple[str, ...]
-    bodies: NDArray[np.int32]
-    qpos: NDArray[np.int32]
-    dofs: NDArray[np.int32]
-    trees: NDArray[np.int32]
-    geom_owner: NDArray[np.int32]
+    names: tuple[str, ...]  # instance names
+    bodies: NDArray[np.int32]  # body ids, (n,)
+    qpos: NDArray[np.int32]  # first `qpos` address of each free joint (3 position, 4 quaternion), (n,)
+    dofs: NDArray[np.int32]  # first `qvel` address (3 linear, 3 angular), (n,)
+    trees: NDArray[np.int32]  # kinematic tree ids, for sleep states, (n,)
+    geom_owner: NDArray[np.int32]  # per geom, the position of its object in this order, or -1, (ngeom,)
     _rows: NDArray[np.intp] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -49,11 +41,7 @@ class SceneIndex:
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, names: tuple[str, ...]) -> "SceneIndex":
-        """Look the objects up in a compiled model.
-
-        Raises:
-            AssetError: The model lacks the body or the free joint of an object.
-        """
+        """Look the objects up in a compiled model; `AssetError` where it lacks the body or the free joint of one."""
         bodies = np.array([_find(model, mujoco.mjtObj.mjOBJ_BODY, f"{n}/object") for n in names], np.int32)
         joints = np.array([_find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{n}/free") for n in names], np.int32)
         owner_of_body = np.full(model.nbody, -1, np.int32)
@@ -105,7 +93,7 @@ class Scene:
         rooms: Which room a point is in.
         receptacles: Receptacle key -> geometry.
         spec: The editable description, for export.
-        person: Who walks in it.
+        person: Size, reach and speeds of the person.
         visuals: Whether the model includes what is only drawn.
     """
 
@@ -121,7 +109,7 @@ class Scene:
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
     def once(self, key: str, make: Callable[[], T]) -> T:
-        """What `make` returns at the first call with `key`, and the same value ever after."""
+        """The cached result of `make`, which is called once per `key`."""
         if key not in self._derived:
             self._derived[key] = make()
         return cast(T, self._derived[key])
@@ -148,13 +136,13 @@ def compose(
     Args:
         episode: What to compose.
         catalogue: Catalogue of the episode's house.
-        person: Who walks in it; None for the usual person.
+        person: Size, reach and speeds of the person; None for the default.
         avatar: Whether to add the person's body.
         visuals: Whether to include what is only drawn. Without it a scene moves the same, compiles faster and steps
             faster, but cannot be rendered.
 
     Raises:
-        AssetError: A model is malformed, or does not compile.
+        AssetError: The house of a user breaks a convention of docs/models.md, or a model does not compile.
         EpisodeError: The episode does not fit the catalogue, or something starts outside of the house or inside of
             something else.
     """
@@ -175,13 +163,10 @@ def assemble(
     avatar: bool = True,
     visuals: bool = True,
 ) -> Scene:
-    """As `compose`, for an episode whose poses need not make sense.
-
-    Raises:
-        AssetError: A model is malformed, or does not compile.
-    """
+    """As `compose`, for an episode whose poses need not make sense."""
     person = person or PersonParameters()
     house = compiled_house(catalogue)
+    require_usable(house)
     spec = house.spec(visuals=visuals)
     spec.copy_during_attach = True
     names = tuple(o.name for o in episode.objects)

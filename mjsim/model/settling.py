@@ -19,27 +19,17 @@ MAX_SINK = 0.02  # m below the floor
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Objects after the drop, in the episode's order.
+    """Objects after the drop, in the episode's order."""
 
-    Attributes:
-        objects: The objects in their settled poses.
-        faults: Instance name -> why its pose is unusable; empty when all is well.
-    """
-
-    objects: tuple[PlacedObject, ...]
-    faults: dict[str, str]
+    objects: tuple[PlacedObject, ...]  # the objects in their settled poses
+    faults: dict[str, str]  # instance name -> why its pose is unusable; empty when all is well
 
 
 def settle(episode: Episode, catalogue: Catalogue) -> Settled:
-    """Run the physics of an empty house until every object sleeps, 6 s at most.
+    """Run the physics of an empty house until every object sleeps, 6 s at most; `PhysicsError` where it fails.
 
     An object is at fault when it is then awake and faster than 1 cm/s, when it came to lie more than 0.3 m
     from its point, or when it left the house.
-
-    Raises:
-        AssetError: The scene does not compile.
-        EpisodeError: The episode does not fit the catalogue.
-        PhysicsError: MuJoCo warned.
     """
     scene = compose(episode, catalogue, avatar=False, visuals=False)
     data = mujoco.MjData(scene.model)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from mjsim.inventory import LEFT, RIGHT
 from mjsim.kernels import kernel
 from mjsim.model import avatar
-from mjsim.model.carry_clearance import carry_clearance
 from mjsim.model.clearance import ClearanceField
+from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
 from mjsim.motion_parameters import CarryingParameters
 from mjsim.person.load_room import BodyMotion, drawn_in
@@ -22,35 +22,30 @@ from mjsim.person.postures import Contacts, Hands, Holding, update_hands
 from mjsim.person.slots import object_corners
 from mjsim.person.strain import count_strain
 
+LOW, HIGH = 0.93, 1.60  # m, heights of carried objects
+
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 _HOUSE, _PERSON = -1, -2  # owners of geoms that belong to no object
 
 
 @dataclass(frozen=True, eq=False)
 class CarryingState:
-    """What carrying remembers between control steps.
+    """What carrying remembers between control steps."""
 
-    Attributes:
-        compliance: How far contact has pushed each hand off its posture, m, shape (2, 2).
-        strained: Control steps for which each hand has been strained, shape (2,).
-    """
-
-    compliance: NDArray[np.float64]
-    strained: NDArray[np.int64]
+    compliance: NDArray[np.float64]  # how far contact has pushed each hand off its posture, m, (2, 2)
+    strained: NDArray[np.int64]  # control steps for which each hand has been strained, (2,)
 
 
 class Carrying:
-    """Keeps both hands in posture; one instance per world.
-
-    Attributes:
-        loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
-        clearance: Clearance at the heights of what is carried.
-    """
+    """Keeps both hands in posture; one instance per world."""
 
     def __init__(self, person: Person) -> None:
         scene, rig = person.scene, person.rig
         self._person = person
-        self.clearance = carry_clearance(scene)
+        self.clearance: ClearanceField = compiled_house(scene.catalogue).once(
+            "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
+        )
+        # how far each object reaches sideways and down about its grip, m, (n, 2)
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._owners = _geom_owners(scene)
         self._no_contacts = (_NO_GEOMS, _NO_FRAMES, self._owners)
@@ -75,16 +70,12 @@ class Carrying:
         return CarryingState(self._compliance.copy(), self._strained.copy())
 
     def set_state(self, state: CarryingState) -> None:
-        """Go on from what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self._compliance[:] = state.compliance
         self._strained[:] = state.strained
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
-        """Set the targets of the hands that no motion moves, and keep the walking command off contacts.
-
-        Args:
-            held_posture: Where a hand that holds something belongs, such as `avatar.CARRY`.
-        """
+        """Set the targets of the hands that no motion moves, and keep the walking command off contacts."""
         person = self._person
         left, right = person.held
         left, right = -1 if left is None else left, -1 if right is None else right
@@ -94,13 +85,7 @@ class Carrying:
         _update_hands(self._body, self._hands, self._parameters, holding, contacts, person.dt)
 
     def carry_position(self, hand: int, item: int, body: BodyMotion | None = None) -> NDArray[np.float64]:
-        """Where a hand best carries object `item`, clear of the house: body frame, m, (3,).
-
-        Args:
-            hand: The hand.
-            item: The object.
-            body: Pose and commands of the body; by default those of the physics.
-        """
+        """Best position (3,), body frame, m, for a hand to carry object `item` clear of the house."""
         radius, height = self.loads[item].tolist()
         forward, left, up = avatar.posture(hand, avatar.CARRY)
         rig, carrying = self._person.rig, self._person.parameters.carrying

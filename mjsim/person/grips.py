@@ -19,12 +19,7 @@ GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and 
 
 
 class Grips:
-    """Closes, opens and measures the welds that `avatar.attach_avatar` declared: hand x object x grip x stiffness.
-
-    Attributes:
-        gripped: Objects that are welded to a hand, left before right.
-        sites: Site of each hand and of the grip that it holds, -1 where it holds none, shape (2, 2).
-    """
+    """Closes, opens and measures the welds that `avatar.attach_avatar` declared: hand x object x grip x stiffness."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, rig: Rig) -> None:
         self._data = data
@@ -41,7 +36,7 @@ class Grips:
         ]
         self._grip_sites = np.array(sites, np.intp).reshape(len(names), len(avatar.GRIPS))
         self._welds = np.array(welds, np.intp).reshape(2, len(names), len(avatar.GRIPS), 2)
-        self.sites = np.full((2, 2), -1, np.intp)
+        self.sites = np.full((2, 2), -1, np.intp)  # of each hand and of the grip that it holds, -1 for none
         self.reset()
 
     def nearest_grip(self, hand: int, item: int) -> int:
@@ -88,7 +83,7 @@ class Grips:
         return left, right
 
     def set_state(self, state: GripState) -> None:
-        """Go on from what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self._held = list(state)
         self._update()
 

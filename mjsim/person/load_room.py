@@ -25,17 +25,11 @@ EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 class BodyMotion(NamedTuple):
-    """Where the body is, its command, and what is around it.
+    """Where the body is, its command, and what is around it."""
 
-    Attributes:
-        pose: x, y, heading and more, m and rad, shape (10,) or longer.
-        command: Commanded velocity in the body frame (forward, left), m/s, and yaw rate, rad/s, shape (3,) or longer.
-        clearance: Clearance at the heights of what is carried.
-    """
-
-    pose: Floats
-    command: Floats
-    clearance: ClearanceField
+    pose: Floats  # x, y, heading and more, m and rad, (10,) or longer
+    command: Floats  # commanded velocity in the body frame (forward, left), m/s, and yaw rate, rad/s, (3,) or longer
+    clearance: ClearanceField  # clearance at the heights of what is carried
 
 
 @kernel

@@ -29,26 +29,20 @@ Steps = Generator[None, None, None]
 
 @dataclass(eq=False)
 class Person:
-    """The body of the person in one running world.
-
-    Attributes:
-        held: Index of the object in the left and the right hand, or None.
-        hand_velocities: How fast the hands' targets move where no motion moves them, m/s, shape (2, 3).
-        moving_hand: Hand that a motion moves at present; the others keep their posture.
-        receptacle_heights: Tells how full receptacles are.
-        posture_pace: As in `mjsim.person.postures.Hands`.
-    """
+    """The body of the person in one running world."""
 
     scene: Scene
     options: WorldOptions
     data: mujoco.MjData
     rig: Rig
     grips: Grips
+    # Index of the object in the left and the right hand, or None.
     held: list[int | None] = field(default_factory=lambda: [None, None])
+    # How fast the hands' targets move where no motion moves them, m/s, (2, 3).
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
-    moving_hand: int | None = None
-    receptacle_heights: ReceptacleHeights = field(init=False)
-    posture_pace: NDArray[np.float64] = field(init=False)
+    moving_hand: int | None = None  # hand that a motion moves at present; the others keep their posture
+    receptacle_heights: ReceptacleHeights = field(init=False)  # tells how full receptacles are
+    posture_pace: NDArray[np.float64] = field(init=False)  # as in `mjsim.person.postures.Hands`
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
@@ -148,13 +142,7 @@ class Person:
         self.rig.motion[3] = min(highest, max(lowest, target))
 
     def face(self, point: NDArray[np.float64], tolerance: float, heading: float | None = None) -> Steps:
-        """Stand still and turn to a point, or to a heading while glancing at the point.
-
-        Args:
-            point: In the house frame, m, shape (3,).
-            tolerance: Remaining error at which the turn is done, rad.
-            heading: Where to turn, rad; None for the direction of the point.
-        """
+        """Stand still and turn to a point (3,), m, or to a heading while glancing at the point, to a tolerance, rad."""
         motion = self.motion
         for _ in range(self.steps(motion.turn_timeout)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
@@ -172,7 +160,7 @@ class Person:
     def swing(
         self, hand: int, goal: Callable[[], NDArray[np.float64]], steps: int, order: int
     ) -> Iterator[None]:
-        """Set a hand's target once per control step on its way to a goal (3,) m, which may change meanwhile."""
+        """Set a hand's target once per control step on its way to a goal (3,), m, which may change on the way."""
         start = self.rig.hand_targets[hand].copy()
         for k in range(1, steps + 1):
             self.rig.hand_targets[hand] = point_between(start, goal(), k / steps, order, self.motion.lead)
@@ -193,16 +181,9 @@ def change_command(
     look: float,
     limits: NDArray[np.float64],
 ) -> None:
-    """Change a command towards a wanted move, within limits, by one control step.
+    """Change a command (forward, left, yaw rate, pitch) towards a wanted move, in m/s and rad/s, by one control step.
 
-    Args:
-        command: Commanded velocity (forward, left), yaw rate and pitch; changed.
-        forward: Wanted velocity forward, m/s.
-        left: Wanted velocity to the left, m/s.
-        turn: Wanted yaw rate, rad/s.
-        look: Wanted rate of the head's pitch, rad/s.
-        limits: Fastest walk, change of velocity, yaw rate, change of yaw rate, pitch rate, lowest and highest
-            pitch, and the control step; SI units, (8,).
+    `limits` (8,): fastest walk, its change, yaw rate, its change, pitch rate, lowest and highest pitch, control step.
     """
     max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
     change_velocity(command, forward, left, max_speed, acceleration * dt)

@@ -20,18 +20,7 @@ def pick(
     carry_position: Callable[[int, int], NDArray[np.float64]],
     pitch: float,
 ) -> Motion:
-    """Reach for object `item` and lift it.
-
-    Args:
-        person: Who picks.
-        hand: Hand that reaches.
-        item: Object.
-        carry_position: Gives where a hand carries an object clear of the house, body frame, m, (3,).
-        pitch: Where the head looks afterwards, rad.
-
-    Returns:
-        Whether the hand holds the object in the carrying posture. If not, the hand is open.
-    """
+    """Reach for object `item`, lift it and look to `pitch`, rad; whether the hand then carries it."""
     rig, grips = person.rig, person.grips
     yield from person.face(person.center(item), person.motion.object_tolerance)
     person.moving_hand = hand
@@ -42,20 +31,6 @@ def pick(
             break
         rig.hand_targets[hand] = rig.to_body(grips.point(item, grip))
         yield
-    success = yield from take(person, hand, item, carry_position, pitch)
-    return success
-
-
-def take(
-    person: Person,
-    hand: int,
-    item: int,
-    carry_position: Callable[[int, int], NDArray[np.float64]],
-    pitch: float,
-) -> Motion:
-    """Lift object `item`, which the hand has reached; the rest, `carry_position` (3,) m too, is as in `pick`."""
-    grips = person.grips
-    person.moving_hand = hand
     grip = grips.nearest_grip(hand, item)
     if grips.gap(hand, item, grip) > person.options.grip_distance:
         return False

@@ -21,11 +21,7 @@ _RAISE_TIMEOUT = 0.6  # s
 
 
 def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
-    """Put the object that `hand` holds into its receptacle and wait until it rests; look to `pitch`, rad, then.
-
-    Returns:
-        Whether the object's centre rests inside the receptacle's volume.
-    """
+    """Put the object of `hand` into its receptacle, look to `pitch`, rad; whether it then rests inside."""
     heading = square_heading(person, receptacle)
     yield from person.face(receptacle.center, person.motion.receptacle_tolerance, heading)
     person.moving_hand = hand
@@ -112,15 +108,7 @@ def overlap(person: Person, item: int) -> float:
 def deepest_overlap(
     geoms: NDArray[np.int32], distances: Vector, owner: NDArray[np.int32], item: int, foot: int
 ) -> float:
-    """Deepest overlap of an object in contacts, m, the person's foot apart; 0 without one.
-
-    Args:
-        geoms: Geoms of each contact, shape (k, 2).
-        distances: Distance of each contact, m, negative where geoms overlap, shape (k,).
-        owner: Object of each geom, or -1, shape (ngeom,).
-        item: The object.
-        foot: The person's foot, a geom.
-    """
+    """Deepest overlap, m, of an object in contacts (k, 2) with distances (k,), m, but for the foot's; 0 without."""
     deepest = 0.0
     for c in range(len(distances)):
         first, second = geoms[c, 0], geoms[c, 1]

@@ -25,54 +25,32 @@ _ARRIVED = 0.0005  # m
 
 
 class Hands(NamedTuple):
-    """Control of both hands; left before right, in the body frame.
+    """Control of both hands; left before right, in the body frame."""
 
-    Attributes:
-        targets: Commanded positions, m, shape (2, 3).
-        velocities: How fast the targets move, m/s, shape (2, 3).
-        compliance: Offsets by which the hands give way to contacts, m, shape (2, 2).
-        goals: Room for where the hands belong, m, shape (2, 3).
-        rest: Where an empty left hand belongs, m, shape (3,).
-        loads: How far each object reaches sideways and down about its grip, m, shape (n, 2).
-        pace: Gain, 1/s, fastest, m/s, and acceleration, m/s^2, of a hand on its way to a posture, shape (3,).
-    """
-
-    targets: Floats
-    velocities: Floats
-    compliance: Floats
-    goals: Floats
-    rest: Floats
-    loads: Floats
-    pace: Floats
+    targets: Floats  # commanded positions, m, (2, 3)
+    velocities: Floats  # how fast the targets move, m/s, (2, 3)
+    compliance: Floats  # offsets by which the hands give way to contacts, m, (2, 2)
+    goals: Floats  # room for where the hands belong, m, (2, 3)
+    rest: Floats  # where an empty left hand belongs, m, (3,)
+    loads: Floats  # how far each object reaches sideways and down about its grip, m, (n, 2)
+    pace: Floats  # gain, 1/s, fastest, m/s, and acceleration, m/s^2, of a hand on its way to a posture, (3,)
 
 
 class Contacts(NamedTuple):
-    """What touches what.
+    """What touches what."""
 
-    Attributes:
-        geoms: Geoms of each contact, shape (k, 2).
-        frames: Frame of each contact, the normal first, shape (k, 9).
-        owners: Object of each geom, -1 for the house, -2 for the person, shape (ngeom,).
-    """
-
-    geoms: Ints
-    frames: Floats
-    owners: Ints
+    geoms: Ints  # geoms of each contact, (k, 2)
+    frames: Floats  # frame of each contact, the normal first, (k, 9)
+    owners: Ints  # object of each geom, -1 for the house, -2 for the person, (ngeom,)
 
 
 class Holding(NamedTuple):
-    """What the hands are doing.
+    """What the hands are doing."""
 
-    Attributes:
-        left, right: Object in the hand, or -1.
-        moving: Hand that a motion moves, or -1.
-        posture: Where a left hand that holds something belongs, m, shape (3,).
-    """
-
-    left: int
+    left: int  # object in the hand, or -1
     right: int
-    moving: int
-    posture: Floats
+    moving: int  # hand that a motion moves, or -1
+    posture: Floats  # where a left hand that holds something belongs, m, (3,)
 
 
 def posture_pace(motion: MotionParameters) -> Floats:
@@ -89,16 +67,7 @@ def update_hands(
     contacts: Contacts,
     dt: float,
 ) -> None:
-    """Set the targets of the hands that no motion moves, and keep the walking command off contacts.
-
-    Args:
-        body: The command is changed.
-        hands: Targets, velocities and compliance are changed.
-        carrying: How the person carries.
-        holding: What each hand is doing.
-        contacts: Contacts of the physics; none where nothing is held or there is no physics.
-        dt: Control step, s.
-    """
+    """Set the targets of the hands that no motion moves, and keep the walking command off contacts; dt in s."""
     for hand in range(2):
         side = 1.0 - 2.0 * hand
         hands.compliance[hand, 0] *= 1.0 - carrying.return_rate * dt

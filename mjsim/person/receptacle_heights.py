@@ -22,27 +22,17 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
 
 
 class Shapes(NamedTuple):
-    """Shapes of all geoms of a model, as in `MjModel`.
+    """Shapes of all geoms of a model, as in `MjModel`."""
 
-    Attributes:
-        types: `geom_type`, shape (ngeom,).
-        sizes: `geom_size`, m, shape (ngeom, 3).
-        bounds: `geom_rbound`, m, shape (ngeom,).
-        meshes: `geom_dataid`, shape (ngeom,).
-        first_vertex, first_face, face_count: `mesh_vertadr`, `mesh_faceadr` and `mesh_facenum`, shape (nmesh,).
-        vertices: `mesh_vert`, m, shape (nmeshvert, 3).
-        faces: `mesh_face`, shape (nmeshface, 3).
-    """
-
-    types: Ints
-    sizes: Floats
-    bounds: Floats
-    meshes: Ints
-    first_vertex: Ints
+    types: Ints  # `geom_type`, (ngeom,)
+    sizes: Floats  # `geom_size`, m, (ngeom, 3)
+    bounds: Floats  # `geom_rbound`, m, (ngeom,)
+    meshes: Ints  # `geom_dataid`, (ngeom,)
+    first_vertex: Ints  # `mesh_vertadr`, `mesh_faceadr` and `mesh_facenum`, (nmesh,)
     first_face: Ints
     face_count: Ints
-    vertices: Floats
-    faces: Ints
+    vertices: Floats  # `mesh_vert`, m, (nmeshvert, 3)
+    faces: Ints  # `mesh_face`, (nmeshface, 3)
 
 
 class ReceptacleHeights:
@@ -72,14 +62,9 @@ class ReceptacleHeights:
     def heights(
         self, data: mujoco.MjData, receptacle: ReceptacleGeometry, points: Floats, top: float, ignore: Ints
     ) -> Floats:
-        """Height of the first solid surface below each point, m, shape (k,); -inf where there is none.
+        """Height of the first solid surface below each point (k, 2), m, from height `top` down; -inf without one.
 
-        Args:
-            data: State; positions are those of the last physics step.
-            receptacle: What the points are in.
-            points: Horizontal positions in the house, m, shape (k, 2).
-            top: Height at which the rays start, m.
-            ignore: Body ids that the rays pass through.
+        The rays pass through the bodies in `ignore`.
         """
         moving = self._within_reach(data, receptacle, self._moving)
         bodies = self._model.geom_bodyid[moving]
@@ -103,16 +88,7 @@ class ReceptacleHeights:
 def cast_down(
     points: Floats, top: float, geoms: Ints, positions: Floats, rotations: Floats, shapes: Shapes
 ) -> Floats:
-    """Height of the first of some geoms below each point at height `top`, m, shape (k,); -inf where there is none.
-
-    Args:
-        points: Horizontal positions in the house, m, shape (k, 2).
-        top: Height at which the rays start, m.
-        geoms: Geom ids.
-        positions: `MjData.geom_xpos`, m, shape (ngeom, 3).
-        rotations: `MjData.geom_xmat`, shape (ngeom, 9).
-        shapes: Shapes of all geoms.
-    """
+    """Height (k,) of the first of some geoms below points (k, 2) at height `top`, m; -inf where there is none."""
     heights = np.full(len(points), -math.inf)
     start, along = np.empty(3), np.empty(3)
     for geom in geoms:

@@ -22,32 +22,18 @@ _SERVOS = 10
 
 @dataclass(frozen=True, eq=False)
 class RigState:
-    """Commands of the person, as a value.
+    """Commands of the person, as a value."""
 
-    Attributes:
-        motion: See `Rig.motion`, shape (4,).
-        hand_targets: See `Rig.hand_targets`, m, shape (2, 3).
-        previous_hand_targets: Those of the control step before, m, shape (2, 3).
-        command: Previous commands of the servos: velocities of x, y and yaw, pitch, hand positions, shape (10,).
-    """
-
-    motion: Vector
-    hand_targets: Vector
-    previous_hand_targets: Vector
-    command: Vector
+    motion: Vector  # see `Rig.motion`, (4,)
+    hand_targets: Vector  # see `Rig.hand_targets`, m, (2, 3)
+    previous_hand_targets: Vector  # those of the control step before, m, (2, 3)
+    command: (
+        Vector  # previous commands of the servos: velocities of x, y and yaw, pitch, hand positions, (10,)
+    )
 
 
 class Rig:
-    """Reads and commands the avatar of one simulation.
-
-    Attributes:
-        model: The compiled scene, never modified.
-        data: Its state.
-        pose: x, y, yaw and pitch of the head, then both hands in the body frame; m and rad; a view of the state, (10,).
-        rates: Their velocities, likewise, (10,).
-        motion: Commanded velocity in the body frame (forward, left), m/s, yaw rate, rad/s, and pitch, rad, (4,).
-        hand_targets: Commanded hand positions in the body frame, m, shape (2, 3).
-    """
+    """Reads and commands the avatar of one simulation."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, control_timestep: float) -> None:
         self.model, self.data = scene.model, data
@@ -59,12 +45,13 @@ class Rig:
         joints += [f"{avatar.PREFIX}{hand}/{axis}" for hand in avatar.HANDS for axis in "xyz"]
         ids = [find_id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
         actuators = np.array([find_id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in joints])
+        # x, y, yaw and pitch of the head, then both hands in the body frame; m and rad; a view of the state, (10,)
         self.pose = _view(data.qpos, model.jnt_qposadr[ids])
-        self.rates = _view(data.qvel, model.jnt_dofadr[ids])
+        self.rates = _view(data.qvel, model.jnt_dofadr[ids])  # their velocities, (10,)
         self._activations = _view(data.act, model.actuator_actadr[actuators])
         self._controls = _view(data.ctrl, actuators)
-        self.motion = np.zeros(4)
-        self.hand_targets = np.zeros((2, 3))
+        self.motion = np.zeros(4)  # commanded velocity forward and left, m/s, yaw rate, rad/s, and pitch, rad
+        self.hand_targets = np.zeros((2, 3))  # commanded hand positions in the body frame, m
         self._last_hand_targets = np.zeros((2, 3))
         self._last_command = np.zeros(_SERVOS)
         self.grip_sites = tuple(
@@ -91,7 +78,7 @@ class Rig:
         return RigState(*(array.copy() for array in arrays))
 
     def set_state(self, state: RigState) -> None:
-        """Go on from commands of `get_state`."""
+        """Restore commands of `get_state`."""
         self.motion[:] = state.motion
         self.hand_targets[:] = state.hand_targets
         self._last_hand_targets[:] = state.previous_hand_targets
@@ -173,17 +160,8 @@ def ramp_servos(
 ) -> None:  # fmt: skip
     """Set where the servos' activations start and how fast they change, so that they arrive after one control step.
 
-    The hands ramp from their previous targets, with the lead applied from the first step on.
-
-    Args:
-        pose: `Rig.pose`.
-        motion: `Rig.motion`.
-        targets: `Rig.hand_targets`.
-        last_targets: The targets a control step ago, (2, 3); overwritten.
-        last_command: Where the activations ended a control step ago, in the house frame, (10,); overwritten.
-        activations: `MjData.act` of the servos, which position and velocity follow, (10,); overwritten.
-        controls: `MjData.ctrl` of the servos, the rates of change of the activations, (10,); overwritten.
-        dt: Control step, s.
+    The hands ramp from `last_targets` (2, 3), with the lead applied at once. `last_command`, `activations` and
+    `controls` (10,) are those of `MjData.act` and `MjData.ctrl`; all four arrays are overwritten.
     """
     heading = pose[2] + 0.5 * motion[2] * dt
     c, s = math.cos(heading), math.sin(heading)
@@ -216,11 +194,7 @@ def _view(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
 
 
 def find_id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """Number of a named part of the person.
-
-    Raises:
-        AssetError: The model has no such part.
-    """
+    """Number of a named part of the person; `AssetError` where the model has no such part."""
     found = int(mujoco.mj_name2id(model, kind, name))
     if found < 0:
         raise AssetError(f"the model has no {kind.name} {name!r}; compose the scene with avatar=True")

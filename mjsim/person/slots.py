@@ -25,30 +25,19 @@ _MIN_GAIN = 0.015  # m of cost by which another place must be better to be taken
 
 @dataclass(frozen=True, eq=False)
 class LoadExtent:
-    """Extent of a held object about the hand, in the receptacle's axes.
+    """Extent of a held object about the hand, in the receptacle's axes."""
 
-    Attributes:
-        low: Least coordinates of its corners, m, shape (3,).
-        high: Largest coordinates, m, shape (3,).
-    """
-
-    low: Vector
-    high: Vector
+    low: Vector  # least coordinates of its corners, m, (3,)
+    high: Vector  # largest coordinates, m, (3,)
 
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Where the hand releases an object.
+    """Where the hand releases an object."""
 
-    Attributes:
-        hand: Horizontal position of the hand in the receptacle's axes, m, shape (2,).
-        fill: Height of what is below the object there, m above the centre of the receptacle's volume.
-        top: Height that everything in the receptacle stays below, likewise.
-    """
-
-    hand: Vector
-    fill: float
-    top: float
+    hand: Vector  # horizontal position of the hand in the receptacle's axes, m, (2,)
+    fill: float  # height of what is below the object there, m above the centre of the receptacle's volume
+    top: float  # height that everything in the receptacle stays below, likewise
 
 
 def object_corners(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Vector:

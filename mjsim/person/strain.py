@@ -24,20 +24,9 @@ def count_strain(
     patience: float,
     strained: NDArray[np.int64],
 ) -> int:
-    """Count for how many control steps each hand has been strained.
+    """Count the control steps for which each hand's weld has been stretched by more than `max_error`, m.
 
-    Args:
-        pose: `Rig.pose`.
-        targets: `Rig.hand_targets`.
-        site_xpos: Positions of all sites, m, (nsite, 3).
-        sites: `Grips.sites`.
-        held: Whether the left and the right hand carry something.
-        max_error: A weld stretched farther than this is strained, m.
-        patience: Control steps after which a load slips.
-        strained: Steps per hand, (2,); changed.
-
-    Returns:
-        Hands whose load slips: 1 for the left one, 2 for the right one, or their sum.
+    Returns the hands whose count in `strained` (2,) has reached `patience`: 1 for the left one, 2 for the right one, 3.
     """
     slipping = 0
     for hand in range(2):

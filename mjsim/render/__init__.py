@@ -40,34 +40,14 @@ if TYPE_CHECKING:
 else:  # hidden from type checkers, which would otherwise accept any name
     _MODULES = {
         "cameras": ("CameraPose",),
-        "context": (
-            "GlInfo",
-            "gl_info",
-        ),
-        "floorplan": (
-            "FloorPlan",
-            "largest_scale",
-            "render_floorplan",
-            "render_house_map",
-        ),
+        "context": ("GlInfo", "gl_info"),
+        "floorplan": ("FloorPlan", "largest_scale", "render_floorplan", "render_house_map"),
         "labels": ("Labels",),
         "layered": ("LayeredRenderer",),
         "markers": ("MarkerLike",),
-        "pictures": (
-            "render_picture",
-            "render_pictures",
-        ),
-        "profiles": (
-            "DRAFT",
-            "FAST",
-            "PROFILES",
-            "QUALITY",
-            "RenderProfile",
-        ),
-        "renderer": (
-            "Frame",
-            "Renderer",
-        ),
+        "pictures": ("render_picture", "render_pictures"),
+        "profiles": ("DRAFT", "FAST", "PROFILES", "QUALITY", "RenderProfile"),
+        "renderer": ("Frame", "Renderer"),
     }
 
     def __getattr__(name):

@@ -18,17 +18,12 @@ FAR = 100.0
 
 @dataclass(frozen=True, eq=False)
 class CameraPose:
-    """A pinhole camera.
+    """A pinhole camera."""
 
-    Attributes:
-        position: Eye point in the house frame, m, shape (3,).
-        rotation: Camera axes in the house frame as columns: x right, y up, z backward, shape (3, 3).
-        fovy: Vertical field of view, rad.
-    """
-
-    position: NDArray[np.float64]
+    position: NDArray[np.float64]  # eye point in the house frame, m, shape (3,)
+    # camera axes in the house frame as columns: x right, y up, z backward, shape (3, 3)
     rotation: NDArray[np.float64]
-    fovy: float
+    fovy: float  # vertical field of view, rad
 
     def __post_init__(self) -> None:
         position = np.asarray(self.position, dtype=np.float64)
@@ -44,21 +39,13 @@ class CameraPose:
 
     @classmethod
     def looking_at(cls, position: ArrayLike, target: ArrayLike, fovy: float) -> "CameraPose":
-        """Upright camera at `position` (3,) that looks at `target` (3,), m, with `fovy` rad.
-
-        Raises:
-            RenderError: The points coincide, or an argument is unusable.
-        """
+        """Upright camera at `position` (3,) that looks at `target` (3,), m, with `fovy` rad."""
         eye = np.asarray(position, dtype=np.float64)
         return cls(eye, look_rotation(np.asarray(target, dtype=np.float64) - eye), fovy)
 
 
 def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Camera axes (3, 3) that look along `direction`, up as near to +z as possible (+y when vertical).
-
-    Raises:
-        RenderError: `direction` has no length.
-    """
+    """Camera axes (3, 3) that look along `direction`, up as near to +z as possible (+y when vertical)."""
     length = np.linalg.norm(direction)
     if not length > 0.0:
         raise RenderError(f"a camera cannot look along {direction!r}; give a target away from its position")
@@ -70,27 +57,18 @@ def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """What one draw call sees.
+class ViewVolume:
+    """What one draw call sees."""
 
-    Attributes:
-        position: Eye point, m, shape (3,).
-        rotation: Camera axes as columns: right, up, backward, shape (3, 3).
-        half_height: Half the height of the image at distance 1 m; in m when orthographic.
-        near: Distance of the near plane, m.
-        far: Distance of the far plane, m.
-        orthographic: Parallel projection.
-    """
-
-    position: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    half_height: float
-    near: float = NEAR
-    far: float = FAR
-    orthographic: bool = False
+    position: NDArray[np.float64]  # eye point, m, (3,)
+    rotation: NDArray[np.float64]  # camera axes as columns: right, up, backward, (3, 3)
+    half_height: float  # half the height of the image at distance 1 m; in m when orthographic
+    near: float = NEAR  # distance of the near plane, m
+    far: float = FAR  # distance of the far plane, m
+    orthographic: bool = False  # parallel projection
 
     @classmethod
-    def of(cls, pose: CameraPose) -> "View":
+    def of(cls, pose: CameraPose) -> "ViewVolume":
         """Perspective view of a camera pose."""
         return cls(pose.position, pose.rotation, float(np.tan(pose.fovy / 2)))
 
@@ -118,19 +96,10 @@ class View:
 
 
 def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) -> CameraPose:
-    """Pose of the camera called `camera`, or the pose itself.
+    """Pose of the camera called `camera`, or the pose itself, for pictures with `aspect`, width over height.
 
     The eye has the same horizontal field of view in pictures of any shape, that of the person; any other camera of the
-    model has its vertical one, as everywhere in MuJoCo.
-
-    Args:
-        model: Compiled model.
-        data: Its state.
-        camera: Name or pose.
-        aspect: Width of the picture divided by its height.
-
-    Raises:
-        RenderError: The model has no camera of that name.
+    model has its vertical one, as everywhere in MuJoCo. `RenderError` for an unknown camera.
     """
     if isinstance(camera, CameraPose):
         return camera

@@ -34,19 +34,12 @@ _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshade
 
 @dataclass(frozen=True)
 class GlInfo:
-    """The OpenGL driver in use.
+    """The OpenGL driver in use."""
 
-    Attributes:
-        vendor: GL_VENDOR.
-        renderer: GL_RENDERER, the device or the software rasteriser.
-        version: GL_VERSION.
-        software: Whether the CPU does the drawing.
-    """
-
-    vendor: str
-    renderer: str
-    version: str
-    software: bool
+    vendor: str  # GL_VENDOR
+    renderer: str  # GL_RENDERER, the device or the software rasteriser
+    version: str  # GL_VERSION
+    software: bool  # whether the CPU does the drawing
 
 
 def is_software(renderer: str) -> bool:

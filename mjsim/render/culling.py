@@ -1,4 +1,4 @@
-"""View culling: leaving out geoms behind the eye or beside the view, which most of a house is.
+"""ViewVolume culling: leaving out geoms behind the eye or beside the view, which most of a house is.
 
 The rasteriser submits every geom of the scene, and on a CPU transforming their vertices costs more than the
 pixels do. Leaving those out does not change a frame as long as nothing casts shadows or is mirrored into it.
@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.render.cameras import View
+from mjsim.render.cameras import ViewVolume
 
 # Metres; far above rounding in single precision, far below what would cost time.
 _MARGIN = 0.01
@@ -23,15 +23,10 @@ _GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
 
 
 class Bounds(NamedTuple):
-    """What the geoms of a model fill, each in its own frame.
+    """What the geoms of a model fill, each in its own frame."""
 
-    Attributes:
-        radii: Of spheres around their origins, m, shape (ngeom,); 0 means unbounded.
-        boxes: Centres and half-sizes of boxes, m, shape (ngeom, 6).
-    """
-
-    radii: NDArray[np.float64]
-    boxes: NDArray[np.float64]
+    radii: NDArray[np.float64]  # of spheres around their origins, m, (ngeom,); 0 means unbounded
+    boxes: NDArray[np.float64]  # centres and half-sizes of boxes, m, (ngeom, 6)
 
     @classmethod
     def of(cls, model: Any) -> "Bounds":
@@ -46,19 +41,9 @@ class Bounds(NamedTuple):
 
 
 def outside(
-    view: View, aspect: float, centres: NDArray[np.float64], radii: NDArray[np.float64]
+    view: ViewVolume, aspect: float, centres: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Which spheres lie wholly outside a view.
-
-    Args:
-        view: Perspective or orthographic.
-        aspect: Width over height of the image.
-        centres: Shape (n, 3), m.
-        radii: Shape (n,), m; 0 or less means unbounded, which is never outside.
-
-    Returns:
-        Mask, shape (n,). A sphere near a corner of the view may be kept although it is outside.
-    """
+    """Which spheres (n,) are wholly outside a view; a radius of 0 means unbounded. Some near corners are kept."""
     right, up, backward = ((centres - view.position) @ view.rotation).T
     ahead, reach = -backward, radii + _MARGIN
     vertical, horizontal = view.half_height, view.half_height * aspect

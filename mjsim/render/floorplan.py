@@ -11,7 +11,7 @@ from mjsim.errors import RenderError
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
-from mjsim.render.cameras import View, look_rotation
+from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import MAX_SIDE, RenderProfile
 from mjsim.render.rasteriser import TOP_DOWN_GROUPS, Rasteriser
@@ -26,23 +26,14 @@ _PROFILE = RenderProfile("floorplan", supersampling=2.0, skybox=False)
 
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
-    """An orthographic picture; north (+y) is up.
+    """An orthographic picture; north (+y) is up."""
 
-    Attributes:
-        rgb: Picture, uint8, shape (height, width, 3), rows from the top.
-        bounds: What it shows: xmin, ymin, xmax, ymax, m.
-        pixels_per_metre: Its scale.
-    """
-
-    rgb: NDArray[np.uint8]
-    bounds: tuple[float, float, float, float]
+    rgb: NDArray[np.uint8]  # picture, uint8, shape (height, width, 3), rows from the top
+    bounds: tuple[float, float, float, float]  # xmin, ymin, xmax, ymax, m
     pixels_per_metre: float
 
     def to_pixels(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Points in the house (k, 2), m, as columns and rows (k, 2).
-
-        Pixel (column, row) covers [column, column + 1) x [row, row + 1); its centre lies half a pixel in.
-        """
+        """Points in the house (k, 2), m, as columns and rows (k, 2); centres of pixels are half a pixel in."""
         points = np.asarray(xy, dtype=np.float64)
         corner = np.array([self.bounds[0], self.bounds[3]])
         return np.asarray((points - corner) * [self.pixels_per_metre, -self.pixels_per_metre])
@@ -54,17 +45,7 @@ def render_floorplan(
     bounds: tuple[float, float, float, float],
     pixels_per_metre: float = 60.0,
 ) -> FloorPlan:
-    """Draw the house from above without its ceilings (geom group 1), and without the person.
-
-    Args:
-        model: Compiled model.
-        data: Its state.
-        bounds: xmin, ymin, xmax, ymax in m; the right and lower edges move outward to whole pixels.
-        pixels_per_metre: Scale.
-
-    Raises:
-        RenderError: No OpenGL context can be made, or the bounds or the scale are unusable.
-    """
+    """Draw the house from above, without ceilings (geom group 1) and person, within (xmin, ymin, xmax, ymax), m."""
     xmin, ymin, xmax, ymax = bounds
     if not (np.isfinite(bounds).all() and xmin < xmax and ymin < ymax and pixels_per_metre > 0):
         raise RenderError(
@@ -77,7 +58,7 @@ def render_floorplan(
             f"a floor plan of {width} x {height} pixels is too large; lower pixels_per_metre={pixels_per_metre}"
         )
     xmax, ymin = xmin + width / pixels_per_metre, ymax - height / pixels_per_metre
-    view = View(
+    view = ViewVolume(
         position=np.array([(xmin + xmax) / 2, (ymin + ymax) / 2, _HEIGHT]),
         rotation=look_rotation(np.array([0.0, 0.0, -1.0])),
         half_height=(ymax - ymin) / 2,
@@ -109,15 +90,7 @@ def largest_scale(bounds: tuple[float, float, float, float]) -> float:
 def render_house_map(
     catalogue: Catalogue, bounds: tuple[float, float, float, float], pixels_per_metre: float = 40.0
 ) -> NDArray[np.uint8]:
-    """The tidy house from above, without objects and person, as a picture for a map.
-
-    Args:
-        catalogue: Of the house.
-        bounds: What it shows: xmin, ymin, xmax, ymax, m.
-        pixels_per_metre: Scale; a smaller one where the house is too large for it.
-
-    Returns:
-        RGBA, uint8, shape (height, width, 4), opaque.
+    """The tidy house from above within (xmin, ymin, xmax, ymax), m, as RGBA, uint8, (height, width, 4).
 
     Raises:
         AssetError: The house does not compile.

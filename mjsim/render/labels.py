@@ -19,27 +19,20 @@ _SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Turns geom ids into instances and categories; -1 stays -1.
+    """Turns geom ids into instances and categories; -1 stays -1."""
 
-    Attributes:
-        instances: Names by instance number: `house`, `person`, the receptacles' keys, the objects' names.
-        categories: Names by category number: `house`, `person`, `receptacle`, the objects' categories.
-        instance_of_geom: Instance number per geom and, last, -1 for the background, int32, shape (ngeom + 1,).
-        category_of_instance: Category number per instance and, last, -1 for the background, int32.
-    """
-
+    # names by instance number: `house`, `person`, the receptacles' keys, the objects' names
     instances: tuple[str, ...]
+    # names by category number: `house`, `person`, `receptacle`, the objects' categories
     categories: tuple[str, ...]
+    # instance number per geom and, last, -1 for the background, int32, shape (ngeom + 1,)
     instance_of_geom: NDArray[np.int32]
+    # category number per instance and, last, -1 for the background, int32
     category_of_instance: NDArray[np.int32]
 
     @classmethod
     def of(cls, scene: Scene) -> "Labels":
-        """Labels of a composed episode; equal episodes have equal labels.
-
-        Raises:
-            RenderError: A receptacle's geoms cannot be found in the model.
-        """
+        """Labels of a composed episode; equal episodes have equal labels."""
         model, keys = scene.model, tuple(scene.receptacles)
         instances = (HOUSE, PERSON, *keys, *scene.index.names)
         of_geom = np.zeros(model.ngeom + 1, np.int32)
@@ -72,11 +65,7 @@ class Labels:
 
 
 def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
-    """Ids of a receptacle's geoms.
-
-    Static bodies may have been fused into the house, so that the receptacle's body is no longer there. Its geoms are
-    then those that stand where the receptacle's own model, put at its mount, has them.
-    """
+    """Ids of a receptacle's geoms: where its body has been fused into the house, those that lie as in its own model."""
     model = scene.model
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{key}/receptacle")
     if body >= 0:

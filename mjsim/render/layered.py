@@ -1,51 +1,33 @@
-"""Films from outside: while the camera stands still, what stands still is drawn once."""
+"""Films from outside: while the camera rests, everything at rest is drawn once."""
 
-from collections.abc import Collection, Sequence
-from typing import Any, Self
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.render import context
-from mjsim.render.cameras import CameraPose, View
+from mjsim.render.cameras import CameraPose, ViewVolume
 from mjsim.render.markers import MarkerLike, blend_hidden
-from mjsim.render.profiles import RenderProfile, resolve_profile
-from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Layer, Rasteriser
+from mjsim.render.rasteriser import Layer
+from mjsim.render.renderer import OffScreenRenderer
 
 REST = 25  # frames without movement after which something counts as standing still again
 
 
-class LayeredRenderer:
-    """Draws a model off screen, several times as fast as a `Renderer` while the camera stands still.
+class LayeredRenderer(OffScreenRenderer):
+    """Draws a model off screen, several times as fast as a `Renderer` while the camera rests.
 
     What moves, and the markers, are drawn over a picture of the rest by their depth; what comes to rest joins the rest.
     Profiles with shadow maps, mirrors or multisampling are drawn in full, as everything changes everything there; so
     are moving things that one can see through, as they have no depth. What moves behind something shows faintly,
-    as x-ray markers do. Use as a context manager.
-
-    Args:
-        model: Compiled model.
-        width: Of the frames, pixels.
-        height: Of the frames, pixels.
-        profile: `draft`, `fast`, `quality` or a profile of your own.
-        groups: Geom groups that are shown (docs/models.md).
-
-    Raises:
-        RenderError: No OpenGL context can be made, or the size or profile is unusable.
+    as x-ray markers do.
     """
 
-    def __init__(
-        self,
-        model: Any,
-        *,
-        width: int = 640,
-        height: int = 480,
-        profile: str | RenderProfile = "fast",
-        groups: Collection[int] = FIRST_PERSON_GROUPS,
-    ) -> None:
-        settings = resolve_profile(profile)
-        self._layered = not (settings.shadow_size or settings.reflections or settings.samples)
-        self._rasteriser = Rasteriser(model, width, height, settings, groups)
+    def __init__(self, model: Any, **options: Any) -> None:
+        super().__init__(model, **options)
+        profile = self._profile
+        self._layered = not (profile.shadow_size or profile.reflections or profile.samples)
         self._camera: CameraPose | None = None
         self._translucent = _translucent(model)
         self._still = np.full(model.ngeom, REST)  # frames since each geom moved
@@ -54,19 +36,10 @@ class LayeredRenderer:
         self._rest: Layer | None = None
 
     def rgb(self, data: Any, camera: CameraPose, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
-        """Colour image (height, width, 3), rows from the top.
-
-        Args:
-            data: State of the model.
-            camera: Where it is seen from; the camera stands still as long as this is the same object.
-            markers: World-locked objects to draw.
-
-        Raises:
-            RenderError: Unusable marker, foreign data, or the renderer is closed.
-        """
+        """Colour image (height, width, 3), rows from the top; the camera rests while it is the same object."""
         with context.current_context():
             self._rasteriser.update(data)
-            view, still = View.of(camera), camera is self._camera
+            view, still = ViewVolume.of(camera), camera is self._camera
             self._camera = camera
             if not (self._layered and still) or np.any(self._note_movement(data) & self._translucent):
                 self._rest = None
@@ -85,7 +58,7 @@ class LayeredRenderer:
         self,
         frame: NDArray[np.uint8],
         depth: NDArray[np.float32],
-        view: View,
+        view: ViewVolume,
         markers: Sequence[MarkerLike],
     ) -> None:
         """Blend markers that one can see through into a drawing in place; drawn as they are they leave no depth."""
@@ -108,27 +81,17 @@ class LayeredRenderer:
         self._poses = poses
         return self._moves
 
-    def _background(self, view: View) -> Layer:
-        """All that stands still; drawn anew when something begins or ceases to."""
+    def _background(self, view: ViewVolume) -> Layer:
+        """Everything at rest; drawn again when something starts or stops moving."""
         moving = self._moves
         if self._rest is None or self._moving is None or np.any(moving != self._moving):
             self._moving = moving
             self._rest = self._rasteriser.layer(view, hidden=moving, lowest=True)
         return self._rest
 
-    def close(self) -> None:
-        """Free the GL resources; again does nothing."""
-        self._rasteriser.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 class _Solid:
-    """A marker as it would be if nobody could see through it."""
+    """An opaque copy of a marker."""
 
     def __init__(self, marker: MarkerLike) -> None:
         self.shape, self.position, self.size = marker.shape, marker.position, marker.size

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.errors import RenderError
-from mjsim.render.cameras import View
+from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import outside
 
 MAX_MARKERS = 1024
@@ -61,8 +61,7 @@ class MarkerLike(Protocol):
 def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False) -> None:
     """Append markers to a scene's geoms; `flat` gives their exact colour, opaque, without any light.
 
-    Raises:
-        RenderError: There are too many markers, or one has an unknown shape or unusable numbers.
+    `RenderError` where there are too many markers, or one has an unknown shape or unusable numbers.
     """
     if len(markers) > MAX_MARKERS:
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
@@ -83,15 +82,7 @@ def add_decorative_geom(
     position: NDArray[np.float64],
     rgba: NDArray[np.float32],
 ) -> Any:
-    """Append an upright geom that belongs to no model, does not shine and takes no part in segmentation; returns it.
-
-    Args:
-        scene: With room for one more geom.
-        shape: Kind of geom.
-        size: In MuJoCo's convention for the shape, m, shape (3,).
-        position: Centre, m, shape (3,).
-        rgba: Colour and opacity, 0 to 1, shape (4,).
-    """
+    """Append an upright geom that belongs to no model, does not shine and is left out of segmentation."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, shape, size, position, np.eye(3).ravel(), rgba)
     # Initialisation leaves these as they were, so that a slot may still name a geom of another scene.
@@ -118,12 +109,8 @@ def blend_hidden(
     frame[hidden] = np.round(mixed).astype(np.uint8)
 
 
-def in_view(view: View, aspect: float, markers: Sequence[MarkerLike]) -> list[MarkerLike]:
-    """The markers that a frame can show, in their order.
-
-    Raises:
-        RenderError: As for `add_markers`.
-    """
+def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> list[MarkerLike]:
+    """The markers that a frame can show, in their order; raises as `add_markers`."""
     if len(markers) > MAX_MARKERS:
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
     if not markers:
@@ -137,11 +124,7 @@ def in_view(view: View, aspect: float, markers: Sequence[MarkerLike]) -> list[Ma
 
 
 def geom_size(marker: MarkerLike) -> NDArray[np.float64]:
-    """Sizes (3,) in MuJoCo's convention for the marker's shape, m.
-
-    Raises:
-        RenderError: The shape is unknown, or a size is missing or not positive.
-    """
+    """Sizes (3,) in MuJoCo's convention for the marker's shape, m; `RenderError` where they are unusable."""
     if marker.shape not in _SHAPES:
         raise RenderError(f"marker shape {marker.shape!r} is unknown; use one of {sorted(_SHAPES)}")
     size = _numbers(marker, "size", _SIZES[marker.shape])

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.kernels import inlined, kernel
-from mjsim.render.cameras import View
+from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import Bounds
 
 # Both in-plane half-sizes of a box that is worth testing against, m.
-_LARGE = 0.4
+_MIN_HALF_SIZE = 0.4
 # How many boxes are tested, those that look largest first: further ones hide nothing more in a house.
 _TESTED = 40
 # Metres; far above rounding in single precision.
@@ -23,17 +23,11 @@ _MARGIN = 0.01
 
 
 class BoxOccluders:
-    """The large boxes of a model, which may hide other geoms.
-
-    Args:
-        model: Compiled model.
-        bounds: What its geoms fill.
-        shown: Which geoms are drawn, shape (ngeom,).
-    """
+    """The large boxes of a model, which may hide other geoms, among those `shown` (ngeom,)."""
 
     def __init__(self, model: Any, bounds: Bounds, shown: NDArray[np.bool_]) -> None:
         size = model.geom_size
-        box = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (np.sort(size, axis=1)[:, 1] > _LARGE)
+        box = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (np.sort(size, axis=1)[:, 1] > _MIN_HALF_SIZE)
         self._model = model
         self._bounds = bounds
         self._shown = shown & (bounds.radii > 0.0)
@@ -42,24 +36,13 @@ class BoxOccluders:
 
     def unseen(
         self,
-        view: View,
+        view: ViewVolume,
         aspect: float,
         positions: NDArray[np.float64],
         rotations: NDArray[np.float64],
         seen: NDArray[np.bool_],
     ) -> NDArray[np.bool_]:
-        """Which geoms stand wholly beside the view, or behind one of the boxes.
-
-        Args:
-            view: Perspective; in parallel views nothing is left out here.
-            aspect: Width over height of the image.
-            positions: Of the geoms, shape (ngeom, 3), m.
-            rotations: Of the geoms, shape (ngeom, 3, 3).
-            seen: Geoms that are in the view, shape (ngeom,).
-
-        Returns:
-            Mask, shape (ngeom,).
-        """
+        """Which geoms (ngeom,) of those seen are wholly beside a perspective view, or behind one of the boxes."""
         result = np.zeros(len(seen), dtype=bool)
         if view.orthographic:
             return result
@@ -72,7 +55,7 @@ class BoxOccluders:
         return result
 
     def _shadows(
-        self, view: View, aspect: float, positions: NDArray[np.float64], rotations: NDArray[np.float64]
+        self, view: ViewVolume, aspect: float, positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Inward normals (k, 5, 3) and distances from the eye, m, (k, 5), of the planes around each box's shadow.
 
@@ -103,13 +86,7 @@ class BoxOccluders:
 def _side_planes(
     centre: NDArray[np.float64], across: NDArray[np.float64], along: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Inward unit normals (k, 4, 3) of the planes through the eye and the edges of rectangles.
-
-    Args:
-        centre: Of the rectangles, seen from the eye, m, shape (k, 3).
-        across: From the centre to the middle of one edge, m, shape (k, 3).
-        along: From the centre to the middle of the next edge, m, shape (k, 3).
-    """
+    """Inward unit normals (k, 4, 3) of the planes through the eye and the edges of rectangles, seen from it."""
     one, other = centre + across, centre - across
     corners = np.stack([one + along, other + along, other - along, one - along], axis=1)
     sides = np.cross(corners, np.roll(corners, -1, axis=1))
@@ -117,7 +94,7 @@ def _side_planes(
     return np.asarray(sides * np.sign(np.einsum("kij,kj->ki", sides, centre))[..., None])
 
 
-def _pyramid(view: View, aspect: float) -> NDArray[np.float64]:
+def _pyramid(view: ViewVolume, aspect: float) -> NDArray[np.float64]:
     """Inward unit normals (4, 3) of the sides of what a perspective view sees; all pass through the eye."""
     right, up, backward = view.rotation.T
     horizontal, vertical = -view.half_height * aspect * backward, -view.half_height * backward
@@ -134,15 +111,9 @@ def _outside_or_covered(
     rotations: NDArray[np.float64],
     boxes: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Which boxes lie outside one side of the view, or inside all planes of one shadow, shape (c,).
+    """Which boxes (c,) lie outside one side of the view, or inside all planes of one shadow.
 
-    Args:
-        pyramid: Inward normals of the sides of the view, shape (4, 3).
-        planes: Inward normals of the shadows, shape (k, 5, 3).
-        offsets: Distances of these planes from the eye, shape (k, 5), m.
-        away: Origins of the boxes' frames seen from the eye, shape (c, 3), m.
-        rotations: Of the boxes' frames, shape (c, 3, 3).
-        boxes: Centres and half-sizes in those frames, shape (c, 6), m.
+    Takes inward normals of the view (4, 3) and of the shadows (k, 5, 3), offsets of these, m, and frames and boxes.
     """
     result = np.zeros(len(away), np.bool_)
     for c in range(len(away)):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mjsim.errors import AssetError, RenderError
 from mjsim.model.catalogue import Catalogue
-from mjsim.render.cameras import View, look_rotation
+from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Rasteriser
@@ -35,14 +35,7 @@ _PROFILE = RenderProfile("picture", skybox=False)
 
 
 def render_pictures(catalogue: Catalogue, size: int = 96) -> dict[str, NDArray[np.uint8]]:
-    """Draw every object model and receptacle of a catalogue by itself.
-
-    Args:
-        catalogue: Names the model files.
-        size: Side of the pictures, pixels.
-
-    Returns:
-        `object:<key>` and `receptacle:<key>` -> RGBA (size, size, 4), straight alpha, rows from the top.
+    """RGBA pictures (size, size, 4), straight alpha, by `object:<key>` and `receptacle:<key>`.
 
     Raises:
         AssetError: A model file does not compile.
@@ -54,12 +47,7 @@ def render_pictures(catalogue: Catalogue, size: int = 96) -> dict[str, NDArray[n
 
 
 def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
-    """Draw one MJCF file: RGBA (size, size, 4), straight alpha, rows from the top.
-
-    Raises:
-        AssetError: The file does not compile.
-        RenderError: As for `render_pictures`.
-    """
+    """Draw one MJCF file: RGBA (size, size, 4), straight alpha, rows from the top; raises as `render_pictures`."""
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
@@ -68,11 +56,7 @@ def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
 
 
 def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
-    """Draw a compiled model: RGBA (size, size, 4), straight alpha, rows from the top; errors call it `name`.
-
-    Raises:
-        RenderError: As for `render_pictures`.
-    """
+    """Draw a compiled model: RGBA (size, size, 4), straight alpha, rows from the top; errors call it `name`."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if not 1 <= size <= 1024:
@@ -85,7 +69,7 @@ def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
     return _reduce(colour, mask, size)
 
 
-def _first_view(model: Any, data: Any) -> View:
+def _first_view(model: Any, data: Any) -> ViewVolume:
     """Orthographic view that is sure to hold the whole model."""
     low, high = _bounds(model, data)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -93,7 +77,7 @@ def _first_view(model: Any, data: Any) -> View:
     elevation = _ELEVATION_FLAT if flat else _ELEVATION
     level = np.array([np.sin(_AZIMUTH), -np.cos(_AZIMUTH), 0.0]) * np.cos(elevation)
     backward = level + np.array([0.0, 0.0, np.sin(elevation)])
-    return View(
+    return ViewVolume(
         position=centre + _DISTANCE * backward,
         rotation=look_rotation(-backward),
         half_height=1.05 * radius,
@@ -115,7 +99,7 @@ def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
     return (centres - halves).min(axis=0), (centres + halves).max(axis=0)
 
 
-def _framed(rasteriser: Rasteriser, view: View, name: str) -> View:
+def _framed(rasteriser: Rasteriser, view: ViewVolume, name: str) -> ViewVolume:
     """The view shifted and scaled so that what is seen fills the picture; twice, the second time finely."""
     for _ in range(2):
         mask = rasteriser.geometry(view)[0] >= 0

@@ -54,11 +54,7 @@ PROFILES = {profile.name: profile for profile in (DRAFT, FAST, QUALITY)}
 
 
 def resolve_profile(profile: str | RenderProfile) -> RenderProfile:
-    """The profile itself, or the one of that name: `draft`, `fast` or `quality`.
-
-    Raises:
-        RenderError: No profile has that name.
-    """
+    """The profile itself, or the one of that name: `draft`, `fast` or `quality`; `RenderError` for another name."""
     if isinstance(profile, RenderProfile):
         return profile
     if profile not in PROFILES:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mjsim.errors import RenderError
 from mjsim.render import context
-from mjsim.render.cameras import View
+from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import Bounds, outside, without
 from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, blend_hidden, in_view
 from mjsim.render.occlusion import BoxOccluders
@@ -34,30 +34,16 @@ _FAR_UP = 1e4  # m; nothing up there throws a spot on the floor
 
 
 class Layer(NamedTuple):
-    """Part of a scene as it was drawn, rows from the bottom, before it is reduced to the size of a frame.
+    """Part of a scene as it was drawn, rows from the bottom, before it is reduced to the size of a frame."""
 
-    Attributes:
-        colour: uint8, shape (h, w, 3).
-        depth: Reversed depth, 1 at the near plane, 0 where nothing was drawn, shape (h, w).
-    """
-
-    colour: NDArray[np.uint8]
-    depth: NDArray[np.float32]
+    colour: NDArray[np.uint8]  # uint8, (h, w, 3)
+    depth: NDArray[np.float32]  # reversed depth, 1 at the near plane, 0 where nothing was drawn, (h, w)
 
 
 class Rasteriser:
     """GL resources of one model. Update and draw under one `current_context` where threads share it.
 
-    Args:
-        model: Compiled model.
-        width: Of the frames, px.
-        height: Of the frames, px.
-        profile: Cost and looks.
-        groups: Geom groups that are shown.
-        lights: Replace the model's lights; None for the model's own.
-
-    Raises:
-        RenderError: No OpenGL context can be made, or a side is unusable.
+    Sizes are those of the frames, px; `groups` are the geom groups that are shown; `lights` replace the model's lights.
     """
 
     def __init__(
@@ -120,11 +106,7 @@ class Rasteriser:
         self.close()
 
     def update(self, data: Any) -> None:
-        """Take the geoms' poses and colours from `data`.
-
-        Raises:
-            RenderError: It is closed, or `data` belongs to another model.
-        """
+        """Take the geoms' poses and colours from `data`; `RenderError` if it belongs to another model."""
         if self.closed:
             raise RenderError("the renderer is closed; make a new one")
         if len(data.geom_xpos) != self._model.ngeom or len(data.qpos) != self._model.nq:
@@ -138,7 +120,7 @@ class Rasteriser:
         if self._lights is not None:
             set_lights(self._scene, self._lights)
 
-    def colour(self, view: View, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
+    def colour(self, view: ViewVolume, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
         """Frame (height, width, 3) of the scene as last updated, rows from the top."""
         scene, model_geoms = self._scene, self._scene.ngeom
         set_flags(scene, self._profile)
@@ -156,7 +138,7 @@ class Rasteriser:
         return reduced(self._colour, self._size)
 
     def geometry(
-        self, view: View, markers: Sequence[MarkerLike] = ()
+        self, view: ViewVolume, markers: Sequence[MarkerLike] = ()
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Geom ids (height, width), -1 for background and markers, and raw reversed depth of one pass."""
         scene, model_geoms = self._scene, self._scene.ngeom
@@ -183,20 +165,13 @@ class Rasteriser:
 
     def layer(
         self,
-        view: View,
+        view: ViewVolume,
         markers: Sequence[MarkerLike] = (),
         *,
         hidden: NDArray[np.bool_],
         lowest: bool = False,
     ) -> Layer:
-        """The scene as last updated without some of its geoms.
-
-        Args:
-            view: Where it is seen from.
-            markers: World-locked objects to draw.
-            hidden: Geoms that are left out, shape (ngeom,).
-            lowest: Whether this is the lowest layer, which has the sky and the dark spots under objects.
-        """
+        """The scene as last updated without `hidden` geoms (ngeom,); the `lowest` layer has sky and contact spots."""
         scene, model_geoms = self._scene, self._scene.ngeom
         set_flags(scene, self._profile)
         scene.flags[_Flag.mjRND_SKYBOX] &= lowest
@@ -222,7 +197,7 @@ class Rasteriser:
         """Width over height, of the drawing or the frame: rounding makes them differ."""
         return max(width / height for width, height in (self._size, self._drawn))
 
-    def _unseen(self, view: View, profile: RenderProfile | None = None) -> NDArray[np.bool_]:
+    def _unseen(self, view: ViewVolume, profile: RenderProfile | None = None) -> NDArray[np.bool_]:
         """Geoms (ngeom,) that can leave no trace in this view."""
         if profile is not None and (profile.shadow_size or profile.reflections):
             return np.zeros(self._model.ngeom, dtype=bool)
@@ -243,7 +218,7 @@ class Rasteriser:
         mujoco.mjr_render(rectangle, scene, self._gl)
         mujoco.mjr_readPixels(colour, depth, rectangle, self._gl)
 
-    def _add_x_ray(self, view: View, markers: Sequence[MarkerLike]) -> None:
+    def _add_x_ray(self, view: ViewVolume, markers: Sequence[MarkerLike]) -> None:
         """Blend the hidden parts of x-ray markers into the colour buffer, after the scene was drawn."""
         if not markers:
             return

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mjsim.model.avatar import EYE
 from mjsim.render import context
-from mjsim.render.cameras import CameraPose, View, camera_pose
+from mjsim.render.cameras import CameraPose, ViewVolume, camera_pose
 from mjsim.render.markers import MarkerLike
 from mjsim.render.profiles import RenderProfile, resolve_profile
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Rasteriser
@@ -17,33 +17,23 @@ from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Rasteriser
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Images of one moment from one camera, rows from the top; None where not asked for.
+    """Images of one moment from one camera, rows from the top; None where not asked for."""
 
-    Attributes:
-        camera: Where it was seen from.
-        rgb: Colour, uint8, shape (height, width, 3).
-        depth: Distance along the optical axis, m, inf where nothing is, float32, shape (height, width).
-        segmentation: Geom ids, -1 where nothing is, int32, shape (height, width).
-    """
-
-    camera: CameraPose
-    rgb: NDArray[np.uint8] | None
+    camera: CameraPose  # where it was seen from
+    rgb: NDArray[np.uint8] | None  # colour, uint8, shape (height, width, 3)
+    # distance along the optical axis, m, inf where nothing is, float32, shape (height, width)
     depth: NDArray[np.float32] | None
-    segmentation: NDArray[np.int32] | None
+    segmentation: NDArray[np.int32] | None  # geom ids, -1 where nothing is, int32, shape (height, width)
 
 
-class Renderer:
-    """Draws a model off screen.
-
-    Any thread may call it; calls take turns. Frames are bit-identical over calls and processes on one OpenGL
-    driver (see `gl_info`). Poses are those of the last `mj_forward` or `mj_step` of the data. Close it, or use
-    it as a context manager.
+class OffScreenRenderer:
+    """Owns the rasteriser of one model. Close it, or use it as a context manager.
 
     Args:
         model: Compiled model.
         width: Of the frames, pixels.
         height: Of the frames, pixels.
-        profile: `draft`, `fast`, `quality` or a profile of your own.
+        profile: `draft`, `fast`, `quality` or a custom profile.
         groups: Geom groups that are shown (docs/models.md).
 
     Raises:
@@ -62,6 +52,24 @@ class Renderer:
         self._model = model
         self._profile = resolve_profile(profile)
         self._rasteriser = Rasteriser(model, width, height, self._profile, groups)
+
+    def close(self) -> None:
+        """Free the GL resources; again does nothing."""
+        self._rasteriser.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Renderer(OffScreenRenderer):
+    """Draws a model off screen.
+
+    Any thread may call it; calls take turns. Frames are bit-identical over calls and processes on one OpenGL
+    driver (see `gl_info`). Poses are those of the last `mj_forward` or `mj_step` of the data.
+    """
 
     @property
     def width(self) -> int:
@@ -161,7 +169,7 @@ class Renderer:
     def _frame(
         self, pose: CameraPose, markers: Sequence[MarkerLike], rgb: bool, depth: bool, segmentation: bool
     ) -> Frame:
-        view = View.of(pose)
+        view = ViewVolume.of(pose)
         colour = self._rasteriser.colour(view, markers) if rgb else None
         ids, raw = self._rasteriser.geometry(view) if depth or segmentation else (None, None)
         metres = view.metres(raw) if depth and raw is not None else None
@@ -175,16 +183,6 @@ class Renderer:
         """
         return camera_pose(self._model, data, camera, self.width / self.height)
 
-    def _look(self, data: Any, camera: str | CameraPose) -> View:
+    def _look(self, data: Any, camera: str | CameraPose) -> ViewVolume:
         self._rasteriser.update(data)
-        return View.of(camera_pose(self._model, data, camera, self.width / self.height))
-
-    def close(self) -> None:
-        """Free the GL resources; again does nothing."""
-        self._rasteriser.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        return ViewVolume.of(camera_pose(self._model, data, camera, self.width / self.height))

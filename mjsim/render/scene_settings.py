@@ -1,4 +1,4 @@
-"""What MuJoCo's renderer is told: which geoms, which lights, which effects, how large the buffers."""
+"""Settings of MuJoCo's renderer: geoms, lights, effects and buffer sizes."""
 
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,25 +16,15 @@ _Flag = mujoco.mjtRndFlag
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """A light at infinity that replaces the model's lights.
+    """A light at infinity that replaces the model's lights."""
 
-    Attributes:
-        direction: Where its rays travel, any length.
-        diffuse: Strength where it falls upright.
-        ambient: Strength everywhere.
-    """
-
-    direction: tuple[float, float, float]
-    diffuse: float
-    ambient: float = 0.0
+    direction: tuple[float, float, float]  # where its rays travel, any length
+    diffuse: float  # strength where it falls upright
+    ambient: float = 0.0  # strength everywhere
 
 
 def checked_size(pixels: int) -> int:
-    """The number itself.
-
-    Raises:
-        RenderError: It is no integer from 1 to `MAX_SIDE`.
-    """
+    """The number itself; `RenderError` where it is no integer from 1 to `MAX_SIDE`."""
     if not isinstance(pixels, int | np.integer) or not 1 <= pixels <= MAX_SIDE:
         raise RenderError(f"frame sides must be integers from 1 to {MAX_SIDE} pixels, got {pixels!r}")
     return int(pixels)

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.render.cameras import View
+from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import outside
 from mjsim.render.markers import add_decorative_geom
 
@@ -27,12 +27,7 @@ _REACH = 0.3
 
 
 class ContactShadows:
-    """The free bodies of a model and the spots under them.
-
-    Args:
-        model: Compiled model; its floor lies at z = 0.
-        shown: Which geoms are drawn, shape (ngeom,).
-    """
+    """The free bodies of a model with its floor at z = 0, and the spots under those `shown` (ngeom,)."""
 
     def __init__(self, model: Any, shown: NDArray[np.bool_]) -> None:
         free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
@@ -53,20 +48,12 @@ class ContactShadows:
     def add(
         self,
         scene: Any,
-        view: View,
+        view: ViewVolume,
         aspect: float,
         positions: NDArray[np.float64],
         rotations: NDArray[np.float64],
     ) -> None:
-        """Append the spots that are in view to a scene's geoms.
-
-        Args:
-            scene: With room for `count` more geoms.
-            view: What the frame sees.
-            aspect: Width over height of the image.
-            positions: Of the model's geoms, shape (ngeom, 3), m.
-            rotations: Of the model's geoms, shape (ngeom, 3, 3).
-        """
+        """Append the spots that are in view to a scene with room for `count` more geoms."""
         if not len(self._starts) or self._material < 0:
             return
         low, high = self._boxes(positions[self._geoms], rotations[self._geoms])

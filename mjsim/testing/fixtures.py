@@ -1,4 +1,4 @@
-"""Pytest fixtures. Import the one you want into your `conftest.py`; this module alone needs pytest."""
+"""Pytest fixtures. Import them into your `conftest.py`; this module alone needs pytest."""
 
 import re
 from collections.abc import Callable
@@ -15,15 +15,16 @@ GoldenFrame = Callable[..., Comparison]
 
 @pytest.fixture
 def golden_frame(request: pytest.FixtureRequest, tmp_path: Path) -> GoldenFrame:
-    """Compares a frame with `golden/<name>.png` beside the test file; images of a failure go to `tmp_path`.
+    """Compares a frame with `golden/<name>.png` beside the test file, or in the nearest folder above it that has one.
 
     `golden_frame(frame)` takes the test's own name, `golden_frame(frame, "hall")` another; other arguments are those
-    of `mjsim.testing.compare_frame`.
+    of `mjsim.testing.compare_frame`. Images of a failure go to `tmp_path`.
     """
 
     def compare(frame: NDArray[np.uint8], name: str | None = None, **options: object) -> Comparison:
         stem = name or re.sub(r"[^\w.-]+", "_", request.node.name).strip("_")
-        folder = request.path.parent / "golden"
+        parents = [parent / "golden" for parent in request.path.parents]
+        folder = next((golden for golden in parents if golden.is_dir()), parents[0])
         return compare_frame(frame, folder / f"{stem}.png", **{"output": tmp_path, **options})  # type: ignore[arg-type]
 
     return compare

@@ -1,4 +1,4 @@
-"""A good tour quickly: simulated annealing over the order of picks, with drops decoded optimally."""
+"""A good tour quickly: simulated annealing over the order of picks, with the best places to leave objects for each."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,9 @@ def uniform(state: NDArray[np.uint64]) -> float:
 
 @kernel
 def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
-    """What may be dropped before the next pick: up to four (bin, then bin, still held), m for none.
+    """What may be left before the next pick: up to four (bin, then bin, still held), m for none.
 
-    Args:
-        m: Number of bins.
-        held: Bin of the object in hand, m for none.
-        other: Bin of the other object in hand, m for none.
+    `held` and `other` are the bins of what is in hand, of m bins, m for none.
     """
     never = (m, m, -1)
     if held == m:
@@ -58,14 +55,10 @@ def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
 
 @kernel
 def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[np.int64]) -> int:
-    """Least length of a tour that picks in a given order.
+    """Least length of a tour that picks in a given order (n,).
 
-    Args:
-        inst: The instance.
-        order: Objects in order, (n,).
-        start: Rows of `costs` before this one are valid already.
-        costs: Row t, entry d: at pick t with another object for bin d in hand (m: none), (n + 1, m + 1); row n
-            is the end.
+    Row t of `costs`, entry d, is that at pick t with another object for bin d in hand (m: none), (n + 1, m + 1); row n
+    is the end. Rows before `start` are valid already.
     """
     n, m = inst.to_bin.shape
     if start == 0:
@@ -117,10 +110,7 @@ def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
 
 @kernel
 def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Actions of a shortest tour that picks in a given order (n,).
-
-    The result has the shape (actions,): k >= 0 picks object k, -1 - b goes to bin b.
-    """
+    """Actions (k >= 0 picks object k, -1 - b goes to bin b) of a shortest tour that picks in a given order (n,)."""
     n, m = inst.to_bin.shape
     costs = np.empty((n + 1, m + 1), np.int64)
     decode(inst, order, 0, costs)
@@ -158,15 +148,9 @@ def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @inlined
 def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArray[np.uint64]) -> int:
-    """Write a neighbour of an order: two objects swapped, some in a row reversed, or one moved.
+    """Write a neighbour of an order (n,): two objects swapped, some in a row reversed, or one moved.
 
-    Args:
-        order: Order of picks, (n,).
-        candidate: Receives the neighbour, (n,).
-        state: Of the random numbers, (1,).
-
-    Returns:
-        The first position that may have changed.
+    `state` is that of `uniform`. Returns the first position that may have changed.
     """
     n = order.size
     i = int(uniform(state) * n)
@@ -202,18 +186,9 @@ def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64
 def anneal_from(
     inst: Instance, seed: int, moves: int, first: NDArray[np.int64], hot: float, cold: float
 ) -> tuple[int, NDArray[np.int64]]:
-    """Simulated annealing.
+    """Simulated annealing from an order of picks (n,), with temperatures in mean legs at the beginning and the end.
 
-    Args:
-        inst: The instance.
-        seed: Of the random moves.
-        moves: How many to try.
-        first: Order of picks to start from, (n,).
-        hot: Temperature at the beginning, mean legs.
-        cold: Temperature at the end, mean legs.
-
-    Returns:
-        Length of the best tour, and its order of picks (n,).
+    Returns the length of the best tour, and its order of picks (n,).
     """
     n, m = inst.to_bin.shape
     state = np.array([seed], np.uint64)

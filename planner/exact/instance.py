@@ -1,4 +1,4 @@
-"""A routing problem for capacity two as the flat arrays that the exact kernels work on."""
+"""A routing problem for one or two hands as the flat arrays that the exact kernels work on."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,37 +15,26 @@ FAR = 1 << 59  # longer than any tour
 class Instance(NamedTuple):
     """n objects, m bins and the root (where the person is); distances in integer units, int64.
 
-    Attributes:
-        between: Object to object, (n, n); `FAR` from an object to itself.
-        to_bin: Object to bin, (n, m).
-        from_bin: Bin to object, (m, n).
-        bins: Bin to bin, (m, m).
-        home: Bin of each object, (n,) int64.
-        root: Root to object, (n,).
-        root_bin: Root to bin, (m,).
-        carried: Bins of the objects carried at the root, (0..2,) int64.
-        tie: Tours that differ by no more than this are equal, units.
-        unit: m per unit.
+    A leg that full hands do not allow is `FAR`. So one hand needs no kernels of its own: with it, every leg from an
+    object to another one is.
     """
 
-    between: NDArray[np.int64]
-    to_bin: NDArray[np.int64]
-    from_bin: NDArray[np.int64]
-    bins: NDArray[np.int64]
-    home: NDArray[np.int64]
-    root: NDArray[np.int64]
-    root_bin: NDArray[np.int64]
-    carried: NDArray[np.int64]
-    tie: int
-    unit: float
+    between: NDArray[np.int64]  # object to object, (n, n); `FAR` from an object to itself
+    to_bin: NDArray[np.int64]  # object to bin, (n, m)
+    from_bin: NDArray[np.int64]  # bin to object, (m, n)
+    bins: NDArray[np.int64]  # bin to bin, (m, m)
+    home: NDArray[np.int64]  # bin of each object, (n,) int64
+    root: NDArray[np.int64]  # root to object, (n,)
+    root_bin: NDArray[np.int64]  # root to bin, (m,)
+    carried: NDArray[np.int64]  # bins of the objects carried at the root, (0..2,) int64
+    tie: int  # tours that differ by no more than this are equal, units
+    unit: float  # m per unit
 
 
 def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instance:
-    """Flatten a problem; objects are its shipments, bins its delivery locations in ascending order.
+    """Flatten a problem of capacity one or two, with its integer distances, closed to a metric, (k, k).
 
-    Args:
-        problem: Of capacity two.
-        metric: Its integer distances, closed to a metric, (k, k).
+    Objects are its shipments, bins its delivery locations in ascending order.
     """
     pickups = [s.pickup for s in problem.shipments]
     places = sorted({s.delivery for s in problem.shipments} | set(problem.onboard))
@@ -54,15 +43,19 @@ def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instanc
     def block(rows: list[int], columns: list[int]) -> NDArray[np.int64]:
         return metric[np.ix_(rows, columns)]
 
-    between = block(pickups, pickups)
+    between, root = block(pickups, pickups), block([problem.start], pickups)[0]
     np.fill_diagonal(between, FAR)
+    if problem.capacity == 1:
+        between[:] = FAR
+    if len(problem.onboard) == problem.capacity:
+        root[:] = FAR
     return Instance(
         between=between,
         to_bin=block(pickups, places),
         from_bin=block(places, pickups),
         bins=block(places, places),
         home=np.array([index[s.delivery] for s in problem.shipments], dtype=np.int64),
-        root=block([problem.start], pickups)[0],
+        root=root,
         root_bin=block([problem.start], places)[0],
         carried=np.array([index[j] for j in problem.onboard], dtype=np.int64),
         tie=problem.integers.tie,
@@ -73,14 +66,7 @@ def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instanc
 def to_visits(
     instance: Instance, actions: Sequence[int], names: Sequence[str], carried: Sequence[str]
 ) -> list[Visit]:
-    """Turn actions into visits.
-
-    Args:
-        instance: What the actions are of.
-        actions: k >= 0 picks object k, -1 - b goes to bin b and leaves all that belongs there.
-        names: Of the objects of the instance.
-        carried: Names of what is carried at the root.
-    """
+    """Turn actions (k >= 0 picks object k, -1 - b leaves all that belongs in bin b) into visits, by name."""
     held = list(zip(instance.carried.tolist(), carried, strict=True))
     visits: list[Visit] = []
     for action in actions:

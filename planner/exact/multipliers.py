@@ -8,11 +8,9 @@ from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
 from planner.exact.deadline import NEVER, Deadline
-from planner.exact.groups import numbered, together, with_one_alone
 from planner.exact.instance import Instance
-from planner.exact.relaxation import SLICE, fill, fill_rows
-from planner.exact.relaxed_tour import walk
 from planner.exact.table import Table, new_table, rows_of
+from planner.exact.table_kernels import fill, fill_rows, walk
 from planner.exact.warm_start import Start
 
 DECAY = 0.97  # of the record of violations, from one step to the next
@@ -20,45 +18,33 @@ MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
 STEP_ROWS = 60_000  # rows filled by one fit of a large table, about
+SLICE = 1 << 13  # rows that are filled between looks at the clock: some 3 ms
 
 
 STEP, ROW, BEST = range(3)  # progress of an ascent
 
 
 class Ascent(NamedTuple):
-    """Subgradient ascent of multipliers, as far as it has got.
+    """Subgradient ascent of multipliers, as far as it has got."""
 
-    Attributes:
-        current: Multipliers, (n,).
-        direction: Their last change, (n,).
-        violation: As in `Bound`, (n,).
-        best: The multipliers with the best bound, (n,) int64.
-        sizes: Length of each step, as a share of what would close the gap, (steps,).
-        progress: Steps taken, rows filled for the next one, and the best bound, units; (3,) int64.
-    """
-
-    current: NDArray[np.float64]
-    direction: NDArray[np.float64]
-    violation: NDArray[np.float64]
-    best: NDArray[np.int64]
-    sizes: NDArray[np.float64]
-    progress: NDArray[np.int64]
+    current: NDArray[np.float64]  # multipliers, (n,)
+    direction: NDArray[np.float64]  # their last change, (n,)
+    violation: NDArray[np.float64]  # as in `Bound`, (n,)
+    best: NDArray[np.int64]  # the multipliers with the best bound, (n,) int64
+    sizes: NDArray[np.float64]  # length of each step, as a share of what would close the gap, (steps,)
+    progress: NDArray[
+        np.int64
+    ]  # steps taken, rows filled for the next one, and the best bound, units; (3,) int64
 
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """A lower bound of the cost-to-go from every state of an instance.
+    """A lower bound of the cost-to-go from every state of an instance."""
 
-    Attributes:
-        instance: The instance.
-        table: Relaxed cost-to-go.
-        root: Bound at the root, units.
-        violation: How far relaxed tours were from picking each object once, recent ones most, (n,).
-    """
-
-    instance: Instance
-    table: Table
-    root: int
+    instance: Instance  # the instance
+    table: Table  # relaxed cost-to-go
+    root: int  # bound at the root, units
+    # how far relaxed tours were from picking each object once, recent ones most, (n,)
     violation: NDArray[np.float64]
 
     @property
@@ -68,25 +54,17 @@ class Bound:
 
 
 def first_bound(instance: Instance, upper: int) -> Bound:
-    """Fit multipliers with all objects in one group: some 10 ms.
-
-    Args:
-        instance: The instance.
-        upper: Length of a known tour, units.
-    """
+    """Fit multipliers with all objects in one group, some 10 ms; `upper` is the length of a known tour, units."""
     n = len(instance.home)
-    table = new_table(instance, together(n))
+    table = new_table(instance, np.zeros(n, np.int64))
     bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STEP_SIZES, NEVER)
     return cast(Bound, bound)  # it never runs out of time
 
 
 def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
-    """The bound that groups and multipliers give, by one filling of a table.
+    """The bound that the groups and multipliers of a warm start give, by one filling of a table.
 
-    Args:
-        instance: What is left to do.
-        start: Groups and multipliers; the last groups are merged with the first if they are too many.
-        max_rows: Of the table.
+    The last groups are merged with the first if the table would have more than `max_rows`.
     """
     n, group = len(instance.home), start.group.copy()
     while rows_of(group) > max_rows and group.max(initial=0) > 0:
@@ -102,18 +80,12 @@ def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
     """Split the groups and fit again, until the gap closes, the table has reached its size, or time is over.
 
     Each time the object with the largest violation gets a group of its own.
-
-    Args:
-        bound: The bound so far.
-        upper: Length of a known tour, units.
-        max_rows: Of the table.
-        deadline: Stop growing when it is over.
     """
     warm = not bound.violation.any()  # a warm start: first see how good its multipliers are here
     while bound.root < upper - bound.instance.tie:
         group: NDArray[np.int64] | None = bound.table.group
         if not warm:
-            group = with_one_alone(bound.table.group, bound.violation, max_rows)
+            group = _one_apart(bound.table.group, bound.violation, max_rows)
         elif rows_of(bound.table.group) > max_rows:
             break
         warm = False
@@ -127,19 +99,25 @@ def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
     return bound
 
 
+def _one_apart(
+    group: NDArray[np.int64], violation: NDArray[np.float64], max_rows: int
+) -> NDArray[np.int64] | None:
+    """Give the object with the largest violation a group of its own; None if all have one, or it takes more rows."""
+    size = np.bincount(group)[group] if len(group) else group
+    if size.max(initial=1) == 1:
+        return None
+    new = group.copy()
+    new[np.argmax(np.where(size > 1, violation, -1.0))] = group.max() + 1
+    return new if rows_of(new) <= max_rows else None
+
+
 def counted_by_bin(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
     """Group the objects by bin if that gives a better bound.
 
     Where bins are far apart, much of a tour's length is in how often it visits each bin. A small table counts that
     only with these groups.
-
-    Args:
-        bound: The bound so far.
-        upper: Length of a known tour, units.
-        max_rows: Of the table.
-        deadline: Leave the bound as it is when this is over.
     """
-    group = numbered(bound.instance.home)
+    group = np.unique(bound.instance.home, return_inverse=True)[1]
     if bound.root >= upper - bound.instance.tie or rows_of(group) > max_rows:
         return bound
     fitted = _refitted(bound, group, upper, MAX_STEPS, deadline)
@@ -163,19 +141,10 @@ def fit(
     step_sizes: tuple[float, float],
     deadline: Deadline,
 ) -> Bound | None:
-    """Subgradient ascent with momentum (Held, Wolfe and Crowder 1974).
+    """Subgradient ascent with momentum (Held, Wolfe and Crowder 1974) from some multipliers (n,).
 
-    Args:
-        instance: The instance.
-        table: Receives the best table.
-        multipliers: Where to start, (n,).
-        upper: Length of a known tour.
-        steps: How many tables to try.
-        step_sizes: Length of the first and the last step, as a share of what would close the gap.
-        deadline: Stop when it is over.
-
-    Returns:
-        The best bound; None if the deadline was over before.
+    `table` receives the best table. The first and the last of the steps have the given sizes, as a share of what would
+    close the gap to `upper`, the length of a known tour. None if the deadline was over before the first.
     """
     n, first_size, last_size = len(instance.home), *step_sizes
     ascent = Ascent(
@@ -194,16 +163,10 @@ def fit(
 
 @kernel
 def climb(inst: Instance, table: Table, ascent: Ascent, upper: int, rows: int) -> bool:
-    """Go on with an ascent, in place, until so many rows were filled; whether it is finished.
+    """Continue an ascent, in place, until `rows` rows were filled; whether it is finished.
 
-    All in one kernel: a thread that returns to Python after each table would wait for others there.
-
-    Args:
-        inst: The instance.
-        table: Holds the best multipliers, and is filled for them, when all is finished.
-        ascent: Where the ascent is.
-        upper: Length of a known tour, units.
-        rows: How many to fill before returning, 1 or more.
+    Then the table holds the best multipliers, and is filled for them. All is one kernel: a thread that returns to
+    Python after each table would wait for others there.
     """
     n, progress = inst.home.size, ascent.progress
     actions = np.empty(2 * n + 2, np.int64)
@@ -259,15 +222,9 @@ def step(
     direction: NDArray[np.float64],
     violation: NDArray[np.float64],
 ) -> bool:
-    """Raise the price of objects that a relaxed tour picks too often; False if it picks each once.
+    """Raise the prices of objects that a relaxed tour picks too often; False if it picks each once.
 
-    Args:
-        actions: The tour, shape (actions,); k >= 0 picks object k.
-        gap: What the bound lacks, units.
-        step_size: Share of the gap.
-        current: Prices, changed in place, units, (n,).
-        direction: Last change of the prices, changed in place, (n,).
-        violation: As in `Bound`, changed in place, (n,).
+    `gap` is what the bound lacks, units, and `step_size` a share of it; the other arrays are those of `Ascent`.
     """
     n = current.size
     surplus = np.full(n, -1.0)

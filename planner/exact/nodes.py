@@ -9,26 +9,19 @@ from mjsim.kernels import inlined, kernel
 from planner.exact.table import INFINITE
 
 NO_PARENT = -1
+FIRST_ROOM = 1 << 12  # states of a new layer
 
 
 class Nodes(NamedTuple):
-    """States of one layer with a hash index; the arrays have room to grow.
+    """States of one layer with a hash index; the arrays have room to grow."""
 
-    Attributes:
-        size: Number of states, (1,) int64.
-        key: Code of each state, int64.
-        cost: Length of the shortest known path to it, int64.
-        total: Cost plus bound of the cost-to-go, int64.
-        parent: 2 x index of the state before + (1 if that is in the same layer), or `NO_PARENT`, int64.
-        slots: Hash table of indices, -1 where empty, a power of two long, int32.
-    """
-
-    size: NDArray[np.int64]
-    key: NDArray[np.int64]
-    cost: NDArray[np.int64]
-    total: NDArray[np.int64]
+    size: NDArray[np.int64]  # number of states, (1,) int64
+    key: NDArray[np.int64]  # code of each state, int64
+    cost: NDArray[np.int64]  # length of the shortest known path to it, int64
+    total: NDArray[np.int64]  # cost plus bound of the cost-to-go, int64
+    # 2 x index of the state before + (1 if that is in the same layer), or `NO_PARENT`, int64
     parent: NDArray[np.int64]
-    slots: NDArray[np.int32]
+    slots: NDArray[np.int32]  # hash table of indices, -1 where empty, a power of two long, int32
 
 
 @kernel
@@ -57,7 +50,7 @@ def slot_of(nodes: Nodes, key: int) -> int:
 
 @kernel
 def with_room(nodes: Nodes, more: int) -> Nodes:
-    """The same layer with room for so many more states."""
+    """The same layer with room for more states."""
     size = nodes.size[0]
     room = nodes.key.size
     if size + more <= room:
@@ -94,10 +87,7 @@ def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
 
 @kernel
 def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
-    """Least number that at least `count` of the first `size` values, shape (room,), do not exceed.
-
-    By bisection: reading an array 20 times takes no longer than partitioning a copy, and compiles in no time.
-    """
+    """Least number that at least `count` of the first `size` values, shape (room,), do not exceed, by bisection."""
     low, high = INFINITE, -INFINITE
     for k in range(size):
         low, high = min(low, values[k]), max(high, values[k])
@@ -115,7 +105,7 @@ def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
 
 @kernel
 def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
-    """Only the most promising states, and the smallest total dropped (`INFINITE` if none was)."""
+    """Only the most promising states, and the smallest total left out (`INFINITE` if none was)."""
     size = nodes.size[0]
     if size <= width:
         return nodes, INFINITE
@@ -140,10 +130,7 @@ def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
 
 @kernel
 def with_room_among(nodes: Nodes, more: int, width: int) -> tuple[Nodes, int]:
-    """Make room by dropping states that are not among the best 2 `width` when there are twice as many.
-
-    They could not be among the best `width` later either.
-    """
+    """Make room, if need be by leaving out states that cannot be among the best `width` later."""
     smallest = INFINITE
     if nodes.size[0] + more > nodes.key.size and nodes.size[0] > 4 * width:
         nodes, smallest = keep_best(nodes, 2 * width)

@@ -1,256 +1,153 @@
-"""Layered beam search: states by number of picks, pruned by a lower bound of the cost-to-go.
+"""Annealing, then a layered search that widens from pass to pass until the tour is proven or the budget is spent."""
 
-A node is a state (U, place, carried) with the length of the shortest known path to it; layer k holds states with
-k objects picked. A state is coded as U 2^12 + place, where place b m + d means at bin b with an object for d,
-b m + b at bin b with empty hands, and m m + i at object i with only that in hand. Arriving at a second object
-is no state of its own: the next stop is one of two bins.
-"""
-
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import inlined, kernel
-from planner.exact.deadline import Deadline
+from planner.certificate import Certificate, Proof
+from planner.exact.annealing import anneal, anneal_from, tour_actions, warm_order
+from planner.exact.deadline import NEVER, Deadline
+from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import Instance
-from planner.exact.lanes import lowest
-from planner.exact.nodes import NO_PARENT, Nodes, offer, with_room, with_room_among
-from planner.exact.table import INFINITE, Table
+from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
+from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
+from planner.exact.table import BIN_ROWS, INFINITE, Solution
+from planner.exact.warm_start import Start
 
-PLACE_BITS = 12
-SLICE = 1 << 12  # states that are expanded between looks at the clock: some 5 ms
-CARRYING, EMPTY = range(2)  # stages of a layer: states that carry something, states that do not
-STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # progress in a layer
+ANNEALING_MOVES = 10_000
+# A first plan from a warm start: some 20 ms.
+WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
+WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
 
 
-class Expanded(NamedTuple):
-    """The result of expanding a layer.
+def improving_tours(
+    instance: Instance,
+    seed: int,
+    work: int,
+    deadline: Deadline,
+    passes: tuple[tuple[int, int], ...],
+    start: Start | None,
+) -> Iterator[Solution]:
+    """Yield a first tour and bound, then those after each pass of the search.
 
-    Attributes:
-        here: The layer, with states reached by dropping.
-        after: The next layer.
-        smallest: Smallest total dropped from the next layer to save memory, `INFINITE` if none was.
-        states: How many were expanded.
-        end: Index of the end of the shortest complete tour, -1 if there is none.
+    `work` is how many states may be expanded, `seed` that of the annealing; `passes` are those of `ExactSolver`. There
+    is always a first tour; no pass begins after the deadline.
     """
-
-    here: Nodes
-    after: Nodes
-    smallest: int
-    states: int
-    end: int
-
-
-@kernel
-def row_of(table: Table, left: int) -> int:
-    """Row of the bound's table for the set of objects left."""
-    row = 0
-    while left:
-        row += table.stride[lowest(left)]
-        left &= left - 1
-    return row
-
-
-class Arrival(NamedTuple):
-    """The end of a leg of a tour.
-
-    Attributes:
-        left: Set of objects left, as bits.
-        row: Its row in the bound's table.
-        cost: Length so far, multipliers of picks included.
-        parent: As in `Nodes`.
-    """
-
-    left: int
-    row: int
-    cost: int
-    parent: int
+    bound, upper, lower, actions = _first_tour(instance, seed, work, start)
+    yield Solution(actions, min(lower, upper), _certificate(bound))
+    done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
+    for rows, wanted in passes:
+        # A pass that is given up proves nothing, and one hardly wider than the last proves little more.
+        width = min(wanted, work // rate)
+        if lower >= upper - instance.tie or width < min(wanted, done + 1) or deadline.over():
+            break
+        if rows >= BIN_ROWS and not by_bin:  # once: later, the bound has outgrown so few rows
+            bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
+        bound = grown(bound, upper, rows, deadline)
+        result = beam_pass(bound, upper, width, work, deadline)
+        work -= result.expanded
+        done, rate = width, max(1, -(-result.expanded // width))  # a wider pass expands fewer per width
+        lower = max(lower, bound.root, result.lower)
+        if result.actions is not None:
+            upper, actions = result.upper, result.actions
+        yield Solution(actions, min(lower, upper), _certificate(bound))
 
 
-@inlined
-def offer_bin(
-    inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, b: int, d: int, limit: int
-) -> None:
-    """Offer the state at bin b carrying one for d (d = b: nothing), unless its total reaches the limit."""
-    total = arrival.cost + table.bin[arrival.row, b, d]
-    if total < limit:
-        place = b * inst.bins.shape[0] + d
-        offer(nodes, (arrival.left << PLACE_BITS) | place, arrival.cost, total, arrival.parent)
-
-
-@inlined
-def offer_second(
-    inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, j: int, d: int, limit: int
-) -> None:
-    """Pick j with one for d in hand, and offer the state at either bin; the arrival is at j, before the pick."""
-    c = inst.home[j]
-    left, row = arrival.left ^ (1 << j), arrival.row - table.stride[j]
-    cost = arrival.cost + table.multipliers[j]
-    first = Arrival(left, row, cost + inst.to_bin[j, d], arrival.parent)
-    offer_bin(inst, table, nodes, first, d, c, limit)
-    if c != d:
-        second = Arrival(left, row, cost + inst.to_bin[j, c], arrival.parent)
-        offer_bin(inst, table, nodes, second, c, d, limit)
-
-
-@inlined
-def offer_only(inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, i: int, limit: int) -> None:
-    """Pick i with empty hands, and offer the state there; the arrival is at i, before the pick."""
-    cost = arrival.cost + table.multipliers[i]
-    total = cost + table.object[arrival.row - table.stride[i], i]
-    if total < limit:
-        place = inst.bins.shape[0] ** 2 + i
-        offer(nodes, ((arrival.left ^ (1 << i)) << PLACE_BITS) | place, cost, total, arrival.parent)
-
-
-@kernel
-def offer_roots(inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int) -> None:
-    """Put the states that can follow the root into the first two layers."""
-    n = inst.home.size
-    left, row = (1 << n) - 1, table.bin.shape[0] - 1
-    if inst.carried.size == 0:
-        for i in range(n):
-            arrival = Arrival(left, row, int(inst.root[i]), NO_PARENT)
-            offer_only(inst, table, after, arrival, i, limit)
-        return
-    d, other = inst.carried[0], inst.carried[inst.carried.size - 1]
-    offer_bin(inst, table, here, Arrival(left, row, int(inst.root_bin[d]), NO_PARENT), d, other, limit)
-    if inst.carried.size == 2:
-        offer_bin(
-            inst, table, here, Arrival(left, row, int(inst.root_bin[other]), NO_PARENT), other, d, limit
+def _first_tour(
+    instance: Instance, seed: int, work: int, start: Start | None
+) -> tuple[Bound, int, int, list[int]]:
+    """A bound, the length of a first tour, a lower bound of all tours, and the actions of the first."""
+    if start is None:
+        length, order = anneal(instance, seed, ANNEALING_MOVES)
+        bound = first_bound(instance, int(length))
+    else:
+        length, order = anneal_from(
+            instance, seed, WARM_MOVES, warm_order(instance, start), *WARM_TEMPERATURES
         )
-        return
-    for j in range(n):
-        offer_second(inst, table, after, Arrival(left, row, int(inst.root[j]), NO_PARENT), j, d, limit)
+        bound = warm_bound(instance, start, WARM_ROWS)
+    upper, lower = int(length), bound.root
+    actions: list[int] = tour_actions(instance, order).tolist()
+    if start is not None:
+        narrow = beam_pass(bound, upper, WARM_WIDTH, work, NEVER)
+        lower = max(lower, narrow.lower)
+        if narrow.actions is not None:
+            upper, actions = narrow.upper, narrow.actions
+    return bound, upper, lower, actions
 
 
-def expand(
-    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
-) -> Expanded | None:
-    """Offer all successors of a layer's states; None if the deadline was over before that was done."""
-    progress = np.array([0, 0, 0, INFINITE, 0, -1])
+def _certificate(bound: Bound) -> Certificate:
+    table = bound.table
+    groups = tuple(tuple(np.flatnonzero(table.group == g).tolist()) for g in range(len(table.size)))
+    return Certificate(
+        Proof.RELAXATION, bound.instance.unit, bound.root, groups, tuple(table.multipliers.tolist())
+    )
+
+
+class Pass(NamedTuple):
+    """The result of a pass: length of the best tour known, its actions if it is new, and a lower bound, units."""
+
+    upper: int
+    actions: list[int] | None
+    lower: int
+    expanded: int
+
+
+def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: Deadline) -> Pass:
+    """Search all layers once for tours shorter than `upper` by more than a tie, keeping `width` states of each.
+
+    It gives up when more than `max_states` were expanded or the deadline is over; the lower bound is then that of the
+    root.
+    """
+    n, prices = len(bound.instance.home), bound.prices
+    limit = upper - bound.instance.tie + prices
+    history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
+    here, after = new_nodes(FIRST_ROOM), new_nodes(FIRST_ROOM)
+    offer_roots(bound.instance, bound.table, here, after, limit)
+    left_out, expanded, actions = INFINITE, 0, None
+    for layer in range(n + 1):
+        if expanded > max_states or deadline.over():
+            return Pass(upper, None, bound.root, expanded)
+        here, worse = keep_best(here, width)
+        found = expand(bound.instance, bound.table, here, after, limit, width, deadline)
+        if found is None:
+            return Pass(upper, None, bound.root, expanded)
+        here, after, early, states, end = found
+        left_out = min(left_out, worse, early)
+        expanded += states
+        size = here.size[0]
+        history.append((here.key[:size].copy(), here.parent[:size].copy()))
+        if end >= 0:
+            upper = int(here.cost[end]) - prices
+            actions = _actions(bound, history, layer, end)
+        here, after = after, new_nodes(FIRST_ROOM)
+    lower = max(bound.root, min(upper, min(limit, left_out) - prices))
+    return Pass(upper, actions, lower, expanded)
+
+
+def _actions(
+    bound: Bound, history: list[tuple[NDArray[np.int64], NDArray[np.int64]]], layer: int, end: int
+) -> list[int]:
+    """The actions of a tour, found by following the parents back from its end."""
+    keys = []
+    k = end
     while True:
-        here, after = expand_some(inst, table, here, after, limit, width, progress)
-        if progress[STAGE] > EMPTY:
-            return Expanded(here, after, *progress[SMALLEST:].tolist())
-        if deadline.over():
-            return None
-
-
-@kernel
-def expand_some(
-    inst: Instance,
-    table: Table,
-    here: Nodes,
-    after: Nodes,
-    limit: int,
-    width: int,
-    progress: NDArray[np.int64],
-) -> tuple[Nodes, Nodes]:
-    """Go on with a layer, first with states that carry something, then with those that do not, for one slice.
-
-    Args:
-        inst: The instance.
-        table: Bound of the cost-to-go.
-        here: The layer.
-        after: The next one.
-        limit: Totals to offer are below it, units.
-        width: States of the next layer that will be kept.
-        progress: Stage, states of the stage done, all of the stage, and the last three of `Expanded`; (6,).
-
-    Returns:
-        Both layers.
-    """
-    if progress[STAGE] == CARRYING and progress[DONE] == 0:
-        progress[OF] = here.size[0]
-        here = with_room(here, here.size[0])
-    slice_left = SLICE
-    while slice_left > 0 and progress[STAGE] <= EMPTY:
-        first, last = progress[DONE], min(progress[OF], progress[DONE] + slice_left)
-        if progress[STAGE] == CARRYING:
-            after, smallest, count = expand_carrying(inst, table, here, after, limit, width, first, last)
-        else:
-            after, smallest, count, end = expand_empty(inst, table, here, after, limit, width, first, last)
-            if end >= 0 and (progress[END] < 0 or here.cost[end] < here.cost[progress[END]]):
-                progress[END] = end
-        progress[SMALLEST] = min(progress[SMALLEST], smallest)
-        progress[STATES] += count
-        slice_left -= last - first
-        progress[DONE] = last
-        if last == progress[OF]:
-            progress[STAGE] += 1
-            progress[DONE], progress[OF] = 0, here.size[0]
-    return here, after
-
-
-@kernel
-def expand_carrying(
-    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
-) -> tuple[Nodes, int, int]:
-    """Offer what follows states with one in hand, numbers `first` to `last`; there must be room in this layer.
-
-    Returns:
-        The next layer, the smallest total dropped from it to save memory, how many states were expanded.
-    """
-    n, m = inst.to_bin.shape
-    smallest, expanded = INFINITE, 0
-    for k in range(first, last):
-        place = here.key[k] & ((1 << PLACE_BITS) - 1)
-        i = place - m * m
-        b, d = place // m, place % m
-        if here.total[k] >= limit or (i < 0 and b == d):
-            continue
-        expanded += 1
-        if i >= 0:
-            d, home_leg = inst.home[i], inst.to_bin[i, inst.home[i]]
-        else:
-            home_leg = inst.bins[b, d]
-        left = here.key[k] >> PLACE_BITS
-        row = row_of(table, left)
-        arrival = Arrival(left, row, int(here.cost[k] + home_leg), 2 * k + 1)
-        offer_bin(inst, table, here, arrival, d, d, limit)
-        if after.size[0] + 2 * n > after.key.size:
-            after, dropped = with_room_among(after, 2 * n, width)
-            smallest = min(smallest, dropped)
-        rest = left
-        while rest:
-            j = lowest(rest)
-            rest &= rest - 1
-            leg = inst.between[i, j] if i >= 0 else inst.from_bin[b, j]
-            arrival = Arrival(left, row, int(here.cost[k] + leg), 2 * k)
-            offer_second(inst, table, after, arrival, j, d, limit)
-    return after, smallest, expanded
-
-
-@kernel
-def expand_empty(
-    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
-) -> tuple[Nodes, int, int, int]:
-    """Offer what follows states with empty hands, numbers `first` to `last`.
-
-    Returns:
-        As for those with one in hand, and the index of the end of the shortest complete tour, -1 if there is none.
-    """
-    n, m = inst.to_bin.shape
-    smallest, expanded, end = INFINITE, 0, -1
-    for k in range(first, last):
-        place = here.key[k] & ((1 << PLACE_BITS) - 1)
-        b = place // m
-        if here.total[k] >= limit or place >= m * m or b != place % m:
-            continue
-        expanded += 1
-        left = here.key[k] >> PLACE_BITS
-        if left == 0 and (end < 0 or here.cost[k] < here.cost[end]):
-            end = k
-        row = row_of(table, left)
-        if after.size[0] + n > after.key.size:
-            after, dropped = with_room_among(after, n, width)
-            smallest = min(smallest, dropped)
-        rest = left
-        while rest:
-            i = lowest(rest)
-            rest &= rest - 1
-            arrival = Arrival(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
-            offer_only(inst, table, after, arrival, i, limit)
-    return after, smallest, expanded, end
+        key, parent = history[layer][0][k], int(history[layer][1][k])
+        keys.append(int(key))
+        if parent == NO_PARENT:
+            break
+        layer -= 0 if parent & 1 else 1
+        k = parent >> 1
+    m = len(bound.instance.bins)
+    left = (1 << len(bound.instance.home)) - 1
+    actions = []
+    for key in reversed(keys):
+        place = key & ((1 << PLACE_BITS) - 1)
+        picked = left ^ (key >> PLACE_BITS)
+        left ^= picked
+        if picked:
+            actions.append(picked.bit_length() - 1)
+        if place < m * m:
+            actions.append(-1 - place // m)
+    return actions

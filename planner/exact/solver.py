@@ -1,28 +1,22 @@
-"""The exact planner: for capacity two up to 40 objects, for other capacities a few."""
+"""The exact planner: for one person with one or two hands, up to 40 objects; OR-Tools for everything else."""
 
 import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from planner.certificate import Certificate, Proof
 from planner.exact.deadline import Deadline
-from planner.exact.full_table import SMALL_TABLE, Solution, by_table, full_table_bytes
-from planner.exact.general import best_first
-from planner.exact.groups import BIN_ROWS
 from planner.exact.instance import Instance, make_instance, to_visits
+from planner.exact.table import BIN_ROWS, SMALL_TABLE, Solution, by_table, full_table_bytes
 from planner.exact.warm_start import Start, WarmStart
-from planner.greedy_solver import GreedySolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem
 from planner.solver import SolveLimit
-from planner.tour import make_plan, with_bound
+from planner.tour import make_plan
 
 TABLE_RATE = 500e6  # bytes of a full table filled per second, roughly
 DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables; for sessions, which plan often
-GENERAL_STATES = 60_000  # of the search for any capacity: some 10 objects, 1 s
-PROVABLE = 14  # objects; that search proves no more of them
-MAX_OBJECTS = 40  # of any proof but the spanning tree
+MAX_OBJECTS = 40
 
 
 @dataclass(frozen=True)
@@ -56,14 +50,18 @@ class ExactSolver:
         Args:
             problem: What is left to do.
             seed: Of the annealing.
-            limit: States or seconds; by default 4 million states. OR-Tools counts other things, so only the
-                seconds are passed on to it.
+            limit: States or seconds; by default 4 million states. OR-Tools counts other work, so limits on work are
+                not passed on to it.
 
         Returns:
             OPTIMAL where proven, else FEASIBLE with the best bound so far.
         """
-        for plan in self._plans(problem, seed, limit or SolveLimit(), table_at_once=True):
-            best = plan
+        limit = limit or SolveLimit()
+        if not self.applies(problem):
+            from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
+
+            return OrToolsSolver().solve(problem, limit=replace(limit, work=None))
+        *_, best = self._plans(problem, seed, limit, table_at_once=True)
         return best
 
     def improve(
@@ -83,15 +81,29 @@ class ExactSolver:
             warm: What is known from similar problems. The first plan is then that of a narrow search with it,
                 which is better; the last may differ from that of `solve` where it is not proven, or ties.
         """
+        limit = limit or SolveLimit()
+        if not self.applies(problem):
+            from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
+
+            yield from OrToolsSolver().improve(problem, limit=replace(limit, work=None))
+            return
         best = None
-        for plan in self._plans(problem, seed, limit or SolveLimit(), table_at_once=False, warm=warm):
+        for plan in self._plans(problem, seed, limit, table_at_once=False, warm=warm):
             if best is None or plan.improves_on(best):
                 best = plan
                 yield plan
 
     def applies(self, problem: RoutingProblem) -> bool:
-        """Whether table and search apply: capacity two, up to 40 objects, true distances."""
-        return problem.capacity == 2 and len(problem.shipments) <= MAX_OBJECTS and problem.integers.is_metric
+        """Whether table and search apply; OR-Tools plans all other problems."""
+        return not self.why_not(problem)
+
+    def why_not(self, problem: RoutingProblem) -> str:
+        """Why table and search do not apply, empty where they do."""
+        if problem.capacity > 2:
+            return f"the capacity of {problem.capacity} is above 2"
+        if len(problem.shipments) > MAX_OBJECTS:
+            return f"{len(problem.shipments)} shipments are more than {MAX_OBJECTS}"
+        return "" if problem.integers.is_metric else "the distances break the triangle inequality"
 
     def table_fits(self, instance: Instance) -> bool:
         """Whether the full table is small enough."""
@@ -108,11 +120,6 @@ class ExactSolver:
     ) -> Iterator[Plan]:
         """Better and better plans; only one where a table is filled at once."""
         started = time.perf_counter()
-        if not self.applies(problem):
-            if not table_at_once:
-                yield GreedySolver().solve(problem)
-            yield self._general(problem, seed, limit, started)
-            return
         metric = problem.integers.metric
         instance = make_instance(problem, metric)
         seconds = math.inf if limit.seconds is None else limit.seconds
@@ -128,26 +135,6 @@ class ExactSolver:
             visits = to_visits(instance, solution.actions, problem.names[:n], problem.names[n:])
             yield make_plan(problem, metric, visits, solution.bound, started, solution.certificate)
 
-    def _general(self, problem: RoutingProblem, seed: int, limit: SolveLimit, started: float) -> Plan:
-        """Any capacity and any distances: proven for a few objects, else OR-Tools with the best bound there is."""
-        deadline = math.inf if limit.seconds is None else started + limit.seconds
-        tried = None
-        if len(problem.shipments) <= MAX_OBJECTS:
-            # Half of the time for a proof where one is likely; the rest for a tour.
-            share = 0.5 if len(problem.shipments) <= PROVABLE else 0.05
-            at = None if limit.seconds is None else started + limit.seconds * share
-            tried = best_first(problem, GENERAL_STATES, Deadline(at, limit.stop))
-            certificate = Certificate(Proof.EXHAUSTIVE, problem.integers.unit, 0)
-            if tried.visits is not None:
-                return with_bound(problem, tried.visits, tried.bound, started, certificate)
-        from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
-
-        left = None if limit.seconds is None else max(0.001, deadline - time.perf_counter())
-        other = OrToolsSolver().solve(problem, seed=seed, limit=SolveLimit(seconds=left))
-        if tried is None or other.lower_bound >= tried.bound:
-            return replace(other, seconds=time.perf_counter() - started)
-        return with_bound(problem, other.visits, tried.bound, started, certificate)
-
     def _search(
         self,
         instance: Instance,
@@ -159,10 +146,12 @@ class ExactSolver:
         start: Start | None,
     ) -> Iterator[Solution]:
         """Better and better tours and bounds: annealed, then by the full table or by passes of the search."""
-        from planner.exact.widening import widening  # brings the compiled kernels, which take 0.5 s to load
+        from planner.exact.search import (
+            improving_tours,  # brings the compiled kernels, which take 0.5 s to load
+        )
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
         passes = () if tabled else self.passes
-        yield from widening(instance, seed, limit.work or DEFAULT_WORK, deadline, passes, start)
+        yield from improving_tours(instance, seed, limit.work or DEFAULT_WORK, deadline, passes, start)
         if tabled and not deadline.over():
             yield by_table(instance)

@@ -13,17 +13,26 @@ The relaxation (Christofides, Mingozzi and Toth 1981) puts objects into groups a
 many are left; any of a group may then be picked, though none twice in a row. Each pick of j costs a multiplier
 more; subtracting the multipliers of U gives a lower bound of the cost-to-go from every U, for any multipliers and
 groups. With each object in a group of its own and no multipliers the table is exact.
+
+This module needs numpy alone. It fills and follows small tables itself where numba, which takes 0.5 s to load, is not
+loaded; the kernels fill in the same numbers.
 """
 
 import math
+import sys
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.certificate import Certificate, Proof
 from planner.exact.instance import FAR, Instance
 
-SPARE = 8  # entries behind the last row: kernels read and write so many at a time
+COMPILER = "numba"
+SMALL_TABLE = 1 << 23  # bytes, 14 objects and 6 bins: filled in 10 ms by kernels, in 50 by numpy
+BIN_ROWS = 50_000  # of a table that counts objects by bin: 30 objects and 6 bins
+SPARE = 8  # entries behind the last row: kernels read eight at a time
 # Units of the longest leg, and of a price, with which tours of 40 objects fit in int32, and in int64.
 LONGEST_32, DEAREST_32, DEAREST_64 = 1 << 21, 1 << 23, 1 << 53
 INFINITE = 1 << 60  # longer than any sum of lengths
@@ -33,30 +42,30 @@ class Table(NamedTuple):
     """Cost-to-go of the relaxed problem, multipliers of picks included; a row for each way to be left of the groups.
 
     Row r has r / (number of rows of all groups before) mod (size + 1) of a group left. Where every object is a group
-    of its own, the row is the subset of the objects left.
-
-    Entries are int32 where all sums fit in, else int64.
-
-    Attributes:
-        group: Group of each object, numbered from 0, (n,) int64.
-        size: How many objects each group has, (groups,) int64.
-        stride: By how many rows picking an object goes down, (n,) int64.
-        entries: Of each row, V(., b, d) and then V(., d, b) for all d, for one b after the other, then Y; flat, with
-            `SPARE` more at the end.
-        bin: E and V, (rows, m, m), entry [b, d]; a view of the entries.
-        object: Y, (rows, n), a view of the entries; only where not all of the group of object i are left.
-        multipliers: Price of a pick, (n,) int64.
-        dearest: The largest multiplier, and minus it the smallest, that the entries have room for.
+    of its own, the row is the subset of the objects left. Entries are int32 where all sums fit in, else int64.
     """
 
-    group: NDArray[np.int64]
-    size: NDArray[np.int64]
-    stride: NDArray[np.int64]
+    group: NDArray[np.int64]  # group of each object, numbered from 0, (n,) int64
+    size: NDArray[np.int64]  # how many objects each group has, (groups,) int64
+    stride: NDArray[np.int64]  # by how many rows picking an object goes down, (n,) int64
+    # of each row, V(., b, d) and then V(., d, b) for all d, for one b after the other, then Y; flat, with `SPARE`
+    # more at the end
     entries: NDArray[np.integer[Any]]
-    bin: NDArray[np.integer[Any]]
+    bin: NDArray[np.integer[Any]]  # E and V, (rows, m, m), entry [b, d]; a view of the entries
+    # Y, (rows, n), a view of the entries; only where not all of the group of object i are left
     object: NDArray[np.integer[Any]]
-    multipliers: NDArray[np.int64]
-    dearest: int
+    multipliers: NDArray[np.int64]  # price of a pick, (n,) int64
+    dearest: int  # the largest multiplier, and minus it the smallest, that the entries have room for
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A tour and a bound."""
+
+    # a tour: k >= 0 picks object k, -1 - b goes to bin b and leaves all that belongs there
+    actions: list[int]
+    bound: int  # no tour is shorter than this, units
+    certificate: Certificate  # what proves the bound
 
 
 def rows_of(group: NDArray[np.int64]) -> int:
@@ -65,12 +74,7 @@ def rows_of(group: NDArray[np.int64]) -> int:
 
 
 def new_table(inst: Instance, group: NDArray[np.int64]) -> Table:
-    """An unfilled table with no multipliers.
-
-    Args:
-        inst: The instance.
-        group: Group of each object, numbered from 0, (n,).
-    """
+    """An unfilled table with no multipliers, by the group of each object, numbered from 0, (n,)."""
     n, m = inst.to_bin.shape
     size = np.bincount(group).astype(np.int64)
     below = np.ones(len(size) + 1, np.int64)
@@ -96,7 +100,108 @@ def _longest(inst: Instance) -> int:
     return int(np.where(inst.between < FAR, inst.between, 0).max(initial=longest))
 
 
-def table_bytes(inst: Instance, rows: int) -> int:
-    """Memory of a table in int32, about."""
+def full_table_bytes(inst: Instance) -> int:
+    """Memory of the full table in int32, about."""
     n, m = inst.to_bin.shape
-    return int(8 * (m * m + n) * rows)
+    return int(8 * (m * m + n) << n)
+
+
+def by_table(inst: Instance) -> Solution:
+    """Fill the full table and follow a shortest tour."""
+    table = filled_table(inst)
+    length, actions = follow(inst, table, len(table.bin) - 1)
+    return Solution(actions, length, Certificate(Proof.FULL_TABLE, inst.unit, length))
+
+
+def filled_table(inst: Instance) -> Table:
+    """The full table."""
+    table = new_table(inst, np.arange(len(inst.home)))
+    if COMPILER in sys.modules or full_table_bytes(inst) > SMALL_TABLE:
+        from planner.exact.table_kernels import fill  # loaded only where it is needed
+
+        fill(inst, table)
+    else:
+        fill_layers(inst, table)
+    return table
+
+
+def follow(inst: Instance, table: Table, row: int) -> tuple[int, list[int]]:
+    """Length of a shortest tour by a full table, and its actions as in `Solution`; `row` is that of the root."""
+    actions: NDArray[np.int64] = np.empty(2 * len(inst.home) + 2, np.int64)
+    if COMPILER in sys.modules:
+        from planner.exact.table_kernels import walk as compiled_walk  # loaded only where it is needed
+
+        length, count = compiled_walk(inst, table, row, actions)
+    else:
+        length, count = walk(inst, table, row, actions)
+    return int(length), actions[:count].tolist()
+
+
+def fill_layers(inst: Instance, table: Table) -> None:
+    """Compute all rows in numpy, by how many objects are left; each object must be a group of its own."""
+    n, m = inst.to_bin.shape
+    bins, objects = np.arange(m), np.arange(n)
+    there = (np.arange(1 << n)[:, None] >> objects & 1).astype(bool)
+    count = there.sum(axis=1)
+    drop = inst.to_bin[objects, inst.home]
+    table.bin[0], table.object[0] = inst.bins, drop
+    for k in range(1, n + 1):
+        rows = np.flatnonzero(count == k)
+        j = np.nonzero(there[rows])[1].reshape(-1, k)  # what may be picked, (rows, k)
+        left, c, legs = rows[:, None] - (1 << j), inst.home[j], inst.to_bin[j]
+        own = legs + table.bin[left[..., None], bins, c[..., None]]
+        second = np.minimum(own, drop[j][..., None] + table.bin[left, c])  # W, (rows, k, m)
+        empty = (legs + table.object[left, j][..., None]).min(axis=1)  # E, (rows, m)
+        carrying = (legs[..., None] + second[:, :, None]).min(axis=1)  # V, (rows, m, m)
+        carrying = np.minimum(carrying, inst.bins + empty[:, None])
+        carrying[:, bins, bins] = empty
+        alone = (inst.between[j] + second[..., inst.home]).min(axis=1)  # Y, (rows, n)
+        table.bin[rows], table.object[rows] = carrying, np.minimum(alone, drop + empty[:, inst.home])
+
+
+def walk(inst: Instance, table: Table, row: int, actions: NDArray[np.int64]) -> tuple[int, int]:
+    """Follow a best (relaxed) tour from the root, in plain Python; `table_kernels` compiles it.
+
+    `row` is that of the objects left at the root; `actions` receives those of `Solution`, at least (2 n + 2,).
+    Returns the length of the tour with multipliers, and the number of actions.
+    """
+    to_object, to_bin, at = inst.root, inst.root_bin, -1
+    first = inst.carried[0] if inst.carried.size > 0 else -1  # bins of what is in hand, -1 for none
+    second = inst.carried[1] if inst.carried.size > 1 else -1
+    total, count = 0, 0
+    while True:
+        best, action = INFINITE, 0
+        for b in (first, second):
+            if b >= 0:
+                other = second if b == first else first
+                cost = to_bin[b] + table.bin[row, b, other if other >= 0 else b]
+                if cost < best:
+                    best, action = cost, -1 - b
+        for j in range(inst.home.size if second < 0 else 0):
+            left, c = row - table.stride[j], inst.home[j]
+            if row // table.stride[j] % (table.size[table.group[j]] + 1) == 0 or j == at:
+                continue
+            cost = to_object[j] + table.multipliers[j]
+            if first >= 0:
+                own_last = inst.to_bin[j, first] + table.bin[left, first, c]
+                cost += min(own_last, inst.to_bin[j, c] + table.bin[left, c, first])
+            else:
+                cost += table.object[left, j]
+            if cost < best:
+                best, action = cost, j
+        if best == INFINITE:
+            return total, count
+        if count == 0:
+            total = best
+        actions[count] = action
+        count += 1
+        if action >= 0:
+            row -= table.stride[action]
+            to_object, to_bin, at = inst.between[action], inst.to_bin[action], action
+            c = inst.home[action]
+            first, second = (first, c) if first >= 0 else (c, -1)
+        else:
+            b = -1 - action
+            to_object, to_bin, at = inst.from_bin[b], inst.bins[b], -1
+            other = second if first == b else first
+            first, second = other if other != b else -1, -1

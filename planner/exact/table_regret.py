@@ -7,15 +7,13 @@ from numpy.typing import NDArray
 
 from mjsim.kernels import kernel
 from planner.exact.deadline import Deadline
+from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
-from planner.exact.nodes import Nodes, new_nodes, slot_of
-from planner.exact.relaxation import after_pick, row_without
-from planner.exact.search import PLACE_BITS, expand, offer_roots
+from planner.exact.nodes import FIRST_ROOM, Nodes, new_nodes, slot_of
 from planner.exact.table import INFINITE, Table
 from planner.plan import Visit, VisitKind
 
-FIRST_ROOM = 1 << 12
 UNLIMITED = 1 << 40  # states of a layer
 
 Costs = dict[Visit, int]  # length of the rest of the task, units, by next visit
@@ -24,29 +22,25 @@ Costs = dict[Visit, int]  # length of the rest of the task, units, by next visit
 def costs_in(
     instance: Instance, table: Table, row: int, names: Sequence[str], carried: Sequence[str]
 ) -> Costs:
-    """Costs of all next visits as a table has them; with a relaxed one these are lower bounds, prices included.
+    """Costs of all next visits by a filled table; with a relaxed one these are lower bounds, prices included.
 
-    Args:
-        instance: The instance, with its root.
-        table: The filled table.
-        row: Row of the objects left at the root.
-        names: Of the objects of the instance.
-        carried: Names of what is carried at the root.
+    `row` is that of the objects left at the root; `names` and `carried` are those of the instance's objects.
     """
-    held = instance.carried.tolist()
+    held, home = instance.carried.tolist(), instance.home
     costs = {}
     for k, (b, name) in enumerate(zip(held, carried, strict=True)):
         other = held[1 - k] if len(held) == 2 else b
         costs[Visit(VisitKind.PLACE, name)] = int(instance.root_bin[b]) + int(table.bin[row, b, other])
-    for j, name in enumerate(names if len(held) < 2 else ()):
-        left = row_without(table, row, j)
-        if left < 0:
-            continue
+    if len(held) < 2:
+        j = np.flatnonzero(row // table.stride % (table.size[table.group] + 1))
+        left, c = row - table.stride[j], home[j]
         if held:
-            rest = after_pick(instance, table, left, j, held[0])
+            own_last = instance.to_bin[j, held[0]] + table.bin[left, held[0], c]
+            rest = np.minimum(own_last, instance.to_bin[j, c] + table.bin[left, c, held[0]])
         else:
-            rest = int(table.object[left, j]) + int(table.multipliers[j])
-        costs[Visit(VisitKind.PICK, name)] = int(instance.root[j]) + rest
+            rest = table.object[left, j].astype(np.int64)
+        found = (instance.root[j] + table.multipliers[j] + rest).tolist()
+        costs |= {Visit(VisitKind.PICK, names[k]): cost for k, cost in zip(j.tolist(), found, strict=True)}
     return costs
 
 
@@ -55,18 +49,9 @@ def costs_by_pass(
 ) -> Costs | None:
     """Costs of all next visits, exact where at most `longest`, else some number greater than it.
 
-    Every state on a tour of at most that length is visited, layer by layer; a sweep back finds the shortest rest of
-    the task from each.
-
-    Args:
-        bound: Bound of the cost-to-go.
-        visits: Those possible next: places of what is carried, then picks if a hand is free.
-        longest: Greatest length of interest, units.
-        max_states: Give up beyond so many states.
-        deadline: Give up when it is over.
-
-    Returns:
-        Costs, or None if the pass was given up.
+    Every state on a tour of at most that length, units, is visited, layer by layer; a sweep back finds the shortest
+    rest of the task from each. `visits` are those possible next: places of what is carried, then picks. None if there
+    are more than `max_states` or the deadline is over.
     """
     instance, table = bound.instance, bound.table
     n = len(instance.home)
@@ -92,15 +77,13 @@ def costs_by_pass(
         rest[k] = sweep(instance, layers[k], after, after_rest)
     first = (layers[1], rest[1]) if n else (beyond, nothing)
     found = root_costs(instance, layers[0], rest[0], *first)
-    return {visit: int(cost) for visit, cost in zip(visits, found, strict=True)}
+    # With one hand that is full, `found` ends with the picks that `visits` lacks.
+    return {visit: int(cost) for visit, cost in zip(visits, found, strict=False)}
 
 
 @kernel
 def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int:
-    """Length of the rest of the task from a state; `INFINITE` if it is not among the nodes.
-
-    `rest` is that length, units, for each of the nodes, shape (states,).
-    """
+    """Length of the rest of the task from a state, by `rest` of all nodes, (states,); `INFINITE` if it is no node."""
     k = nodes.slots[slot_of(nodes, (left << PLACE_BITS) | place)]
     return int(rest[k]) if k >= 0 else INFINITE
 
@@ -109,10 +92,7 @@ def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int
 def after_second(
     inst: Instance, after: Nodes, after_rest: NDArray[np.int64], left: int, j: int, d: int
 ) -> int:
-    """Length of the rest from object j, just picked, with one for d in hand too, units.
-
-    `left` no longer has j; `after_rest` is the length of the rest from each state of `after`, shape (states,).
-    """
+    """Length of the rest from object j, just picked (`left` no longer has it), with one for d in hand too."""
     m = inst.bins.shape[0]
     c = inst.home[j]
     first = inst.to_bin[j, d] + look_up(after, after_rest, left, d * m + c)
@@ -122,10 +102,7 @@ def after_second(
 
 @kernel
 def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Length of the rest of the task from each state of a layer, given those of the next layer.
-
-    Both are in units, shape (states of the layer,).
-    """
+    """Length of the rest of the task from each state of a layer, (states,), given those of the next layer."""
     n, m = inst.to_bin.shape
     size = here.size[0]
     rest = np.full(size, INFINITE, np.int64)
@@ -161,11 +138,7 @@ def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int6
 def root_costs(
     inst: Instance, here: Nodes, rest: NDArray[np.int64], after: Nodes, after_rest: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Length of the task by next action: places of what is carried, then picks if a hand is free.
-
-    The result has the shape (actions,); `rest` and `after_rest` are those of the states of `here` and `after`, shape
-    (states,). All are in units.
-    """
+    """Length of the task by next action, (actions,): places of what is carried, then picks."""
     n, m = inst.to_bin.shape
     count = inst.carried.size
     everything = (1 << n) - 1

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.certificate import Certificate, Proof
-from planner.exact.full_table import filled_table, follow_table
 from planner.exact.instance import FAR, Instance, make_instance, to_visits
-from planner.exact.table import Table
+from planner.exact.table import Table, filled_table, follow
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
 from planner.tour import make_plan
@@ -24,15 +23,10 @@ if TYPE_CHECKING:
 
 
 class TableState(NamedTuple):
-    """A state of a task as a row of a full table.
+    """A state of a task as a row of a full table; the instance has the present root.
 
-    Attributes:
-        instance: The instance of the table, with the present root.
-        table: The filled table.
-        row: Row of the objects left.
-        names: Of the objects of the instance.
-        metric: Integer distances between the locations of the present problem, consistent with the table, (k, k).
-        unit: Of these, m.
+    `metric` is the integer distances between the locations of the present problem, consistent with the table, (k, k),
+    in `unit`, m.
     """
 
     instance: Instance
@@ -51,11 +45,7 @@ class _Filled:
 
 
 class TaskTable:
-    """Fills a full table where it is small enough, and keeps it until an object was moved.
-
-    Args:
-        solver: Says how large a table may be.
-    """
+    """Fills a full table where the solver finds it small enough, and keeps it until an object was moved."""
 
     def __init__(self, solver: "ExactSolver") -> None:
         self._solver = solver
@@ -67,7 +57,7 @@ class TaskTable:
         state = self._at(problem)
         if state is None:
             return None
-        length, actions = follow_table(state.instance, state.table, state.row)
+        length, actions = follow(state.instance, state.table, state.row)
         visits = to_visits(state.instance, actions, state.names, problem.names[len(problem.shipments) :])
         certificate = Certificate(Proof.FULL_TABLE, state.unit, length)
         return make_plan(problem, state.metric, visits, length, started, certificate)
@@ -117,7 +107,8 @@ def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
         np.full_like(filled.instance.root, FAR),
         np.full_like(filled.instance.root_bin, FAR),
     )
-    root[left] = metric[problem.start, here[:n]]
+    if len(problem.onboard) < problem.capacity:
+        root[left] = metric[problem.start, here[:n]]
     root_bin[bin_of] = metric[problem.start, here[n:]]
     instance = filled.instance._replace(
         root=root, root_bin=root_bin, carried=np.array(bin_of[n:], dtype=np.int64)

@@ -12,40 +12,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.certificate import Proof
-from planner.exact.groups import numbered
 from planner.plan import Plan, VisitKind
 from planner.problem import RoutingProblem
 
 
 class Start(NamedTuple):
-    """A warm start in the numbering of one instance.
+    """A warm start in the numbering of one instance."""
 
-    Attributes:
-        group: Group of each object, numbered from 0, (n,) int64.
-        multipliers: Price of picking each object, units, (n,) int64.
-        order: Numbers of objects in the order of a good tour.
-        missing: Numbers of the objects that are not in the order.
-    """
-
-    group: NDArray[np.int64]
-    multipliers: NDArray[np.int64]
-    order: list[int]
-    missing: list[int]
+    group: NDArray[np.int64]  # group of each object, numbered from 0, (n,) int64
+    multipliers: NDArray[np.int64]  # price of picking each object, units, (n,) int64
+    order: list[int]  # numbers of objects in the order of a good tour
+    missing: list[int]  # numbers of the objects that are not in the order
 
 
 @dataclass(frozen=True)
 class WarmStart:
-    """What earlier plans tell about objects, by name.
+    """What earlier plans tell about objects, by name."""
 
-    Attributes:
-        multipliers: Price of picking an object in the relaxation, m.
-        groups: Objects that the relaxation counts together.
-        order: Objects in the order in which a good tour may pick them.
-    """
-
-    multipliers: Mapping[str, float]
-    groups: tuple[tuple[str, ...], ...] = ()
-    order: tuple[str, ...] = ()
+    multipliers: Mapping[str, float]  # price of picking an object in the relaxation, m
+    groups: tuple[tuple[str, ...], ...] = ()  # objects that the relaxation counts together
+    order: tuple[str, ...] = ()  # objects in the order in which a good tour may pick them
 
     def updated(self, problem: RoutingProblem, plan: Plan) -> "WarmStart":
         """With the results of one more plan; multipliers of objects that it is not about stay."""
@@ -59,13 +45,9 @@ class WarmStart:
         return WarmStart({**self.multipliers, **new}, groups, order)
 
     def numbered(self, names: Sequence[str], unit: float) -> Start | None:
-        """Renumbered for an instance of the objects of these names; None where no multiplier of them is known.
+        """Renumbered for an instance of the objects of these names in its order, in its unit, m.
 
-        An object that is new costs the average and joins the first group.
-
-        Args:
-            names: Of the objects, in the order of the instance.
-            unit: Of the instance, m.
+        None where no multiplier of them is known. An object that is new costs the average and joins the first group.
         """
         prices = {name: round(price / unit) for name, price in self.multipliers.items()}
         found = [prices[name] for name in names if name in prices]
@@ -78,7 +60,7 @@ class WarmStart:
             group[[number[name] for name in members if name in number]] = g
         order = [number[name] for name in self.order if name in number]
         return Start(
-            numbered(group),
+            np.unique(group, return_inverse=True)[1],
             np.array([prices.get(name, average) for name in names], np.int64),
             order,
             sorted(set(range(len(names))) - set(order)),

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from experiments.house import House
-
 FAST = ("--objects", "2", "--fidelity", "event", "--no-regret")
 ROOT = Path(__file__).parents[2]
 
@@ -22,11 +20,6 @@ def signals_as_in_a_terminal():
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
-
-
-@pytest.fixture(scope="session")
-def house():
-    return House.load()
 
 
 @pytest.fixture

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main
+from experiments.cli.main import main
 from experiments.errors import UserCodeError
-from experiments.files import read_json
-from experiments.replaying.replay import replay
-from experiments.runs import records
-from experiments.runs.records import read_events
+from experiments.record import records
+from experiments.record.files import read_json
+from experiments.record.records import read_events
+from experiments.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from faults.conftest import FAST, one_line
@@ -115,33 +115,20 @@ def test_one_line_and_the_traceback_in_a_report(tmp_path, own_module, capsys, mo
     words = [
         "run",
         *FAST,
-        "--no-video",
-        "--no-floor-plan",
-        "--assistance",
-        "none",
-        "--user",
-        "own_code:build",
+        *["--no-video", "--no-floor-plan", "--assistance", "none", "--user", "own_code:build", "--out"],
     ]
-    assert main([*words, "--out", str(tmp_path / "out")]) == 1
+    assert main([*words, str(tmp_path / "out")]) == 1
     line = one_line(capsys.readouterr().err)
     report = Path(line.rpartition(" ")[2]).read_text()
     assert "ZeroDivisionError" in report and "own_code.py" in report
 
 
-def test_a_participant_that_says_nothing_of_markers_needs_none(house, tmp_path, monkeypatch):
-    (tmp_path / "own_code.py").write_text(
-        PARTICIPANT.format(after=5, fault="raise EOFError").replace("    needs = frozenset()\n", "")
-    )
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(UserCodeError, match="EOFError"):  # it acts until then
+@pytest.mark.parametrize(
+    ("needs", "said"),
+    [("", "EOFError"), ("needs = 'flagpole'", "needs 'flagpole'; it must be a set of marker roles")],
+)
+def test_needs_are_a_set_of_roles_or_not_said(needs, said, house, tmp_path, own_module):
+    """Without any, it acts until it fails."""
+    own_module(PARTICIPANT.format(after=5, fault="raise EOFError").replace("needs = frozenset()", needs))
+    with pytest.raises(UserCodeError, match=said):
         run(house, tmp_path / "run", user="own_code:build")
-    sys.modules.pop("own_code")
-
-
-def test_needs_that_are_no_set_of_roles_are_refused(house, tmp_path, monkeypatch):
-    text = PARTICIPANT.format(after=5, fault="pass").replace("needs = frozenset()", "needs = 'flagpole'")
-    (tmp_path / "own_code.py").write_text(text)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(UserCodeError, match="needs 'flagpole'; it must be a set of marker roles"):
-        run(house, tmp_path / "run", user="own_code:build")
-    sys.modules.pop("own_code")

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import RecordError
-from experiments.files import read_json
-from experiments.replaying.replay import replay
-from experiments.runs import records
+from experiments.record import records
+from experiments.record.files import read_json
+from experiments.replay.replay import replay
 from experiments.session.film_config import FilmConfig
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
@@ -74,7 +74,7 @@ def full(*_args, **_options):
 
 
 def test_a_full_disk_at_the_floor_plan_costs_the_floor_plan_alone(house, tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.runs.topdown.draw_topdown", full)
+    monkeypatch.setattr("experiments.trials.trial.draw_topdown", full)
     warnings = []
     run_trial(CONFIG, tmp_path / "out", house=house, on_warning=warnings.append)
     assert warnings == ["no floor plan: OSError: [Errno 28] No space left on device"]
@@ -82,13 +82,14 @@ def test_a_full_disk_at_the_floor_plan_costs_the_floor_plan_alone(house, tmp_pat
 
 
 def test_where_nothing_can_be_written_that_is_said(house, tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.trials.trial_record.save_arrays", full)
+    monkeypatch.setattr("experiments.record.export.save_arrays", full)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with pytest.raises(OSError, match="No space left"):
         run_trial(CONFIG, tmp_path / "out", topdown=False, house=house)
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_batch_on_a_full_disk_says_so_and_goes_on_later(small_disk, mjsim):
     disk = small_disk("100k")
     words = ("batch", *FAST, "--assistance", "optimal", "--seeds", "0:2", "--workers", "1", "--out")

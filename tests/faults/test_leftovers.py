@@ -1,44 +1,42 @@
-"""Work in progress of processes that were killed is removed; that of living ones is not."""
+"""Work in progress of processes that were killed is removed after a day."""
 
-import signal
-import subprocess
-import sys
+import os
+import time
 
 import pytest
 
-from mjsim.files import WORK, exchange, remove_leftovers, replacing, work_folder
-
-WORKER = """
-import sys, time
-from pathlib import Path
-from mjsim.files import {what}
-with {what}(Path(sys.argv[1]){more}) as path:
-    print(path, flush=True)
-    time.sleep(60)
-"""
+from mjsim.files import MAX_AGE, WORK, exchange, remove_leftovers, replacing, work_folder
 
 
-@pytest.mark.parametrize(("what", "more"), [("work_folder", ""), ("replacing", " / 'house.xml'")])
-def test_work_is_removed_once_its_process_is_gone(what, more, tmp_path):
-    script = WORKER.format(what=what, more=more)
-    with subprocess.Popen([sys.executable, "-c", script, str(tmp_path)], stdout=subprocess.PIPE) as process:
-        process.stdout.readline()
-        remove_leftovers(tmp_path)
-        assert len(list(tmp_path.glob(f"{WORK}*"))) == 1, "the process lives"
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-    assert len(list(tmp_path.glob(f"{WORK}*"))) == 1
+@pytest.mark.parametrize("name", ["house.xml", "trials/episode.json"])
+def test_work_is_removed_once_it_has_not_changed_for_a_day(name, tmp_path):
+    abandoned, recent = tmp_path / f"{WORK}killed", tmp_path / f"{WORK}living"
+    for work in (abandoned, recent):
+        (work / name).parent.mkdir(parents=True)
+        (work / name).write_text("half")
+    for path in (abandoned, recent, *abandoned.rglob("*"), (recent / name).parent):
+        os.utime(path, (time.time() - MAX_AGE - 1,) * 2)
     with replacing(tmp_path / "other.txt") as temporary:
         temporary.write_text("new")
+    assert {path.name for path in tmp_path.iterdir()} == {"other.txt", recent.name}
+    remove_leftovers(tmp_path, max_age=0)
     assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
+
+
+@pytest.mark.parametrize("failure", [OSError, KeyboardInterrupt])
+def test_work_that_fails_leaves_nothing(failure, tmp_path):
+    for make in (lambda: work_folder(tmp_path), lambda: replacing(tmp_path / "house.xml")):
+        with pytest.raises(failure), make():
+            raise failure
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_others_hide_is_kept(tmp_path):
     (tmp_path / ".mjsim-notes").mkdir()
     (tmp_path / f"{WORK}link").symlink_to(tmp_path / ".mjsim-notes")
-    with work_folder(tmp_path):
-        pass
-    assert (tmp_path / ".mjsim-notes").is_dir()
+    (tmp_path / ".mjsim-notes" / "note").touch()
+    remove_leftovers(tmp_path, max_age=0)
+    assert (tmp_path / ".mjsim-notes" / "note").exists()
 
 
 def test_folders_are_exchanged(tmp_path):

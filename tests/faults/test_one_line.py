@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main
-from experiments.failures import INTERNAL_ERROR
+from experiments.cli.failures import INTERNAL_ERROR
+from experiments.cli.main import main
 from faults.conftest import ROOT, one_line
 
 PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
@@ -43,7 +43,7 @@ def raising(error):
 )
 def test_an_error_is_one_line(error, code, said, problem, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr("experiments.commands.plan.solver", raising(error))
+    monkeypatch.setattr("experiments.cli.plan.solver", raising(error))
     assert main(["plan", problem]) == code
     line = one_line(capsys.readouterr().err)
     assert said in line
@@ -54,7 +54,7 @@ def test_an_error_is_one_line(error, code, said, problem, tmp_path, capsys, monk
 def test_a_report_says_what_is_needed_and_no_secrets(problem, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("API_TOKEN", "sesame-1")
-    monkeypatch.setattr("experiments.failures.exit_code", lambda _: None)
+    monkeypatch.setattr("experiments.cli.failures.exit_code", lambda _: None)
     with pytest.raises(SystemExit):
         main(["plan", problem, "--no-such-token", "sesame-2"])  # argparse refuses before anything runs
     assert main(["plan", problem + ".gone", "--planner", "greedy"]) == INTERNAL_ERROR
@@ -64,7 +64,7 @@ def test_a_report_says_what_is_needed_and_no_secrets(problem, tmp_path, capsys, 
 
 
 def test_secrets_on_the_command_line_are_left_out():
-    from experiments.failures import _report_text
+    from experiments.cli.failures import _report_text
 
     text = _report_text(
         ValueError("x"), ["serve", "--api-token", "sesame", "--password=sesame", "--port", "1"]

@@ -5,10 +5,10 @@ import os
 
 import pytest
 
-from experiments.cli import main
+from experiments.cli.main import main
 from experiments.errors import RecordError
-from experiments.runs.records import EPISODE, EVENTS, METRICS
-from experiments.runs.run_directory import run_directory
+from experiments.record.records import EPISODE, EVENTS, METRICS
+from experiments.record.run_directory import run_directory
 
 PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
 
@@ -19,60 +19,42 @@ def fill_run(folder):
         (folder / name).write_text("{}")
 
 
-def make_run(path):
-    fill_run(path)
+def write(file, text="precious"):
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text)
 
 
-def make_run_with_notes(path):
-    fill_run(path)
-    (path / "notes.txt").write_text("precious")
+NOTES = "notes.txt"
+STATES = {  # by name: what makes the state of a path
+    "run": [fill_run],
+    "run with notes": [fill_run, lambda path: write(path / NOTES)],
+    "notes": [lambda path: write(path / NOTES)],
+    "batch": [
+        lambda path: fill_run(path / "trials" / "one"),
+        lambda path: write(path / "trials.csv", "objects\n"),
+    ],
+    "tables of others": [
+        lambda path: (path / "trials").mkdir(parents=True),
+        lambda path: write(path / "trials.csv"),
+    ],
+    "file": [write],
+    "dangling link": [lambda path: path.symlink_to(path.with_name("nowhere"))],
+    "loop": [lambda path: path.symlink_to(path)],
+    "link to notes": [
+        lambda path: write(path.with_name("real") / NOTES),
+        lambda path: path.symlink_to("real"),
+    ],
+    "pipe": [os.mkfifo],
+    "below a file": [write],
+}
+STATES["strange batch"] = [*STATES["batch"], lambda path: write(path / "trials" / "mine" / NOTES)]
 
 
-def make_notes(path):
-    path.mkdir()
-    (path / "notes.txt").write_text("precious")
-
-
-def make_batch(path):
-    fill_run(path / "trials" / "one")
-    (path / "trials.csv").write_text("objects\n")
-
-
-def make_strange_batch(path):
-    make_batch(path)
-    make_notes(path / "trials" / "mine")
-
-
-def make_tables_of_others(path):
-    (path / "trials").mkdir(parents=True)
-    (path / "trials.csv").write_text("patient\n")
-
-
-def make_file(path):
-    path.write_text("precious")
-
-
-def make_dangling_link(path):
-    path.symlink_to(path.with_name("nowhere"))
-
-
-def make_loop(path):
-    path.symlink_to(path)
-
-
-def make_link_to_notes(path):
-    make_notes(path.with_name("real"))
-    path.symlink_to(path.with_name("real"))
-
-
-def make_pipe(path):
-    os.mkfifo(path)
-
-
-def below_a_file(path):
-    path.parent.mkdir(exist_ok=True)
-    path.write_text("precious")
-    return path / "run"
+def make(state, path):
+    """Bring a path into a state; returns where a command is told to write."""
+    for step in STATES[state]:
+        step(path)
+    return path / "run" if state == "below a file" else path
 
 
 def tree(folder):
@@ -88,17 +70,12 @@ def nothing_is_computed(monkeypatch):
     def fail(*_args, **_options):
         pytest.fail("computed before it was known where to write")
 
-    for name in (
-        "experiments.house.House.load",
-        "experiments.gallery.take_pictures",
-        "planner.solver.solver",
-    ):
+    for name in ("experiments.house.House.load", "tools.gallery.take_pictures", "planner.solver.solver"):
         monkeypatch.setattr(name, fail)
-    monkeypatch.setattr("experiments.commands.gallery.take_pictures", fail)
-    monkeypatch.setattr("experiments.commands.plan.solver", fail)
-    monkeypatch.setattr("experiments.commands.replay.replay", fail)
-    monkeypatch.setattr("experiments.commands.check.check_path", fail)
-    monkeypatch.setattr("experiments.commands.compare.read_blocks", fail)
+    monkeypatch.setattr("experiments.cli.plan.solver", fail)
+    monkeypatch.setattr("experiments.replay.replay.replay", fail)
+    monkeypatch.setattr("mjsim.model.validation.report.check_path", fail)
+    monkeypatch.setattr("experiments.analysis.comparison.read_blocks", fail)
 
 
 def refused(words, tmp_path, capsys, codes=(1, 2)):
@@ -113,27 +90,16 @@ def refused(words, tmp_path, capsys, codes=(1, 2)):
 
 @pytest.mark.parametrize("force", [[], ["--force"]], ids=["", "force"])
 @pytest.mark.parametrize(
-    "make",
-    [
-        make_run_with_notes,
-        make_notes,
-        make_batch,
-        make_file,
-        make_dangling_link,
-        make_loop,
-        make_link_to_notes,
-        make_pipe,
-        below_a_file,
-    ],
+    "state", [state for state in STATES if state not in ("run", "tables of others", "strange batch")]
 )
-def test_a_run_replaces_nothing_but_runs(make, force, tmp_path, capsys):
-    place = make(tmp_path / "out") or tmp_path / "out"
+def test_a_run_replaces_nothing_but_runs(state, force, tmp_path, capsys):
+    place = make(state, tmp_path / "out")
     line = refused(["run", "--no-video", *force, "--out", place], tmp_path, capsys)
     assert str(tmp_path / "out") in line
 
 
 def test_a_run_is_replaced_only_when_told_so(tmp_path, capsys):
-    make_run(tmp_path / "out")
+    fill_run(tmp_path / "out")
     assert "--force" in refused(["run", "--out", tmp_path / "out"], tmp_path, capsys)
 
 
@@ -145,19 +111,10 @@ def test_places_where_no_run_can_be(place, tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "make",
-    [
-        make_notes,
-        make_run,
-        make_file,
-        make_strange_batch,
-        make_tables_of_others,
-        make_loop,
-        make_dangling_link,
-    ],
+    "state", ["notes", "run", "file", "strange batch", "tables of others", "loop", "dangling link"]
 )
-def test_a_batch_adds_to_batches_alone(make, tmp_path, capsys):
-    make(tmp_path / "out")
+def test_a_batch_adds_to_batches_alone(state, tmp_path, capsys):
+    make(state, tmp_path / "out")
     line = refused(["batch", "--seeds", "0", "--out", tmp_path / "out"], tmp_path, capsys)
     assert str(tmp_path / "out") in line
 
@@ -175,13 +132,11 @@ def commands_that_write_a_file(tmp_path):
     }
 
 
-@pytest.mark.parametrize(
-    "make", [make_file, make_notes, make_dangling_link, make_loop, make_pipe, below_a_file]
-)
+@pytest.mark.parametrize("state", ["file", "notes", "dangling link", "loop", "pipe", "below a file"])
 @pytest.mark.parametrize("command", ["house", "plan", "replay", "bench", "check", "compare"])
-def test_files_that_exist_are_kept(command, make, tmp_path, capsys):
+def test_files_that_exist_are_kept(command, state, tmp_path, capsys):
     words = commands_that_write_a_file(tmp_path)[command]
-    place = make(tmp_path / "out.xml") or tmp_path / "out.xml"
+    place = make(state, tmp_path / "out.xml")
     assert str(tmp_path / "out.xml") in refused([*words, place], tmp_path, capsys)
 
 
@@ -209,8 +164,8 @@ def test_a_run_that_finds_its_place_taken_is_kept_beside_it(tmp_path):
         run_directory(tmp_path / "out") as folder,
     ):
         fill_run(folder)
-        make_notes(tmp_path / "out")
-    assert (tmp_path / "out" / "notes.txt").read_text() == "precious"
+        write(tmp_path / "out" / NOTES)
+    assert (tmp_path / "out" / NOTES).read_text() == "precious"
     assert (tmp_path / "out-2" / METRICS).is_file()
 
 

@@ -8,15 +8,16 @@ import time
 
 import pytest
 
-from experiments.files import read_json
-from experiments.replaying.replay import replay
-from experiments.runs import records
-from experiments.runs.records import read_events
-from experiments.runs.trajectory import Trajectory
-from experiments.signals import PATIENCE, Stopped, signals_postponed, signals_raised
+from experiments.record import records
+from experiments.record.files import read_json
+from experiments.record.records import read_events
+from experiments.record.writer import RecordWriter
+from experiments.replay.replay import replay
+from experiments.session.signals import PATIENCE, Stopped, signals_postponed, signals_raised
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from faults.conftest import FAST, ROOT, one_line
+from mjsim.files import WORK
 
 PARTICIPANT = """
 import os, signal, time
@@ -36,6 +37,7 @@ def build(house, rng):
 RUN = ("run", *FAST, "--no-video", "--no-floor-plan", "--assistance", "none", "--user", "own_code:build")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seconds"), [("SIGINT", 0), ("SIGTERM", 0), ("SIGHUP", 0), ("SIGTERM", 30)], ids=str
 )
@@ -85,6 +87,7 @@ def test_an_ignored_signal_stays_ignored():
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_batch_that_is_stopped_writes_its_tables(number, tmp_path):
     words = ["batch", *FAST, "--assistance", "optimal", "--seeds", "0:200", "--workers", "1", "--out", "out"]
@@ -104,7 +107,7 @@ def test_a_batch_that_is_stopped_writes_its_tables(number, tmp_path):
     _, said = process.communicate(timeout=60)
     assert process.returncode == 128 + number
     assert number.name in one_line(said)
-    done = [path.name for path in trials.iterdir()]
+    done = [path.name for path in trials.iterdir() if not path.name.startswith(WORK)]
     assert not [name for name in done if name.startswith(".")]
     assert len((tmp_path / "out" / "trials.csv").read_text().splitlines()) == len(done) + 1 < 200
 
@@ -118,12 +121,12 @@ def test_a_worker_that_is_killed_is_one_line(tmp_path, mjsim, own_module):
     done = mjsim("batch", *FAST, *words, "--out", "out")
     assert done.returncode == 1
     assert "Traceback" not in done.stderr and "worker" in done.stderr
-    assert not list((tmp_path / "out" / "trials").iterdir())
+    assert all(path.name.startswith(WORK) for path in (tmp_path / "out" / "trials").iterdir())
 
 
 def test_a_signal_in_the_very_first_step_leaves_one_state(house, tmp_path, monkeypatch):
-    """Where a step takes so long that the signal cannot wait, it comes between two halves of the record."""
-    monkeypatch.setattr(Trajectory, "append", stopped_once(Trajectory.append))
+    """Where a step takes so long that the signal cannot wait, it comes before the step is recorded."""
+    monkeypatch.setattr(RecordWriter, "append", stopped_once(RecordWriter.append))
     config = TrialConfig(objects=2, assistance="optimal", seed=0, regret=False)
     assert run_trial(config, tmp_path / "out", topdown=False, house=house)["ended"] == "interrupted"
     assert replay(tmp_path / "out", house=house).steps == 1

@@ -1,19 +1,13 @@
 """Trials that several sentences look at: real runs in the apartment, with as little physics as possible."""
 
 import pytest
+from sessions import play
 
-from experiments.house import House
 from mjsim.render import render_pictures
-from paper.sessions import Played, play
 
 
 @pytest.fixture(scope="session")
-def house() -> House:
-    return House.load()
-
-
-@pytest.fixture(scope="session")
-def pictures(house: House):
+def pictures(house):
     """The pictures of the lists, drawn once for all frames of these tests."""
     found = render_pictures(house.catalogue)
     with pytest.MonkeyPatch.context() as patch:
@@ -22,12 +16,12 @@ def pictures(house: House):
 
 
 @pytest.fixture(scope="session")
-def followed(house: House) -> Played:
+def followed(house):
     """Somebody who does what `optimal` suggests."""
     return play(house, "optimal")
 
 
 @pytest.fixture(scope="session")
-def own_way(house: House) -> Played:
+def own_way(house):
     """Somebody who is shown the plan and often does something else."""
     return play(house, "optimal", user="boltzmann:30")

@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
+from sessions import opened, play
 
 from mjsim.observation import ObjectStatus
-from paper.sessions import opened, play
 
 
 def tours(played):
@@ -127,5 +127,5 @@ def test_the_assistant_cannot_touch_the_world(house):
     for assistance in ("none", "highlight", "optimal", "guided"):
         played = play(house, assistance, user="boltzmann:0", objects=2)
         assert played.shown[-1][0].object_status == (ObjectStatus.DELIVERED,) * 2
-        finals.add(tuple(played.session.recording.state_hashes().tolist()))
+        finals.add(tuple(played.session.record.record().recording["state_hash"].tolist()))
     assert len(finals) == 1

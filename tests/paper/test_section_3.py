@@ -4,9 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from sessions import SIZES, opened
 
 from experiments.participants.follower import Follower
-from experiments.runs.records import EventLog
+from experiments.record.records import EventLog
 from experiments.session.film_config import FilmConfig
 from experiments.session.first_person import FirstPersonRenderer
 from experiments.trials.setup import prepare_session, trial_episode
@@ -16,7 +17,6 @@ from hud.messages import message
 from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
 from mjsim.model.scene import compose
 from mjsim.observation import ObjectStatus
-from paper.sessions import SIZES, opened
 
 UNKNOWN = "object_99"
 
@@ -26,7 +26,7 @@ class Clumsy:
 
     needs = frozenset()
 
-    def __init__(self, house) -> None:
+    def __init__(self, house):
         self._follower = Follower(house, np.random.default_rng(0))
         self.world = None
         self.tried: dict[Refusal, ActionResult] = {}
@@ -49,7 +49,7 @@ class Clumsy:
 class Photographer:
     """A viewer that draws what is shown right after each refusal, with and without the message."""
 
-    def __init__(self, scene, house, sizes) -> None:
+    def __init__(self, scene, house, sizes):
         self._renderers = [FirstPersonRenderer(scene, house, FilmConfig(*size, "draft")) for size in sizes]
         self._sizes = sizes
         self.user = None

@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from sessions import opened
 
-from experiments.familiarisation.story import story_text
+from experiments.procedure.story import story_text
 from mjsim.model import sampling
 from mjsim.observation import ObjectStatus
-from paper.sessions import opened
 
 HOUSES = range(200)
 LEVELS = (6, 12, 18, 24)
@@ -27,7 +27,7 @@ BINS = {  # category -> its bin, and where the paper has that
 
 @pytest.fixture(scope="module")
 def houses(house):
-    """Episodes by house and level. Objects are left at their points; tests/test_sampling.py lets them settle."""
+    """Episodes by house and level. Objects are left at their points; test_sampling.py lets them settle."""
     pools, draw = {}, sampling.house_points
 
     def points_once(*arguments, seed, points):

@@ -5,15 +5,14 @@ import math
 import cv2
 import numpy as np
 import pytest
+from sessions import SIZES, opened, play
 
 from hud import theme
 from hud.compose import Compositor
 from hud.markers import BREADCRUMB, BREADCRUMB_RADIUS, CHEST_HEIGHT, FLAGPOLE
-from hud.state import HudState
+from mjsim.model.sight import FieldOfView, in_field_of_view, visible_objects
 from mjsim.observation import ObjectStatus
 from mjsim.render import CameraPose, Renderer
-from mjsim.visibility import FieldOfView, in_field_of_view, visible_objects
-from paper.sessions import SIZES, opened, play
 
 CONDITIONS = ("none", "highlight", "optimal")
 sizes = pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
@@ -37,7 +36,7 @@ def highlighted(house):
     return play(house, "highlight")
 
 
-def tiles(frame, state: HudState, compositor: Compositor, panel: str):
+def tiles(frame, state, compositor, panel):
     """The pictures in a list's rows, in order, each (s, s, 3), and the pictures' keys that they should be."""
     height, width = frame.shape[:2]
     layout = compositor.layout(state, width, height)

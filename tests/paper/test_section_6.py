@@ -3,14 +3,18 @@
 import numpy as np
 import pytest
 
-from experiments.runs.metrics import compute_metrics
+from experiments.record.metrics import compute_metrics
 
 
 @pytest.fixture(params=["followed", "own_way"])
 def measured(request):
     played = request.getfixturevalue(request.param)
     positions = np.array([observation.position for observation, _ in played.shown])
-    return played, positions, compute_metrics(played.events, played.session.trajectory.arrays()["position"])
+    return (
+        played,
+        positions,
+        compute_metrics(played.events, played.session.record.record().trajectory["position"]),
+    )
 
 
 def test_task_distance_is_what_was_walked(measured):
@@ -58,14 +62,14 @@ def test_completion_time_is_over_the_own_fly_through(own_way):
         {"t": 0.0, "event": "phase_ended", "phase": "flythrough", "duration_s": 50.0},
         *own_way.events[1:],
     ]
-    metrics = compute_metrics(events, own_way.session.trajectory.arrays()["position"])
+    metrics = compute_metrics(events, own_way.session.record.record().trajectory["position"])
     assert metrics.completion_over_familiarisation == own_way.events[-1]["t"] / 50.0
     assert metrics.completion_time_s == own_way.events[-1]["t"]
 
 
 def test_deviations_rise_and_path_efficiency_falls_for_who_goes_an_own_way(followed, own_way):
     one, other = (
-        compute_metrics(played.events, played.session.trajectory.arrays()["position"])
+        compute_metrics(played.events, played.session.record.record().trajectory["position"])
         for played in (followed, own_way)
     )
     assert one.nd_strict_2n < other.nd_strict_2n

@@ -5,8 +5,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from authoring.objects import build_meshes
-from authoring.textures import build_textures
+from tools.authoring.objects import build_meshes
+from tools.authoring.textures import build_textures
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

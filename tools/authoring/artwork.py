@@ -6,7 +6,7 @@ Each painter takes a generator and returns an RGB image, floats in [0, 1].
 import cv2
 import numpy as np
 
-from authoring.patterns import Floats, blend, disc, flat, grid, noise, polygon, ramp, rgb, smooth_step
+from tools.authoring.patterns import Floats, blend, disc, flat, grid, noise, polygon, ramp, rgb, smooth_step
 
 
 def garden(rng: np.random.Generator) -> Floats:

@@ -5,10 +5,10 @@ import math
 import numpy as np
 from shapely.geometry import Polygon
 
-from authoring.mesh_tools import Floats, Surface, arc, from_above, join, ridge, sheet, slab
+from tools.authoring.mesh_tools import Floats, LabelledMesh, arc, from_above, join, ridge, sheet, slab
 
 
-def meshes() -> dict[str, Surface]:
+def meshes() -> dict[str, LabelledMesh]:
     """Mesh name -> surface; spines run along y."""
     return {
         "hardback_cover": slab(0.15, 0.2, 0.0035).moved((0, 0, 0.0365)),
@@ -21,14 +21,14 @@ def meshes() -> dict[str, Surface]:
     }
 
 
-def _spine(height: float, length: float, bulge: float) -> Surface:
+def _spine(height: float, length: float, bulge: float) -> LabelledMesh:
     """A rounded back: half an ellipse extruded along y, flat side towards +x."""
     curve = arc(height / 2, 0.5 * math.pi, 1.5 * math.pi, 9)
     outline = Polygon(np.column_stack([curve[:, 0] * bulge / (height / 2), curve[:, 1]]))
     return ridge(outline, length)
 
 
-def _curled() -> Surface:
+def _curled() -> LabelledMesh:
     """A thin magazine whose free edge lifts a little."""
     x, y = np.meshgrid(np.linspace(-0.075, 0.075, 9), np.array([-0.105, 0.105]), indexing="ij")
     lift = 0.007 * np.clip((x + 0.02) / 0.095, 0, 1) ** 2
@@ -37,7 +37,7 @@ def _curled() -> Surface:
     return _closed(top, bottom)
 
 
-def _open_pages() -> Surface:
+def _open_pages() -> LabelledMesh:
     """Two arched halves; the gutter runs along x, the halves lie to either side in y."""
     y = np.concatenate([np.linspace(-0.12, -0.004, 9), [0.0], np.linspace(0.004, 0.12, 9)])
     arch = 0.012 + 0.02 * np.sqrt(np.clip(np.abs(y) / 0.03, 0, 1)) * (1.0 - 0.55 * np.abs(y) / 0.12)
@@ -48,10 +48,10 @@ def _open_pages() -> Surface:
     return _closed(top, bottom)
 
 
-def _closed(top: Floats, bottom: Floats) -> Surface:
+def _closed(top: Floats, bottom: Floats) -> LabelledMesh:
     """Close two grids (rows, columns, 3) into a solid; the texture lies on the upper one."""
     upper, lower = from_above(sheet(top)), sheet(bottom)
-    lower = Surface(lower.vertices, lower.faces[:, ::-1])
+    lower = LabelledMesh(lower.vertices, lower.faces[:, ::-1])
 
     def rim(points: Floats) -> Floats:
         return np.vstack(
@@ -59,5 +59,5 @@ def _closed(top: Floats, bottom: Floats) -> Surface:
         )
 
     skirt = sheet(np.stack([rim(bottom), rim(top)], axis=1))
-    parts = [Surface(s.vertices, s.faces, np.full((len(s.vertices), 2), 0.01)) for s in (lower, skirt)]
+    parts = [LabelledMesh(s.vertices, s.faces, np.full((len(s.vertices), 2), 0.01)) for s in (lower, skirt)]
     return join([upper, *parts])

@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 
-from authoring.mesh_tools import Surface, arc, join, lathe, mm, tube
+from tools.authoring.mesh_tools import LabelledMesh, arc, join, lathe, mm, tube
 
 
-def meshes() -> dict[str, Surface]:
+def meshes() -> dict[str, LabelledMesh]:
     """Mesh name -> surface."""
     return {**_mug(), **_bowl(), **_plate(), **_pot(), **_teapot()}
 
 
-def _mug() -> dict[str, Surface]:
+def _mug() -> dict[str, LabelledMesh]:
     wall = lathe(mm("0 0, 34 0, 42 6, 45 30, 45 100, 41 100"))
     lining = lathe(mm("41 100, 40 20, 34 10, 0 10"))
     bow = arc(0.03, -0.62 * math.pi, 0.62 * math.pi, 11)
@@ -21,20 +21,20 @@ def _mug() -> dict[str, Surface]:
     return {"mug_wall": join([wall, handle]).moved(shift), "mug_lining": lining.moved(shift)}
 
 
-def _bowl() -> dict[str, Surface]:
+def _bowl() -> dict[str, LabelledMesh]:
     outside = mm("0 0, 40 0, 42 8, 60 25, 74 48, 80 72, 76 72")
     inside = mm("76 72, 70 50, 56 30, 36 14, 0 12")
     return {"bowl_outside": lathe(outside, 28), "bowl_inside": lathe(inside, 28)}
 
 
-def _plate() -> dict[str, Surface]:
+def _plate() -> dict[str, LabelledMesh]:
     under = mm("0 0, 45 0, 50 4, 82 18, 83.5 21, 82 22.5")
     rim = [(0.082, 0.0225), (0.056, 0.012)]
     well = mm("56 12, 50 7, 0 7")
     return {"plate_body": join([lathe(under, 32), lathe(well, 32)]), "plate_rim": lathe(rim, 32)}
 
 
-def _pot() -> dict[str, Surface]:
+def _pot() -> dict[str, LabelledMesh]:
     body = lathe(mm("0 0, 66 0, 74 8, 75 85, 0 85"), 28)
     ears = []
     for side in (-1, 1):
@@ -45,7 +45,7 @@ def _pot() -> dict[str, Surface]:
     return {"pot_body": body, "pot_lid": lid, "pot_fittings": join([*ears, knob])}
 
 
-def _teapot() -> dict[str, Surface]:
+def _teapot() -> dict[str, LabelledMesh]:
     belly = lathe(mm("0 0, 40 0, 44 6, 62 35, 64 55, 54 82, 34 98, 0 98"), 28)
     spout = tube(
         [(0, 0.05, 0.035), (0, 0.078, 0.052), (0, 0.092, 0.078), (0, 0.108, 0.1)], [0.02, 0.015, 0.011, 0.009]

@@ -6,15 +6,26 @@ import numpy as np
 from shapely import affinity
 from shapely.geometry import LineString, Point, Polygon, box
 
-from authoring.mesh_tools import Floats, Surface, arc, cushion, extrude, from_above, join, lathe, mm, sheet
+from tools.authoring.mesh_tools import (
+    Floats,
+    LabelledMesh,
+    arc,
+    cushion,
+    extrude,
+    from_above,
+    join,
+    lathe,
+    mm,
+    sheet,
+)
 
 
-def meshes() -> dict[str, Surface]:
+def meshes() -> dict[str, LabelledMesh]:
     """Mesh name -> surface."""
     return {**_socks(), **_t_shirt(), "towel": _towel(), "jeans": _jeans(), **_cap()}
 
 
-def _socks() -> dict[str, Surface]:
+def _socks() -> dict[str, LabelledMesh]:
     """Two socks side by side, one half on the other; legs along y."""
     leg = Polygon(mm("-28 -20, -28 110, 28 110, 28 -50, 0 -85"))
     foot = Polygon(mm("-28 -20, 0 -85, 28 -50, -30 0, -100 -30, -100 -85"))
@@ -34,13 +45,13 @@ def _socks() -> dict[str, Surface]:
         ]
     )
 
-    def pair(part: Surface) -> Surface:
+    def pair(part: LabelledMesh) -> LabelledMesh:
         return join([part.moved((0.0, -0.005, 0)), part.turned(0.12).moved((0.078, -0.022, 0.02))])
 
     return {"socks_knit": pair(knit), "socks_trim": pair(trim)}
 
 
-def _t_shirt() -> dict[str, Surface]:
+def _t_shirt() -> dict[str, LabelledMesh]:
     """A small T-shirt spread out flat, collar at +y."""
     half = mm("40 125, 85 112, 152 35, 112 0, 68 52, 74 -130")
     outline = Polygon([*half, *((-x, y) for x, y in reversed(half))])
@@ -63,7 +74,7 @@ def _t_shirt() -> dict[str, Surface]:
     }
 
 
-def _rumpled(surface: Surface, depth: float) -> Surface:
+def _rumpled(surface: LabelledMesh, depth: float) -> LabelledMesh:
     """Soft waves in the upper side."""
 
     def rule(v: Floats) -> Floats:
@@ -75,7 +86,7 @@ def _rumpled(surface: Surface, depth: float) -> Surface:
     return surface.bent(rule)
 
 
-def _towel() -> Surface:
+def _towel() -> LabelledMesh:
     """A dropped towel: a heap with radial folds; the texture runs along the cloth."""
     u, v = np.meshgrid(np.linspace(-1, 1, 23), np.linspace(-1, 1, 23), indexing="ij")
     # Square cloth to round heap, drawn in unevenly so that the hem meanders.
@@ -94,14 +105,14 @@ def _towel() -> Surface:
     )
 
 
-def _jeans() -> Surface:
+def _jeans() -> LabelledMesh:
     """Jeans spread out flat, waist at +y."""
     half = mm("80 125, 95 50, 140 -105, 50 -125")
     outline = Polygon([*half, (0.0, 0.02), *((-x, y) for x, y in reversed(half))])
     return _rumpled(cushion(outline, 0.026, 0.006), 0.003)
 
 
-def _cap() -> dict[str, Surface]:
+def _cap() -> dict[str, LabelledMesh]:
     """A baseball cap, brim towards +y."""
     t = np.linspace(0.0, 0.5 * math.pi, 8)
     dome = np.column_stack([0.088 * np.cos(t) ** 0.8, 0.012 + 0.083 * np.sin(t)])

@@ -5,15 +5,26 @@ import math
 import numpy as np
 from shapely.geometry import Point, Polygon, box
 
-from authoring.mesh_tools import Surface, arc, extrude, join, lathe, mm, rounded_box, side, slab, tube
+from tools.authoring.mesh_tools import (
+    LabelledMesh,
+    arc,
+    extrude,
+    join,
+    lathe,
+    mm,
+    rounded_box,
+    side,
+    slab,
+    tube,
+)
 
 
-def meshes() -> dict[str, Surface]:
+def meshes() -> dict[str, LabelledMesh]:
     """Mesh name -> surface."""
     return {**_stapler(), **_tape(), **_pencil_cup(), **_calculator(), **_notebook(), **_hole_punch()}
 
 
-def _stapler() -> dict[str, Surface]:
+def _stapler() -> dict[str, LabelledMesh]:
     base = Polygon(mm("-90 0, 90 0, 90 10, 20 16, -60 16, -90 14"))
     arm = Polygon(mm("-90 26, -84 52, -50 62, 30 64, 85 50, 92 36, 80 30"))
     hinge = Polygon(mm("-80 10, -50 10, -55 45, -78 45"))
@@ -25,7 +36,7 @@ def _stapler() -> dict[str, Surface]:
     }
 
 
-def _tape() -> dict[str, Surface]:
+def _tape() -> dict[str, LabelledMesh]:
     """A desk dispenser: roll at -y, cutter at +y."""
     profile = mm("-85 0, 85 0, 88 40, 70 45, 50 22, -0 18, -18 30, -50 30, -85 30")
     cheek = Polygon(mm("-85 0, 0 0, 0 30, -22 55, -55 55, -85 30"))
@@ -42,7 +53,7 @@ def _tape() -> dict[str, Surface]:
     }
 
 
-def _pencil_cup() -> dict[str, Surface]:
+def _pencil_cup() -> dict[str, LabelledMesh]:
     cup = lathe(mm("0 0, 38 0, 40 2, 42 98, 42 100, 38 100, 37 70, 0 70"))
     return {
         "pencil_cup": cup,
@@ -51,16 +62,16 @@ def _pencil_cup() -> dict[str, Surface]:
     }
 
 
-def _pencil() -> Surface:
+def _pencil() -> LabelledMesh:
     return lathe(mm("0 0, 6.2 0, 6.2 140, 0 140"), 6)
 
 
-def _calculator() -> dict[str, Surface]:
+def _calculator() -> dict[str, LabelledMesh]:
     case = rounded_box(0.09, 0.15, 0.022, 0.006)
     return {"calculator_case": case, "calculator_face": slab(0.08, 0.138, 0.0015).moved((0, 0, 0.0215))}
 
 
-def _notebook() -> dict[str, Surface]:
+def _notebook() -> dict[str, LabelledMesh]:
     """Bound along its long side at -x."""
     loops = []
     for y in np.linspace(-0.085, 0.085, 11):
@@ -72,7 +83,7 @@ def _notebook() -> dict[str, Surface]:
     }
 
 
-def _hole_punch() -> dict[str, Surface]:
+def _hole_punch() -> dict[str, LabelledMesh]:
     """Lever drawn from the side, handle at +y."""
     lever = Polygon(mm("-50 40, -45 62, -20 72, 30 76, 68 72, 72 62, 10 50"))
     bracket = Polygon(mm("-50 12, -5 12, -10 55, -45 55"))

@@ -8,12 +8,12 @@ from shapely import affinity
 from shapely.geometry import LineString, Polygon
 from shapely.ops import unary_union
 
-from authoring.mesh_tools import Surface, arc, extrude, join, slab, tube
+from tools.authoring.mesh_tools import LabelledMesh, arc, extrude, join, slab, tube
 
 WIRE = 0.0035  # radius of the dish rack's wires, m
 
 
-def meshes() -> dict[str, Surface]:
+def meshes() -> dict[str, LabelledMesh]:
     """Mesh name -> surface."""
     books = {f"shelf_books_{k}": books for k, books in enumerate(_shelf_books())}
     return {
@@ -26,7 +26,7 @@ def meshes() -> dict[str, Surface]:
     }
 
 
-def _dish_rack(width: float, depth: float, low: float, high: float) -> Surface:
+def _dish_rack(width: float, depth: float, low: float, high: float) -> LabelledMesh:
     """Upright wires around a rectangle between the heights `low` and `high`, with two rails."""
     x, y = width / 2, depth / 2
     corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
@@ -41,7 +41,7 @@ def _dish_rack(width: float, depth: float, low: float, high: float) -> Surface:
     return join(bars)
 
 
-def _recycling_symbol(size: float) -> Surface:
+def _recycling_symbol(size: float) -> LabelledMesh:
     """Three chasing arrows of about `size` in height around the origin, extruded 4 mm."""
     path = np.array([[0.16, -0.3], [-0.32, -0.3], [-0.45, -0.1], [-0.3, 0.13]])
     band = LineString(path).buffer(0.085, cap_style="flat", join_style="bevel")
@@ -56,17 +56,17 @@ def _recycling_symbol(size: float) -> Surface:
     return join([extrude(affinity.scale(a, size, size, origin=(0, 0)), 0.004) for a in drawing])
 
 
-def _handle() -> Surface:
+def _handle() -> LabelledMesh:
     """A bow handle in the x-z plane, ends pointing up at z = 0."""
     bow = arc(0.06, math.pi, 2 * math.pi, 9, 0.8)
     return tube(np.column_stack([bow[:, 0], np.zeros(9), bow[:, 1]]), 0.009, 6)
 
 
-def _shelf_books() -> list[Surface]:
+def _shelf_books() -> list[LabelledMesh]:
     """Standing books on two shelves of the bookcase, in four colours; spines face -y."""
     widths = [0.032, 0.024, 0.04, 0.028, 0.036, 0.022, 0.045, 0.03]
     heights = [0.2, 0.215, 0.18, 0.205, 0.19, 0.222]
-    colours: list[list[Surface]] = [[], [], [], []]
+    colours: list[list[LabelledMesh]] = [[], [], [], []]
     for shelf, (base, left, right) in enumerate([(0.06, -0.41, 0.3), (0.335, -0.25, 0.41)]):
         x, k = left, 3 * shelf
         while x + widths[k % 8] < right:
@@ -74,7 +74,7 @@ def _shelf_books() -> list[Surface]:
             box = trimesh.creation.box((width - 0.002, depth, height))
             middle = np.array([x + width / 2, -0.14 + depth / 2, base + height / 2])
             colours[(k * 3 + k // 5) % 4].append(
-                Surface(np.asarray(box.vertices) + middle, np.asarray(box.faces))
+                LabelledMesh(np.asarray(box.vertices) + middle, np.asarray(box.faces))
             )
             x, k = x + width, k + 1
     return [join(books) for books in colours]

@@ -19,7 +19,7 @@ CREASE = math.radians(40.0)  # faces that meet at a sharper angle get separate n
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class LabelledMesh:
     """A triangle mesh, in m.
 
     Attributes:
@@ -32,24 +32,24 @@ class Surface:
     faces: NDArray[np.int64]
     uv: Floats | None = None
 
-    def moved(self, offset: ArrayLike) -> "Surface":
+    def moved(self, offset: ArrayLike) -> "LabelledMesh":
         """The same surface, shifted by `offset` (m, shape (3,))."""
-        return Surface(self.vertices + np.asarray(offset, dtype=float), self.faces, self.uv)
+        return LabelledMesh(self.vertices + np.asarray(offset, dtype=float), self.faces, self.uv)
 
-    def turned(self, angle: float) -> "Surface":
+    def turned(self, angle: float) -> "LabelledMesh":
         """The same surface, turned about z by `angle` rad."""
         c, s = math.cos(angle), math.sin(angle)
-        return Surface(
+        return LabelledMesh(
             self.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), self.faces, self.uv
         )
 
-    def lengthwise(self) -> "Surface":
+    def lengthwise(self) -> "LabelledMesh":
         """Axes x, y, z become y, z, x: an extruded drawing then stands up, its thickness across."""
-        return Surface(self.vertices[:, [2, 0, 1]], self.faces, self.uv)
+        return LabelledMesh(self.vertices[:, [2, 0, 1]], self.faces, self.uv)
 
-    def bent(self, rule: Callable[[Floats], Floats]) -> "Surface":
+    def bent(self, rule: Callable[[Floats], Floats]) -> "LabelledMesh":
         """The same surface with its vertices (n, 3) mapped by `rule`."""
-        return Surface(rule(self.vertices), self.faces, self.uv)
+        return LabelledMesh(rule(self.vertices), self.faces, self.uv)
 
 
 def mm(points: str) -> Floats:
@@ -57,19 +57,19 @@ def mm(points: str) -> Floats:
     return np.array([[float(value) / 1000 for value in point.split()] for point in points.split(",")])
 
 
-def join(surfaces: Sequence[Surface]) -> Surface:
+def join(surfaces: Sequence[LabelledMesh]) -> LabelledMesh:
     """One surface out of several, without UV unless all have it."""
     offsets = np.cumsum([0, *(len(s.vertices) for s in surfaces[:-1])])
     uvs = [s.uv for s in surfaces if s.uv is not None]
-    return Surface(
+    return LabelledMesh(
         np.vstack([s.vertices for s in surfaces]),
         np.vstack([s.faces + o for s, o in zip(surfaces, offsets, strict=True)]),
         np.vstack(uvs) if len(uvs) == len(surfaces) else None,
     )
 
 
-def sheet(points: Floats) -> Surface:
-    """Surface over a grid of points, shape (rows, columns, 3); the outside is rows x columns (right-handed)."""
+def sheet(points: Floats) -> LabelledMesh:
+    """LabelledMesh over a grid of points, shape (rows, columns, 3); the outside is rows x columns (right-handed)."""
     rows, columns = points.shape[:2]
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()
@@ -77,10 +77,12 @@ def sheet(points: Floats) -> Surface:
     faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     vertices = points.reshape(-1, 3)
     u, v = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
-    return Surface(vertices, _without_slivers(vertices, faces), np.column_stack([u.ravel(), v.ravel()]))
+    return LabelledMesh(vertices, _without_slivers(vertices, faces), np.column_stack([u.ravel(), v.ravel()]))
 
 
-def lathe(profile: ArrayLike, sections: int = 24, start: float = 0.0, stop: float = 2 * math.pi) -> Surface:
+def lathe(
+    profile: ArrayLike, sections: int = 24, start: float = 0.0, stop: float = 2 * math.pi
+) -> LabelledMesh:
     """Turn a profile of (radius, height) points about z; the outside is to the right of its direction."""
     line = np.asarray(profile, dtype=float)
     angles = np.linspace(start, stop, sections + 1)
@@ -91,7 +93,7 @@ def lathe(profile: ArrayLike, sections: int = 24, start: float = 0.0, stop: floa
     return sheet(points)
 
 
-def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> Surface:
+def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> LabelledMesh:
     """A round bar along a path, shape (k, 3), with closed ends; `radius` may change along it."""
     line = np.asarray(path, dtype=float)
     radii = np.broadcast_to(np.asarray(radius, dtype=float), (len(line),))
@@ -115,29 +117,29 @@ def arc(radius: float, start: float, stop: float, points: int, squash: float = 1
     return np.column_stack([radius * np.cos(t), squash * radius * np.sin(t)])
 
 
-def extrude(polygon: Polygon | MultiPolygon, height: float) -> Surface:
+def extrude(polygon: Polygon | MultiPolygon, height: float) -> LabelledMesh:
     """A prism over one or more polygons in the x-y plane, from z = 0 to `height`."""
     if isinstance(polygon, MultiPolygon):
         return join([extrude(part, height) for part in polygon.geoms])
     mesh = trimesh.creation.extrude_polygon(orient(polygon), height, engine="manifold")
-    return Surface(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
+    return LabelledMesh(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64))
 
 
-def side(drawing: Polygon | MultiPolygon, width: float, rounding: float = 0.0) -> Surface:
+def side(drawing: Polygon | MultiPolygon, width: float, rounding: float = 0.0) -> LabelledMesh:
     """A body drawn from the side in the y-z plane, `width` across x, its corners rounded by `rounding` (m)."""
     if rounding:
         drawing = drawing.buffer(-rounding, quad_segs=3).buffer(rounding, quad_segs=3)
     return extrude(drawing, width).moved((0, 0, -width / 2)).lengthwise()
 
 
-def ridge(drawing: Polygon, length: float) -> Surface:
+def ridge(drawing: Polygon, length: float) -> LabelledMesh:
     """A prism along y over a drawing in the x-z plane."""
     prism = extrude(drawing, length).moved((0, 0, -length / 2))
     # Lay the extrusion direction along y: (x, y, z) -> (x, -z, y) is a rotation about x.
-    return Surface(prism.vertices[:, [0, 2, 1]] * [1, -1, 1], prism.faces)
+    return LabelledMesh(prism.vertices[:, [0, 2, 1]] * [1, -1, 1], prism.faces)
 
 
-def cushion(polygon: Polygon, height: float, edge: float) -> Surface:
+def cushion(polygon: Polygon, height: float, edge: float) -> LabelledMesh:
     """A flat pillow over a polygon: a prism with its upper and lower edges rounded by `edge`, UV from above.
 
     Raises:
@@ -168,43 +170,43 @@ def cushion(polygon: Polygon, height: float, edge: float) -> Surface:
         spans = flat[faces][:, 1:] - flat[faces][:, :1]
         downwards = (spans[:, 0, 0] * spans[:, 1, 1] - spans[:, 0, 1] * spans[:, 1, 0]).sum() < 0
         lids.append(
-            Surface(vertices, np.asarray(faces[:, ::-1] if flip != downwards else faces, dtype=np.int64))
+            LabelledMesh(vertices, np.asarray(faces[:, ::-1] if flip != downwards else faces, dtype=np.int64))
         )
     return from_above(join([wall, *lids]))
 
 
-def from_above(surface: Surface) -> Surface:
+def from_above(surface: LabelledMesh) -> LabelledMesh:
     """Texture coordinates by looking straight down: u along x, v along y, over the bounding box."""
     low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
-    return Surface(surface.vertices, surface.faces, (surface.vertices[:, :2] - low) / (high - low))
+    return LabelledMesh(surface.vertices, surface.faces, (surface.vertices[:, :2] - low) / (high - low))
 
 
-def slab(width: float, depth: float, height: float) -> Surface:
+def slab(width: float, depth: float, height: float) -> LabelledMesh:
     """A box with its base at z = 0 whose top carries the texture; its sides take the texture's corner colour."""
     x, y = width / 2, depth / 2
     corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
-    top = Surface(np.column_stack([corners, np.full(4, height)]), np.array([[0, 1, 2], [0, 2, 3]]))
+    top = LabelledMesh(np.column_stack([corners, np.full(4, height)]), np.array([[0, 1, 2], [0, 2, 3]]))
     box = trimesh.creation.box((width, depth, height))
-    rest = Surface(
+    rest = LabelledMesh(
         np.asarray(box.vertices) + np.array([0, 0, height / 2]),
         np.asarray(box.faces[box.face_normals[:, 2] < 0.5]),
     )
     edge = np.full((len(rest.vertices), 2), 0.01)
-    return join([from_above(top), Surface(rest.vertices, rest.faces, edge)])
+    return join([from_above(top), LabelledMesh(rest.vertices, rest.faces, edge)])
 
 
-def rounded_box(width: float, depth: float, height: float, radius: float) -> Surface:
+def rounded_box(width: float, depth: float, height: float, radius: float) -> LabelledMesh:
     """A box with its base at z = 0 and edges rounded by `radius`."""
     ball = trimesh.creation.icosphere(subdivisions=1, radius=radius).vertices
     reach = np.array([width, depth, height]) / 2 - radius
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
     hull = trimesh.convex.convex_hull((ball[None] + (signs * reach)[:, None]).reshape(-1, 3))
-    return Surface(
+    return LabelledMesh(
         np.asarray(hull.vertices) + np.array([0, 0, height / 2]), np.asarray(hull.faces, dtype=np.int64)
     )
 
 
-def write_obj(path: Path, surface: Surface) -> None:
+def write_obj(path: Path, surface: LabelledMesh) -> None:
     """Write a surface with creased normals as OBJ text, rounded to 0.01 mm."""
     normals, normal_of = np.unique(np.round(_corner_normals(surface), 3) + 0.0, axis=0, return_inverse=True)
     corner = normal_of.reshape(-1, 3)
@@ -218,7 +220,7 @@ def write_obj(path: Path, surface: Surface) -> None:
     write_text_atomically(path, "\n".join(lines) + "\n")
 
 
-def _corner_normals(surface: Surface) -> Floats:
+def _corner_normals(surface: LabelledMesh) -> Floats:
     """Normal at every corner of every face, shape (3 m, 3): mean of the faces there that bend less than CREASE."""
     _, place = np.unique(np.round(surface.vertices, 6), axis=0, return_inverse=True)
     triangles = surface.vertices[surface.faces]

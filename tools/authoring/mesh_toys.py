@@ -5,15 +5,15 @@ import math
 import numpy as np
 from shapely.geometry import Polygon, box
 
-from authoring.mesh_tools import Surface, lathe, mm, side
+from tools.authoring.mesh_tools import LabelledMesh, lathe, mm, side
 
 
-def meshes() -> dict[str, Surface]:
+def meshes() -> dict[str, LabelledMesh]:
     """Mesh name -> surface."""
     return {**_car(), **_ball(), **_rings(), **_duck()}
 
 
-def _car() -> dict[str, Surface]:
+def _car() -> dict[str, LabelledMesh]:
     """Drawn from the side: nose at +, tail at -."""
     hull = Polygon(mm("-110 22, 110 22, 112 45, 100 56, 55 62, -105 64, -112 50"))
     cabin = Polygon(mm("-85 60, 60 60, 25 97, 15 100, -55 100, -65 97"))
@@ -27,7 +27,7 @@ def _car() -> dict[str, Surface]:
     }
 
 
-def _ball() -> dict[str, Surface]:
+def _ball() -> dict[str, LabelledMesh]:
     """One gore of six; the model turns it. Poles are level, so that the stripes show from above."""
     t = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 11)
     line = np.column_stack([0.08 * np.cos(t), 0.08 * np.sin(t)])
@@ -39,7 +39,7 @@ def _ball() -> dict[str, Surface]:
     return {name: gore.bent(lambda v: v @ turn + [0, 0, 0.08]) for name, gore in gores.items()}
 
 
-def _rings() -> dict[str, Surface]:
+def _rings() -> dict[str, LabelledMesh]:
     rings = {}
     for k, (major, minor, height) in enumerate(
         [(0.048, 0.02, 0.03), (0.041, 0.018, 0.064), (0.034, 0.016, 0.095), (0.027, 0.014, 0.122)]
@@ -51,7 +51,7 @@ def _rings() -> dict[str, Surface]:
     return rings
 
 
-def _duck() -> dict[str, Surface]:
+def _duck() -> dict[str, LabelledMesh]:
     body = lathe(mm("0 -52, 40 -50, 58 -20, 60 5, 45 35, 20 47, 0 50"), 22)
 
     def stretch(v: np.ndarray) -> np.ndarray:

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import cv2
 
-from authoring import (
+from mjsim.errors import AssetError
+from mjsim.files import replacing
+from tools.authoring import (
     mesh_books,
     mesh_dishes,
     mesh_labels,
@@ -14,30 +16,22 @@ from authoring import (
     mesh_recycling,
     mesh_toys,
 )
-from authoring.mesh_tools import Surface, write_obj
-from mjsim.errors import AssetError
-from mjsim.files import replacing
+from tools.authoring.mesh_tools import LabelledMesh, write_obj
 
 
-def object_meshes() -> dict[str, Surface]:
+def object_meshes() -> dict[str, LabelledMesh]:
     """Every mesh of the object models by name; the same on every call."""
     modules = (mesh_dishes, mesh_toys, mesh_books, mesh_laundry, mesh_office, mesh_recycling)
     return {name: surface for module in modules for name, surface in module.meshes().items()}
 
 
-def receptacle_meshes() -> dict[str, Surface]:
+def receptacle_meshes() -> dict[str, LabelledMesh]:
     """Every mesh of the receptacle models by name; the same on every call."""
     return mesh_receptacles.meshes()
 
 
 def build_meshes(models_root: Path) -> list[Path]:
-    """Write meshes and label textures below `models_root/objects` and `models_root/receptacles`.
-
-    Args:
-        models_root: The folder of models, as `mjsim.model.assets.models_root` gives it.
-
-    Returns:
-        The files written, in a fixed order.
+    """Write meshes and label textures below `models_root`; the files written, in a fixed order.
 
     Raises:
         AssetError: A texture cannot be encoded.

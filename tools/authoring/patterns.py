@@ -20,16 +20,9 @@ def rgb(code: str) -> Floats:
 def noise(
     rng: np.random.Generator, shape: tuple[int, int], *, roll_off: float = 1.0, stretch: float = 1.0
 ) -> Floats:
-    """Periodic noise whose amplitude falls with spatial frequency f as 1 / f**`roll_off`.
+    """Periodic noise (height, width) of zero mean and unit deviation, with amplitudes falling as 1 / f**`roll_off`.
 
-    Args:
-        rng: source of randomness.
-        shape: height and width in pixels.
-        roll_off: 0 is white noise; 2 is smooth as clouds.
-        stretch: features are this many times longer horizontally than vertically.
-
-    Returns:
-        (height, width) of zero mean and unit standard deviation.
+    Features are `stretch` times longer horizontally than vertically.
     """
     spectrum = np.fft.fft2(rng.standard_normal(shape))
     vertical = np.fft.fftfreq(shape[0])[:, None]
@@ -92,18 +85,7 @@ def disc(
 
 
 def joints(shape: tuple[int, int], rows: int, columns: int, width: float, offset: float = 0.0) -> Floats:
-    """Mask of the joints of a tiling.
-
-    Args:
-        shape: height and width in pixels.
-        rows: tiles from top to bottom.
-        columns: tiles from left to right.
-        width: joint width in pixels.
-        offset: how far every second row is shifted, in tiles (0.5 for a running bond).
-
-    Returns:
-        (height, width), 1 in the joints.
-    """
+    """Mask (height, width), 1 in the joints of a tiling; every second row is shifted by `offset` tiles."""
     x, y = grid(shape)
     row = np.floor(y * rows)
     u = (x * columns + offset * (row % 2)) % 1.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from authoring.patterns import Floats, blend, flat, grid, joints, noise, rgb, smooth_step
+from tools.authoring.patterns import Floats, blend, flat, grid, joints, noise, rgb, smooth_step
 
 
 def carpet(rng: np.random.Generator) -> Floats:

@@ -14,8 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from authoring import artwork, textiles
-from authoring.patterns import (
+from mjsim.errors import AssetError
+from mjsim.files import replacing
+from tools.authoring import artwork, textiles
+from tools.authoring.patterns import (
     Floats,
     blend,
     disc,
@@ -29,8 +31,6 @@ from authoring.patterns import (
     tile_tones,
     to_bytes,
 )
-from mjsim.errors import AssetError
-from mjsim.files import replacing
 
 Painter = Callable[[np.random.Generator], Floats]
 

@@ -1,48 +1,27 @@
 """Analyses of variance between subjects, with one or two factors."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from experiments.analysis.statistics.effects import FTest
 from experiments.errors import StatisticsError
 
 Values = NDArray[np.float64]
-EFFECTS = ("first", "second", "both")
-
-
-@dataclass(frozen=True)
-class TwoWay:
-    """Tests of a two-way analysis of variance.
-
-    Attributes:
-        first: Main effect of the first factor.
-        second: Of the second.
-        interaction: Of both together.
-    """
-
-    first: FTest
-    second: FTest
-    interaction: FTest
+EFFECTS = ("assistance", "objects", "interaction")  # of a two-way analysis of variance, in order
 
 
 def check_groups(groups: Mapping[str, Values], least: int = 1) -> None:
-    """Whether groups can be compared.
-
-    Raises:
-        StatisticsError: There are fewer than two, one has fewer than `least` values, or nothing varies within groups.
-    """
+    """Check that groups can be compared: two or more, of at least `least` values each, which vary within groups."""
     if len(groups) < 2:
         raise StatisticsError(f"there is only one group ({', '.join(groups) or 'none at all'})")
     small = [name for name, values in groups.items() if len(values) < least]
     if small:
         raise StatisticsError(f"{small[0]} has {len(groups[small[0]])} known values, {least} are needed")
-    if sum(len(v) for v in groups.values()) <= len(groups):
-        raise StatisticsError("each group has one person only; nothing is known about how people differ")
+    if people_in(groups) <= len(groups):
+        raise StatisticsError("each group has one person only; the variance within groups is unknown")
     if not any(varies(values) for values in groups.values()):
         raise StatisticsError("the values do not vary within any group")
 
@@ -52,144 +31,108 @@ def varies(values: Values) -> bool:
     return bool(len(values) > 1 and np.ptp(values) > 1e-12 * max(1.0, float(np.abs(values).max())))
 
 
+def people_in(groups: Mapping[str, Values]) -> int:
+    """Number of values in all groups."""
+    return sum(len(values) for values in groups.values())
+
+
 def one_way(groups: Mapping[str, Values]) -> FTest:
-    """Fisher's analysis of variance of one factor.
-
-    Raises:
-        StatisticsError: The groups cannot be compared.
-    """
-    return FTest.of(*one_way_statistic(groups), sum(len(v) for v in groups.values()))
-
-
-def one_way_statistic(groups: Mapping[str, Values]) -> tuple[float, int, int]:
-    """As `one_way`, but F and its degrees of freedom alone."""
+    """Fisher's analysis of variance of one factor."""
     check_groups(groups)
-    people = sum(len(v) for v in groups.values())
-    return float(stats.f_oneway(*groups.values()).statistic), len(groups) - 1, people - len(groups)
+    return _anova(groups, "equal")
 
 
 def welch(groups: Mapping[str, Values]) -> FTest:
-    """Welch's analysis of variance, which does not take variances for equal.
+    """Welch's analysis of variance, which does not assume equal variances; every group must vary.
 
     Source: Welch 1951, doi:10.1093/biomet/38.3-4.330.
-
-    Raises:
-        StatisticsError: The groups cannot be compared, or a group does not vary.
     """
     check_groups(groups, least=2)
-    still = [name for name, values in groups.items() if not varies(values)]
-    if still:
-        raise StatisticsError(f"the values of {still[0]} do not vary")
-    statistic = float(stats.f_oneway(*groups.values(), equal_var=False).statistic)
-    weights = np.array([len(v) / v.var(ddof=1) for v in groups.values()])
-    spread = sum(
-        (1 - w) ** 2 / (len(v) - 1) for w, v in zip(weights / weights.sum(), groups.values(), strict=True)
-    )
-    freedom = (len(groups) ** 2 - 1) / (3 * float(spread))
-    return FTest.of(statistic, len(groups) - 1, freedom, sum(len(v) for v in groups.values()))
+    constant = [name for name, values in groups.items() if not varies(values)]
+    if constant:
+        raise StatisticsError(f"the values of {constant[0]} do not vary")
+    return _anova(groups, "unequal")
 
 
 def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
-    """Whether variances differ: an analysis of variance of the distances from the median.
+    """Test for equal variances: an analysis of variance of the distances from the median.
 
     Source: Brown and Forsythe 1974, doi:10.1080/01621459.1974.10482955.
-
-    Raises:
-        StatisticsError: The groups cannot be compared.
     """
     check_groups(groups, least=2)
-    people = sum(len(v) for v in groups.values())
-    with np.errstate(divide="ignore", invalid="ignore"):  # said below
-        statistic = float(stats.levene(*groups.values(), center="median").statistic)
-    if not np.isfinite(statistic):
+    distances = {name: np.abs(values - np.median(values)) for name, values in groups.items()}
+    if not any(varies(values) for values in distances.values()):
         raise StatisticsError("the distances from the median do not vary within any group")
-    return FTest.of(statistic, len(groups) - 1, people - len(groups), people)
+    return _anova(distances, "equal")
 
 
-def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2) -> TwoWay:
-    """Analysis of variance of two crossed factors with unequal numbers of people.
+def _anova(groups: Mapping[str, Values], variances: str) -> FTest:
+    from statsmodels.stats.oneway import anova_oneway
 
-    Each effect is what the model gains by it: in Type II over the model without it and its interaction, in Type III
-    over the full model without it. Factors are coded by sums (1, 0, -1), without which Type III tests something else.
+    found = anova_oneway(list(groups.values()), use_var=variances)
+    return FTest(float(found.statistic), len(groups) - 1, float(found.df[1]), people_in(groups))
 
-    Args:
-        values: One per person, (n,), none missing.
-        first: Level of the first factor, (n,).
-        second: Level of the second factor, (n,).
-        kind: 2 or 3.
 
+def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2) -> dict[str, FTest]:
+    """Analysis of variance of two crossed factors with unequal numbers of people, by name of `EFFECTS`.
+
+    Values and both factors have one entry per person, (n,); `kind` is type 2 or 3 of the sums of squares. Raises
+    `StatisticsError` if a cell is empty, each has one person only, or nothing varies within cells.
     Source: Langsrud 2003, doi:10.1023/A:1023260610025.
-
-    Raises:
-        StatisticsError: A cell is empty, each has one person only, or nothing varies within cells.
     """
-    return TwoWay(*(FTest.of(*one, len(values)) for one in two_way_statistics(values, first, second, kind)))
-
-
-def two_way_statistics(
-    values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2
-) -> list[tuple[float, int, int]]:
-    """As `two_way`, but F and its degrees of freedom alone: first factor, second factor, interaction."""
-    blocks = Design.of(first, second).blocks
-    residual, freedom = _residual(values, blocks)
+    columns = sum_coded(first, second)
+    freedom = len(values) - sum(block.shape[1] for block in columns.values())
     if freedom < 1:
-        raise StatisticsError("each cell has one person only; nothing is known about how people differ")
+        raise StatisticsError("each cell has one person only; the variance within cells is unknown")
+    residual = _residual(values, columns, columns)
     if residual <= 1e-20 * max(1.0, float((values**2).sum())):
         raise StatisticsError("the values do not vary within any cell")
-    columns = [blocks[effect].shape[1] for effect in EFFECTS]
-    gains = two_way_squares(values, blocks, kind)
-    return [(g / df1 / (residual / freedom), df1, freedom) for g, df1 in zip(gains, columns, strict=True)]
+    sums = two_way_squares(values, first, second, kind)
+    df = {effect: columns[effect].shape[1] for effect in EFFECTS}
+    return {
+        effect: FTest(sums[effect] / df[effect] / (residual / freedom), df[effect], freedom, len(values))
+        for effect in EFFECTS
+    }
 
 
-def two_way_squares(values: Values, blocks: Mapping[str, Values], kind: int = 2) -> list[float]:
-    """Sums of squares of both factors and their interaction; `blocks` are those of a `Design`."""
-    gains = []
+def two_way_squares(
+    values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2
+) -> dict[str, float]:
+    """Sums of squares of the effects of a two-way analysis; arguments as in `two_way`.
+
+    Each is the reduction of the residual sum of squares by the effect: in Type II compared with the model without it
+    and its interaction, in Type III with the full model without it. `anova_lm` of statsmodels gives the same from a
+    formula in six times the time.
+    """
+    columns, sums = sum_coded(first, second), {}
     for effect in EFFECTS:
-        larger = [n for n in blocks if kind == 3 or effect == "both" or n != "both"]
-        without = _residual(values, {n: blocks[n] for n in larger if n != effect})[0]
-        gains.append(max(without - _residual(values, {n: blocks[n] for n in larger})[0], 0.0))
-    return gains
+        full = [name for name in columns if kind == 3 or effect == "interaction" or name != "interaction"]
+        without = _residual(values, columns, [name for name in full if name != effect])
+        sums[effect] = max(without - _residual(values, columns, full), 0.0)
+    return sums
 
 
-@dataclass(frozen=True)
-class Design:
-    """Columns of a two-way design, sum coded: `constant`, `first`, `second`, `both`, each (n, columns)."""
-
-    blocks: Mapping[str, Values]
-
-    @classmethod
-    def of(cls, first: NDArray[Any], second: NDArray[Any]) -> "Design":
-        """From the levels of both factors, (n,) each.
-
-        Raises:
-            StatisticsError: A factor has one level only, or a cell is empty.
-        """
-        for names in (first, second):
-            if len(np.unique(names)) < 2:
-                raise StatisticsError(f"there is only one level ({', '.join(map(str, np.unique(names)))})")
-        present = set(zip(first.tolist(), second.tolist(), strict=True))
-        empty = [(a, b) for a in np.unique(first) for b in np.unique(second) if (a, b) not in present]
-        if empty:
-            raise StatisticsError(
-                f"nobody is in the cell {empty[0][0]}, {empty[0][1]}; tests of two factors need all"
-            )
-        one, other = sum_coded(first), sum_coded(second)
-        both = (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
-        return cls({"constant": np.ones((len(one), 1)), "first": one, "second": other, "both": both})
+def sum_coded(first: NDArray[Any], second: NDArray[Any]) -> dict[str, Values]:
+    """Columns of a two-way design by effect, each (n, columns): 1 at a level, -1 at the last one, else 0."""
+    for levels in (first, second):
+        if len(np.unique(levels)) < 2:
+            raise StatisticsError(f"there is only one level ({', '.join(map(str, np.unique(levels)))})")
+    present = set(zip(first.tolist(), second.tolist(), strict=True))
+    empty = [(a, b) for a in np.unique(first) for b in np.unique(second) if (a, b) not in present]
+    if empty:
+        raise StatisticsError(
+            f"no people in the cell {empty[0][0]}, {empty[0][1]}; tests of two factors need all"
+        )
+    one, other = (
+        1.0 * (levels[:, None] == names[:-1]) - (levels == names[-1])[:, None]
+        for levels in (first, second)
+        for names in [np.unique(levels)]
+    )
+    both = (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
+    return {"constant": np.ones((len(one), 1)), **dict(zip(EFFECTS, (one, other, both), strict=True))}
 
 
-def sum_coded(levels: NDArray[Any]) -> Values:
-    """A column for each level but the last: 1 there, -1 at the last level, else 0. Shape (n, levels - 1)."""
-    names = np.unique(levels)
-    columns: Values = (levels[:, None] == names[None, :-1]).astype(float)
-    columns[levels == names[-1]] = -1.0
-    return columns
-
-
-def _residual(values: Values, blocks: Mapping[str, Values]) -> tuple[float, int]:
-    """Sum of squares that a linear model leaves, and its degrees of freedom."""
-    from statsmodels.regression.linear_model import OLS
-
-    columns = np.hstack(list(blocks.values()))
-    fit = OLS(values, columns).fit()
-    return float(fit.ssr), int(len(values) - columns.shape[1])
+def _residual(values: Values, columns: Mapping[str, Values], names: Iterable[str]) -> float:
+    """Residual sum of squares of a linear model with the named columns."""
+    design = np.hstack([columns[name] for name in names])
+    return float(((values - design @ np.linalg.lstsq(design, values)[0]) ** 2).sum())

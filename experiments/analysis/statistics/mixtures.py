@@ -1,7 +1,7 @@
-"""Kinds of people by how often they accept what is suggested: a mixture of beta-binomial distributions.
+"""Kinds of people by how often they accept suggestions: a mixture of beta-binomial distributions.
 
-Within a kind, each person has a rate of acceptance from a Beta distribution, and accepts that share of the visits but
-for chance. How many kinds there are is chosen by Schwarz's criterion (BIC).
+Each person of a kind has a rate of acceptance from a Beta distribution and accepts each visit with that probability.
+The number of kinds is chosen by Schwarz's criterion (BIC).
 """
 
 import math
@@ -14,9 +14,9 @@ from scipy.special import betaln, digamma, expit
 
 from experiments.errors import StatisticsError
 
-MOST = 3  # kinds
-LEAST_PEOPLE = 10
-PRECISIONS = (0.0, 7.0)  # logarithms of a + b; beyond the upper one, nobody within a kind differs
+MAX_KINDS = 3
+MIN_PEOPLE = 10
+PRECISIONS = (0.0, 7.0)  # logarithms of a + b; beyond the upper one, people of a kind do not differ
 STARTS = 3
 
 Counts = NDArray[np.int64]
@@ -24,40 +24,28 @@ Counts = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Mixture:
-    """A mixture that was fitted.
+    """A mixture that was fitted."""
 
-    Attributes:
-        shares: Share of people of each kind, (k,), sums to 1.
-        means: Their mean rates of acceptance, (k,), falling.
-        precisions: a + b of their Beta distributions, (k,); the larger, the more alike people of a kind are.
-        log_likelihood: Of the visits in their order.
-        bic: Schwarz's criterion; smaller is better.
-    """
-
-    shares: tuple[float, ...]
-    means: tuple[float, ...]
+    shares: tuple[float, ...]  # share of people of each kind, (k,), sums to 1
+    means: tuple[float, ...]  # their mean rates of acceptance, (k,), falling
+    # a + b of their Beta distributions, (k,); the larger, the more alike people of a kind are
     precisions: tuple[float, ...]
-    log_likelihood: float
-    bic: float
+    log_likelihood: float  # of the visits in their order
+    bic: float  # Schwarz's criterion; smaller is better
 
 
 def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
     """Mixtures of one to three kinds by maximum likelihood, the best by BIC first.
 
-    Args:
-        accepted: Accepted visits of each person, (n,).
-        visits: All visits of each person, (n,).
-
-    Raises:
-        StatisticsError: There are too few people, or a count cannot be.
+    Accepted visits and all visits of each person, (n,). Raises `StatisticsError` where there are too few people.
     """
-    if len(accepted) < LEAST_PEOPLE:
-        raise StatisticsError(f"a mixture needs at least {LEAST_PEOPLE} people; there are {len(accepted)}")
+    if len(accepted) < MIN_PEOPLE:
+        raise StatisticsError(f"a mixture needs at least {MIN_PEOPLE} people; there are {len(accepted)}")
     if (visits < 1).any() or (accepted < 0).any() or (accepted > visits).any():
         raise StatisticsError("a number of accepted visits is below 0 or above that of all visits")
     # Equal people are counted, not computed again.
     cases, people = np.unique(np.stack([accepted, visits], axis=1), axis=0, return_counts=True)
-    return sorted((_fit(cases, people, kinds) for kinds in range(1, MOST + 1)), key=lambda m: m.bic)
+    return sorted((_fit(cases, people, kinds) for kinds in range(1, MAX_KINDS + 1)), key=lambda m: m.bic)
 
 
 def _fit(cases: Counts, people: Counts, kinds: int) -> Mixture:

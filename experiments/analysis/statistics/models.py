@@ -9,21 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from experiments.analysis.statistics.anova import Design, Values, sum_coded, varies
+from experiments.analysis.statistics.anova import EFFECTS, Values, sum_coded, varies
 from experiments.errors import StatisticsError
 
-LEAST_HOUSES = 5  # with fewer, nothing is learned about how houses differ
+MIN_HOUSES = 5  # fewer say little about the variance between houses
 
 
 @dataclass(frozen=True)
 class Chi2Test:
-    """A chi squared test of a model's term.
-
-    Attributes:
-        statistic: Chi squared.
-        df: Degrees of freedom.
-        p: Probability of such a statistic or a larger one without an effect.
-    """
+    """A chi squared test of a model's term: statistic, degrees of freedom, and p."""
 
     statistic: float
     df: int
@@ -32,43 +26,29 @@ class Chi2Test:
 
 @dataclass(frozen=True)
 class OrdinalModel:
-    """Proportional odds of answers by condition.
+    """Proportional odds of answers by condition."""
 
-    Attributes:
-        test: Likelihood ratio test of the condition.
-        odds_ratios: By condition: odds of a higher answer, over those under the first condition.
-        people: How many answered.
-    """
-
-    test: Chi2Test
+    test: Chi2Test  # likelihood ratio test of the condition
+    # by condition: odds of a higher answer, over those under the first condition
     odds_ratios: Mapping[str, float]
-    people: int
+    people: int  # number of answers
 
 
 @dataclass(frozen=True)
 class MixedModel:
-    """A linear model with houses as a random factor, fitted by restricted maximum likelihood.
+    """A linear model with houses as a random factor, fitted by restricted maximum likelihood."""
 
-    Attributes:
-        tests: Wald tests by effect: `assistance`, and where there are several levels, `objects` and `interaction`.
-        house_variance: Variance between houses, in squared units of the measure.
-        residual_variance: Variance between people in a house.
-        houses: How many houses there are.
-    """
-
+    # Wald tests by effect: `assistance`, and where there are several levels, `objects` and `interaction`
     tests: Mapping[str, Chi2Test]
-    house_variance: float
-    residual_variance: float
-    houses: int
+    house_variance: float  # variance between houses, in squared units of the measure
+    residual_variance: float  # variance between people in a house
+    houses: int  # number of houses
 
 
 def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
     """Fit proportional odds to answers by condition; answers must be whole numbers.
 
     Source: McCullagh 1980, doi:10.1111/j.2517-6161.1980.tb01109.x.
-
-    Raises:
-        StatisticsError: There is one condition only, everybody answers the same, or the fit does not converge.
     """
     from statsmodels.miscmodels.ordinal_model import OrderedModel
 
@@ -76,12 +56,12 @@ def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
         raise StatisticsError("there is only one group")
     answers = np.concatenate(list(groups.values()))
     if not varies(answers):
-        raise StatisticsError("everybody gave the same answer")
+        raise StatisticsError("all answers are the same")
     codes, counts = np.unique(answers, return_inverse=True)[1], np.unique(answers, return_counts=True)[1]
     members = np.repeat(np.arange(len(groups)), [len(v) for v in groups.values()])
     dummies = (members[:, None] == np.arange(1, len(groups))).astype(float)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # whether it converged is asked below
+        warnings.simplefilter("ignore")  # convergence is checked below
         fit = OrderedModel(codes, dummies, distr="logit").fit(method="bfgs", maxiter=500, disp=False)
     if not fit.mle_retvals["converged"] or not np.isfinite(fit.llf):
         raise StatisticsError(
@@ -102,63 +82,41 @@ def mixed_model(
 ) -> MixedModel:
     """Fit assistance, number of objects and both together as fixed effects, and houses as a random one.
 
-    Args:
-        values: One per person, (n,), none missing.
-        assistance: Condition of each, (n,).
-        objects: Number of objects of each, (n,); all the same is fine.
-        houses: House of each, (n,).
-
-    Raises:
-        StatisticsError: There are too few houses, a cell is empty, or the fit fails.
+    All arrays have one entry per person, (n,). Raises `StatisticsError` if houses are few, a cell is empty or it fails.
     """
     count = len(np.unique(houses))
-    if count < LEAST_HOUSES:
-        raise StatisticsError(f"a mixed model needs at least {LEAST_HOUSES} houses; there are {count}")
+    if count < MIN_HOUSES:
+        raise StatisticsError(f"a mixed model needs at least {MIN_HOUSES} houses; there are {count}")
     if not varies(values):
         raise StatisticsError("the values do not vary")
-    blocks = _blocks(assistance, objects)
-    # In units of their spread, so that small and large measures converge alike.
-    spread = float(values.std())
-    fit = _fit_mixed(values / spread, np.hstack(list(blocks.values())), houses)
+    terms = "C(assistance, Sum)"
+    if len(np.unique(objects)) > 1:
+        sum_coded(assistance, objects)  # which finds empty cells
+        terms += " * C(objects, Sum)"
+    spread = float(values.std())  # in its units, so that small and large measures converge alike
+    data = {"y": values / spread, "assistance": assistance, "objects": objects}
+    fit = _fit_mixed(f"y ~ {terms}", data, houses)
+    found = fit.wald_test_terms(scalar=True).table.iloc[1:]  # without the constant
+    tests = (Chi2Test(float(x), int(df), float(p)) for x, p, df in found.itertuples(index=False))
     return MixedModel(
-        _wald_tests(np.asarray(fit.fe_params), np.asarray(fit.cov_params()), blocks),
+        dict(zip(EFFECTS, tests, strict=False)),
         float(np.asarray(fit.cov_re)[0, 0]) * spread**2,
         float(fit.scale) * spread**2,
         count,
     )
 
 
-def _fit_mixed(values: Values, columns: Values, houses: NDArray[Any]) -> Any:
-    from statsmodels.regression.mixed_linear_model import MixedLM
+def _fit_mixed(formula: str, data: Mapping[str, NDArray[Any]], houses: NDArray[Any]) -> Any:
+    from statsmodels.formula.api import mixedlm
 
     for method in ("bfgs", "powell"):
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")  # of a variance between houses of zero
             try:
-                fit = MixedLM(values, columns, groups=houses).fit(method=method)
+                fit = mixedlm(formula, data, groups=houses).fit(method=method)
             except (np.linalg.LinAlgError, ValueError):
                 continue
-        # At the edge, some climbs end in an infinite likelihood.
+        # At the edge, some optimizations end in an infinite likelihood.
         if fit.converged and np.isfinite(fit.llf):
             return fit
     raise StatisticsError("the mixed model does not converge")
-
-
-def _blocks(assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, Values]:
-    if len(np.unique(objects)) == 1:
-        return {"constant": np.ones((len(assistance), 1)), "assistance": sum_coded(assistance)}
-    blocks = Design.of(assistance, objects).blocks
-    names = {"first": "assistance", "second": "objects", "both": "interaction"}
-    return {names.get(name, name): columns for name, columns in blocks.items()}
-
-
-def _wald_tests(parameters: Values, covariance: Values, blocks: Mapping[str, Values]) -> dict[str, Chi2Test]:
-    tests, first = {}, 0
-    for name, columns in blocks.items():
-        here = slice(first, first + columns.shape[1])
-        first = here.stop
-        if name != "constant":
-            b, v = parameters[here], covariance[here, here]
-            statistic = float(b @ np.linalg.solve(v, b))
-            tests[name] = Chi2Test(statistic, len(b), float(chi2.sf(statistic, len(b))))
-    return tests

@@ -1,6 +1,6 @@
-"""Power of F tests between subjects, and how many people they need."""
+"""Power of F tests between subjects, and the sample size that they need."""
 
-from collections.abc import Callable
+import bisect
 
 from scipy.optimize import brentq
 from scipy.stats import f, ncf
@@ -9,7 +9,7 @@ from experiments.analysis.statistics.effects import ALPHA
 from experiments.errors import StatisticsError
 
 POWER = 0.8
-MOST = 100_000  # people in a cell
+MAX_PEOPLE = 100_000  # in a cell
 
 
 def power_of(eta_squared: float, df1: int, df2: float, people: int, alpha: float = ALPHA) -> float:
@@ -31,32 +31,13 @@ def detectable_eta_squared(df1: int, df2: float, people: int, power: float = POW
 def people_per_cell(
     eta_squared: float, df1: int, cells: int, power: float = POWER, alpha: float = ALPHA
 ) -> int:
-    """The smallest number of people in each cell with which a test reaches a power.
+    """The smallest number of people in each of `cells` equal cells with which a test reaches a power."""
 
-    Args:
-        eta_squared: Partial eta squared of the effect.
-        df1: Its degrees of freedom.
-        cells: Number of cells; all have equally many people.
-        power: Wanted probability of finding it.
-        alpha: Level of the test.
-
-    Raises:
-        StatisticsError: More people than anybody could ask would be needed.
-    """
-
-    def reached(people: int) -> bool:
+    def enough(people: int) -> bool:
         return power_of(eta_squared, df1, cells * (people - 1), cells * people, alpha) >= power
 
-    if not reached(MOST):
+    if not enough(MAX_PEOPLE):
         raise StatisticsError(
-            f"an eta squared of {eta_squared:.2g} needs more than {MOST} people in each cell"
+            f"an eta squared of {eta_squared:.2g} needs more than {MAX_PEOPLE} people in each cell"
         )
-    return _first(reached, 2, MOST)
-
-
-def _first(holds: Callable[[int], bool], low: int, high: int) -> int:
-    """The smallest number from `low` to `high` from which on something holds."""
-    while low < high:
-        middle = (low + high) // 2
-        low, high = (low, middle) if holds(middle) else (middle + 1, high)
-    return low
+    return bisect.bisect_left(range(MAX_PEOPLE), True, lo=2, key=enough)

@@ -1,7 +1,7 @@
-"""Somebody who was shown the house once: notices, remembers, chooses, follows or does not, and takes time to think.
+"""A simulated person who was shown the house once: notices, remembers, chooses, complies or not, takes time.
 
-Every person differs. What differs is in parts, each a module with its parameters: how they are distributed over people,
-their units and sources. `docs/participants.md` lists them, `docs/study.md` says what is fitted.
+Each part of the model is a module with its parameters, their distributions over people, units and sources.
+`docs/participants.md` lists them, `docs/study.md` names those that are fitted.
 """
 
 import dataclasses
@@ -12,7 +12,8 @@ import numpy as np
 
 from experiments.house import House
 from experiments.participants.base import Participant
-from experiments.participants.behaviour import BehaviourDistribution, Parameter
+from experiments.participants.behaviour import Parameter, draw
+from experiments.participants.distribution import Distributions
 from experiments.participants.guest.model import Behaviour, Guest
 
 PARTS: Final = get_type_hints(Behaviour)
@@ -44,7 +45,7 @@ class _Build:
         self, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
     ) -> Participant:
         """Make a guest with these values; where none are given, they are drawn."""
-        values = behaviour or BehaviourDistribution().draw("guest", PARAMETERS, rng)
+        values = behaviour or draw(PARAMETERS, Distributions(), rng, "guest")
         return Guest(house, rng, as_behaviour(values))
 
 

@@ -12,31 +12,22 @@ class Compliance:
     """How closely a person follows a suggested step.
 
     The published variance of deviations is largest under `optimal` at every difficulty, as if there were kinds of
-    people (PAPER section 8): some always follow, some sometimes, some hardly. The weights are starting values. Who
-    always follows neither gives up a step nor picks up anything else, but may have enough of it, too.
-
-    Attributes:
-        follows: Probability of taking up a suggested step.
-        abandons: Probability of giving up a step on the way to it.
-        picks_up: Probability of picking up an object that is noticed beside the way, with a hand free.
-        beside: How far from the person that is at most, m.
-        quits: Probability, at each suggestion, of following none from then on: the longer a task, the more people.
+    people (PAPER section 8): some always follow, some sometimes, some hardly. The weights are starting values. A person
+    who always follows neither gives up a step nor picks up anything else, but may quit as well.
     """
 
+    # probability of taking up a suggested step
     follows: float = chance({"mixture": [[0.62, 1.0], [0.20, {"beta": [2, 2]}], [0.18, {"beta": [1, 9]}]]})
-    abandons: float = chance({"beta": [1.0, 19.0]})
+    abandons: float = chance({"beta": [1.0, 19.0]})  # probability of giving up a step on the way to it
+    # probability of picking up an object that is noticed next to the path, with a hand free
     picks_up: float = chance({"uniform": [0.15, 0.30]})
-    beside: float = varies(2.0, 0.0, 20.0, "m")
+    beside: float = varies(2.0, 0.0, 20.0, "m")  # largest distance of such an object from the person, m
+    # probability, at each suggestion, of following none from then on
     quits: float = chance({"beta": [1.0, 99.0]})
 
 
 class Adherence:
-    """A person's decisions about suggestions.
-
-    Args:
-        compliance: How closely it follows.
-        rng: Source of chance.
-    """
+    """A person's decisions about suggestions."""
 
     def __init__(self, compliance: Compliance, rng: np.random.Generator) -> None:
         self.compliance, self._rng, self._has_quit = compliance, rng, False
@@ -48,7 +39,7 @@ class Adherence:
         return follows < self.compliance.follows and not self._has_quit
 
     def gives_up_after(self, duration: float) -> float | None:
-        """After what time on the way of so many seconds the step is given up, s; None if it is not."""
+        """Time after which the step is given up, s, on a walk of this duration, s; None if it is not."""
         chance, share = self._rng.random(2).tolist()
         gives_up = chance < self.compliance.abandons and not self._always_follows
         return share * duration if gives_up else None

@@ -1,4 +1,4 @@
-"""What a person does next: a noisy choice that looks a few visits ahead."""
+"""The choice of the next visit: noisy, with a look a few visits ahead."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,45 +14,34 @@ class Decision:
     """How a person chooses.
 
     People plan several moves ahead, the more the better they know a task (van Opheusden et al., Nature 618, 2023),
-    and regions of a building enter their routes (Wiener and Mallot, Spatial Cognition and Computation 3, 2003). How
-    many moves, how wrong distances are judged and what a region costs are assumptions.
-
-    Attributes:
-        temperature: Of the choice: an option that costs c metres more is taken with odds exp(-c / temperature), m.
-        look_ahead: How many visits are imagined, the nearest one next each time; rounded.
-        distance_error: Standard deviation of the logarithm of a distance as it is judged.
-        room_cost: What going into another room counts in addition to the walk, m.
-        search_cost: What a search for more counts in addition to the walk, m.
+    and regions of a building enter their routes (Wiener and Mallot, Spatial Cognition and Computation 3, 2003). The
+    number of moves, the error of distances and the cost of a region are assumptions.
     """
 
+    # of the choice: an option that costs c metres more is taken with odds exp(-c / temperature), m
     temperature: float = varies({"lognormal": [0.5, 0.35]}, 0.0, 1000.0, "m")
+    # how many visits are imagined, the nearest one next each time; rounded
     look_ahead: float = varies({"uniform": [1.5, 4.5]}, 1.0, 12.0, "visits")
+    # standard deviation of the logarithm of a distance as it is judged
     distance_error: float = varies(0.15, 0.0, 5.0)
+    # cost of entering another room in addition to the walk, m
     room_cost: float = varies(2.0, 0.0, 100.0, "m")
-    search_cost: float = varies(3.0, 0.0, 100.0, "m")
+    search_cost: float = varies(3.0, 0.0, 100.0, "m")  # cost of a search in addition to the walk, m
 
 
 @dataclass(frozen=True)
 class Task:
-    """What is known to be left to do, by numbers of places.
+    """The known rest of the task, by numbers of places."""
 
-    Attributes:
-        legs: What walks count, from place to place, m, shape (n, n); place 0 is where the person stands.
-        picks: Place of each object that can be fetched.
-        bins: Place of the bin of each of these.
-        carried: Place of the bin of each object in the hands.
-        capacity: How many objects are carried at most.
-    """
-
-    legs: NDArray[np.float64]
-    picks: Sequence[int]
-    bins: Sequence[int]
-    carried: Sequence[int]
-    capacity: int
+    legs: NDArray[np.float64]  # costs of walks from place to place, m, shape (n, n); place 0 is the person's
+    picks: Sequence[int]  # place of each object that can be fetched
+    bins: Sequence[int]  # place of the bin of each of these
+    carried: Sequence[int]  # place of the bin of each object in the hands
+    capacity: int  # how many objects are carried at most
 
 
 def first_step_costs(task: Task, look_ahead: int) -> list[float]:
-    """What the next `look_ahead` visits count, m, for each possible first one: those of `picks`, then of `carried`.
+    """Cost of the next `look_ahead` visits, m, for each possible first one: those of `picks`, then of `carried`.
 
     After the first, the nearest possible visit is imagined each time. With both hands full, picks are infinite.
     """
@@ -76,7 +65,7 @@ def first_step_costs(task: Task, look_ahead: int) -> list[float]:
 def _imagined(
     task: Task, legs: list[list[float]], at: int, picks: list[int], carried: list[int], visits: int
 ) -> float:
-    """What so many visits count, each the nearest possible one, m."""
+    """Cost of some visits, each the nearest possible one, m."""
     picks, carried, cost = list(picks), list(carried), 0.0
     for _ in range(visits):
         options = [(legs[at][place], 1, place, k) for k, place in enumerate(carried)]
@@ -102,12 +91,6 @@ def judged_distances(
 
 
 def choose(costs: Sequence[float], temperature: float, rng: np.random.Generator) -> int:
-    """Number of an option, with odds exp(-cost / temperature); the cheapest at temperature 0.
-
-    Args:
-        costs: At least one, m; infinite ones are not chosen.
-        temperature: m.
-        rng: Source of chance.
-    """
+    """Number of an option, with odds exp(-cost / temperature), m; the cheapest at 0, never one of infinite cost."""
     noise = rng.gumbel(size=len(costs))
     return int(np.argmin(np.asarray(costs) - temperature * noise))

@@ -1,4 +1,4 @@
-"""What a person remembers: where bins stand, where objects lie, which places have been searched."""
+"""The memory of a person: places of bins and objects."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -15,18 +15,16 @@ class Memory:
 
     After one tour through a building most landmarks are recalled (a share of about 0.8 is a starting value). Memory of
     where an object was seen fades; times are exponential, and their mean is a starting value.
-
-    Attributes:
-        knows_bins: Probability of knowing where a bin is after the familiarisation. The HUD names its room.
-        retention: Mean time for which it is remembered where an object lies, s.
     """
 
+    # probability of knowing where a bin is after the familiarisation. The HUD names its room.
     knows_bins: float = chance(0.8)
+    # mean time for which the place of an object is remembered, s
     retention: float = varies({"lognormal": [300.0, 0.5]}, 1.0, 1e6, "s")
 
 
 class Recollection:
-    """What a person remembers at present.
+    """The places that a person remembers at present.
 
     Args:
         memory: How well.
@@ -34,7 +32,7 @@ class Recollection:
         rng: Source of chance.
 
     Attributes:
-        objects: Where objects are believed to lie, m, shape (2,).
+        objects: Believed places of objects, m, shape (2,).
         bins: Bins whose place is known.
     """
 
@@ -53,7 +51,7 @@ class Recollection:
         return new
 
     def forget(self, time: float, but: str | None = None) -> None:
-        """Forget what was seen too long ago, but not the object that one is after."""
+        """Forget objects that were seen too long ago, except `but`."""
         for name in [n for n, until in self._until.items() if until < time and n != but]:
             self.drop(name)
 

@@ -1,4 +1,4 @@
-"""The simulated guest: notices, remembers, chooses, follows or does not, and takes its time."""
+"""The simulated guest: notices, remembers, chooses, complies or not, and takes its time."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,27 +6,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import TIME_TOLERANCE, WAIT, Decision, Guidance, Moves, Percept, Point
+from experiments.participants.base import Guidance, Percept, Point
+from experiments.participants.frontier import Frontier, Place
 from experiments.participants.guest.compliance import Adherence, Compliance
 from experiments.participants.guest.decision import Decision as DecisionParameters
-from experiments.participants.guest.intention import Intention
 from experiments.participants.guest.memory import Memory, Recollection
 from experiments.participants.guest.options import Chooser, Known
 from experiments.participants.guest.perception import Noticing, Perception
-from experiments.participants.guest.searching import Frontier, Place
 from experiments.participants.guest.timing import Timing
 from experiments.participants.guest.walking import Detours, Walking
 from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor
 from hud.markers import BREADCRUMB, FLAGPOLE
-from mjsim.actions import IDLE
-from mjsim.options import WorldOptions
+from mjsim.actions import IDLE, TIME_TOLERANCE, WAIT, Action, Wait
+from mjsim.walking.polyline import path_length, project
 from planner.plan import Visit, VisitKind
-from planner.polyline import path_length, project
 
 ARRIVED = 0.5  # m from a place on the way, or one to look around from
 GONE = 1.2  # m: a remembered object nearer than this and not in view is no longer there
-SEEN_BIN = 2.0  # m; who comes as near to a bin knows where it is
+SEEN_BIN = 2.0  # m; a bin nearer than this is known from then on
 
 
 @dataclass(frozen=True)
@@ -41,14 +39,19 @@ class Behaviour:
     timing: Timing
 
 
-class Guest:
-    """Tidies as somebody might who was shown the house once: in any condition, with what it shows.
+@dataclass(frozen=True)
+class Intention:
+    """A visit or search that a person is about to make."""
 
-    Args:
-        house: What it knows of the house.
-        rng: Its chance.
-        behaviour: Its values.
-    """
+    aim: Visit | Place  # a visit, or a place to look around from
+    suggested: bool = False  # whether it is the suggested step
+    # whether it takes another path than the shown one, because it is off that path or was blocked on it
+    strays: bool = False
+    gives_up_at: float = math.inf  # Simulated time at which the suggested step is given up, s
+
+
+class Guest:
+    """Tidies like a person who was shown the house once, in any condition and with its guidance."""
 
     needs: frozenset[str] = frozenset()
 
@@ -66,7 +69,7 @@ class Guest:
         self._turn: FullTurn | None = None
         self._turned_for_poles = self._has_begun = False
         self._carried: set[str] = set()
-        self._brought: set[str] = set()  # carried no more: in their bins, as far as is known
+        self._brought: set[str] = set()  # no longer carried: believed to be in their bins
         self._passed: set[str] = set()  # objects that were not picked up in passing
         self._room: str | None = None
         self._read: Visit | None = None
@@ -74,13 +77,13 @@ class Guest:
         self._is_open = False  # whether it would take up the suggestion that it has read
         self._next_look = self._thinks_until = 0.0
 
-    def act(self, percept: Percept) -> Decision:
-        """Look; read and think; then go on with what it has in mind."""
+    def act(self, percept: Percept) -> Action:
+        """Look; read and think; then continue with the present intention."""
         if percept.busy:
             return WAIT
         self._begin(percept)
-        if self._thinks(percept):  # and looks at the HUD
-            return _stand(self._thinks_until - percept.time)
+        if self._thinks(percept):  # while it looks at the HUD
+            return Wait(self._thinks_until)
         self._look(percept)
         decision = self._turn_around(percept)
         if decision is None and not self._is_sensible(percept):
@@ -88,10 +91,10 @@ class Guest:
             decision = self._turn_around(percept)
         if decision is not None:
             return decision
-        return _stand(self._thinks_until - percept.time) if self._thinks(percept) else self._go_on(percept)
+        return Wait(self._thinks_until) if self._thinks(percept) else self._go_on(percept)
 
     def _begin(self, percept: Percept) -> None:
-        """Read the list, where it is more than the next step."""
+        """Read the list, unless the HUD shows the next step."""
         if not self._has_begun:
             self._has_begun, self._next_look = True, percept.time
             rows = 0 if BREADCRUMB in percept.shown_roles else len(percept.targets)
@@ -101,7 +104,7 @@ class Guest:
         return percept.time < self._thinks_until - TIME_TOLERANCE
 
     def _look(self, percept: Percept) -> None:
-        """Learn where things are, from time to time; notice what might be picked up in passing."""
+        """From time to time, learn the places of objects and bins, and pick up objects in passing."""
         for name in percept.carried:
             self._known.drop(name)
         self._brought |= self._carried - set(percept.carried)
@@ -125,7 +128,7 @@ class Guest:
         self._pick_up_in_passing(percept)
 
     def _look_around_if_there(self, percept: Percept) -> None:
-        """Where a search led to is in view now, or reached: perhaps look all around; then choose what is next."""
+        """Once the goal of a search is in view or reached, perhaps look all around, then choose again."""
         aim = self._intention.aim if self._intention is not None else None
         if not isinstance(aim, Place) or (
             self._frontier.is_left(aim) and not self._is_at(percept, aim.point)
@@ -138,7 +141,7 @@ class Guest:
             self._turn = FullTurn(percept.heading)
 
     def _misses(self, percept: Percept) -> bool:
-        """Whether objects are left of which it does not know where they are."""
+        """Whether the places of some remaining objects are unknown."""
         return len(self._known.objects) + len(self._carried) + len(self._brought) < len(percept.targets)
 
     def _pick_up_in_passing(self, percept: Percept) -> None:
@@ -159,7 +162,7 @@ class Guest:
         return aim.object if isinstance(aim, Visit) else None
 
     def _is_sensible(self, percept: Percept) -> bool:
-        """Whether what it has in mind can still be done and is still wanted."""
+        """Whether the present intention is still possible and wanted."""
         intention = self._intention
         if intention is None:
             return False
@@ -184,7 +187,7 @@ class Guest:
         return refused and near and name not in percept.look() and name not in percept.flagpoles
 
     def _decide(self, percept: Percept) -> None:
-        """Read a new suggestion; else take up an intention, which takes time to think of."""
+        """Read a new suggestion; else form an intention, which takes time."""
         shown = percept.guidance
         self._intention, self._stops = None, []
         if shown is not None and shown.visit != self._read:
@@ -230,7 +233,7 @@ class Guest:
         return Known(objects, pull, search=self._misses(percept))
 
     def _goal(self, percept: Percept, aim: Visit | Place, shown: Guidance | None) -> Point:
-        """Where an aim is, m, shape (2,)."""
+        """Place of an aim, m, shape (2,)."""
         if isinstance(aim, Place):
             return aim.point
         if shown is not None and aim == shown.visit:
@@ -240,8 +243,8 @@ class Guest:
             return self._known.objects[aim.object]
         return self._house.approaches[percept.targets[aim.object]]
 
-    def _turn_around(self, percept: Percept) -> Decision | None:
-        """Turn on, if it is turning; then the bins of this room are known."""
+    def _turn_around(self, percept: Percept) -> Action | None:
+        """Continue a turn; at its end, the bins of this room are known."""
         turning = self._turn.act(percept) if self._turn is not None else None
         if turning is None and self._turn is not None:
             self._turn = None
@@ -249,8 +252,8 @@ class Guest:
             self._known.bins |= {key for key in self._house.receptacles if bins[key].room == self._room}
         return turning
 
-    def _go_on(self, percept: Percept) -> Decision:
-        """Walk by the stops to the aim, and do there what is to be done."""
+    def _go_on(self, percept: Percept) -> Action:
+        """Walk by way of the stops to the aim, and pick or place there."""
         intention = self._intention
         if intention is None:
             return IDLE
@@ -266,7 +269,7 @@ class Guest:
     def _is_at(self, percept: Percept, point: Point) -> bool:
         return math.dist(point, percept.position) <= ARRIVED
 
-    def _visit(self, percept: Percept, intention: Intention, visit: Visit) -> Decision:
+    def _visit(self, percept: Percept, intention: Intention, visit: Visit) -> Action:
         shown, until = percept.guidance, min(self._next_look, intention.gives_up_at)
         if intention.suggested and shown is not None:
             if percept.blocked and not intention.strays:
@@ -283,9 +286,3 @@ class Guest:
             self._turn = FullTurn(percept.heading)
             return self._turn_around(percept) or IDLE
         return self._executor.act(percept, visit, self._known.objects, until=self._next_look)
-
-
-def _stand(seconds: float) -> Decision:
-    """Stand still for so long, s, and one control step at least."""
-    steps = max(1, math.ceil((seconds - TIME_TOLERANCE) / WorldOptions.control_timestep))
-    return Moves(np.zeros((steps, 4)))

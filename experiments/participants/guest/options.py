@@ -1,4 +1,4 @@
-"""What a person could do next, and what it counts."""
+"""Possible next visits and searches, and their costs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.participants.base import Percept, Point
 from experiments.participants.distances import estimated_distances
+from experiments.participants.frontier import Frontier, Place
 from experiments.participants.guest.decision import Decision, Task, choose, first_step_costs, judged_distances
-from experiments.participants.guest.searching import Frontier, Place
 from mjsim.episode import CAPACITY
 from planner.errors import PlannerError
 from planner.plan import Visit, VisitKind
@@ -18,28 +18,15 @@ from planner.plan import Visit, VisitKind
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What a person knows of the task when it chooses.
+    """The knowledge of the task that a choice depends on."""
 
-    Attributes:
-        objects: Where objects are believed to lie, m, shape (2,).
-        pull: How much straight lines count in judging distances to them, 0 to 1.
-        search: Whether looking for more is an option, where nothing is known that could be fetched.
-    """
-
-    objects: Mapping[str, Point]
-    pull: float
-    search: bool
+    objects: Mapping[str, Point]  # believed places of objects, m, shape (2,)
+    pull: float  # weight of straight lines in judging distances to them, 0 to 1
+    search: bool  # whether a search is possible where no known object can be fetched
 
 
 class Chooser:
-    """Chooses visits and searches.
-
-    Args:
-        decision: How a person chooses.
-        house: What it knows of the house.
-        frontier: Where it has not searched.
-        rng: Source of chance.
-    """
+    """Chooses visits and searches."""
 
     def __init__(
         self, decision: Decision, house: House, frontier: Frontier, rng: np.random.Generator
@@ -47,7 +34,7 @@ class Chooser:
         self._decision, self._house, self._frontier, self._rng = decision, house, frontier, rng
 
     def choose(self, percept: Percept, known: Known) -> Visit | Place | None:
-        """What to do next: fetch, bring, or look for more; None if there is nothing to do."""
+        """The next visit or search; None if there is nothing to do."""
         fetchable = [] if percept.hands_full else sorted(known.objects)
         visits = [Visit(VisitKind.PICK, name) for name in fetchable]
         visits += [Visit(VisitKind.PLACE, name) for name in percept.carried]
@@ -72,7 +59,7 @@ class Chooser:
         return visits[chosen] if chosen < len(visits) else places[best]
 
     def _visit_costs(self, percept: Percept, known: Known, fetchable: Sequence[str]) -> list[float]:
-        """What visits count, m: of what can be fetched, then of what is carried."""
+        """Costs of visits, m: of objects that can be fetched, then of carried ones."""
         names = [*fetchable, *percept.carried]
         bins = sorted({percept.targets[name] for name in names})
         places = [percept.position, *(known.objects[n] for n in fetchable)]
@@ -88,7 +75,7 @@ class Chooser:
         return first_step_costs(task, round(self._decision.look_ahead))
 
     def _judged_legs(self, places: Sequence[Point], pull: float, objects: int) -> NDArray[np.float64]:
-        """What walks between places count, m, shape (n, n); the first `objects` after the start show through walls."""
+        """Costs of walks between places, m, shape (n, n); the first `objects` after the start show through walls."""
         points = np.array(places)
         legs = self._all_legs(points)
         straight = np.linalg.norm(points[:, None] - points[None], axis=2)

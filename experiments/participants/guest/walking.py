@@ -1,4 +1,4 @@
-"""How a person's walk differs from the shortest: lapses of attention, and going straight for a flagpole."""
+"""Departures of a person's walk from the shortest one: lapses of attention, and detours towards a flagpole."""
 
 from dataclasses import dataclass
 
@@ -9,46 +9,29 @@ from experiments.participants.base import Point
 from experiments.participants.behaviour import chance, varies
 from experiments.participants.distances import estimated_distances
 
-SHORTEST_DETOUR = 0.5  # m; nobody goes out of the way for less
+MIN_DETOUR = 0.5  # m
 
 
 @dataclass(frozen=True)
 class Walking:
-    """Where a walk leaves the shortest path. The shapes of the distributions are starting values.
+    """Where a walk leaves the shortest path. The shapes of the distributions are starting values."""
 
-    Attributes:
-        lapse_rate: Probability, at each walk to something, of going elsewhere first without noticing; not on a path
-            that is shown.
-        lapse_distance: How long the walk there is at most, m.
-        pull: Probability, at each walk to a flagpole in another room, of first walking to where this room is nearest
-            to it; also how much straight lines count in estimating how far away flagpoles are.
-    """
-
+    # probability, at each walk but on a shown path, of first going elsewhere without noticing
     lapse_rate: float = chance({"beta": [0.5, 3.0]})
-    lapse_distance: float = varies(5.0, 0.0, 50.0, "m")
+    lapse_distance: float = varies(5.0, 0.0, 50.0, "m")  # longest walk there, m
+    # probability, at each walk to a flagpole in another room, of first walking to the place of this room
+    # that is nearest to it; also the weight of straight lines in estimated distances of flagpoles
     pull: float = chance({"beta": [2.0, 3.0]})
 
 
 class Detours:
-    """Finds the places at which a walk passes by before it reaches its goal.
-
-    Args:
-        walking: How a person walks.
-        house: Where it walks.
-        rng: Source of chance.
-    """
+    """Finds the places that a walk passes before its goal."""
 
     def __init__(self, walking: Walking, house: House, rng: np.random.Generator) -> None:
         self._walking, self._house, self._rng = walking, house, rng
 
     def stops(self, start: Point, goal: Point, *, pole: bool) -> list[Point]:
-        """Places to pass on the way, m, shape (2,) each; usually none.
-
-        Args:
-            start: Where the person is, m, shape (2,).
-            goal: Where it wants to go, m, shape (2,).
-            pole: Whether a flagpole stands there that shows through walls.
-        """
+        """Places to pass on the way, m, shape (2,) each; usually none. A `pole` at the goal shows through walls."""
         lapse, pulled = self._rng.random(2).tolist()
         start, stops = self._house.navmesh.snap(start), []
         if lapse < self._walking.lapse_rate:
@@ -58,18 +41,18 @@ class Detours:
         return stops
 
     def _lapse(self, start: Point) -> list[Point]:
-        """Any place of the house that is not too far, shape (2,); none where there is none."""
+        """A random place of the house that is not too far, shape (2,), if there is one."""
         places = np.concatenate(list(self._house.viewpoints.values()))
         walks = np.array(estimated_distances(self._house, start, list(places)))
-        near = places[(walks > SHORTEST_DETOUR) & (walks <= self._walking.lapse_distance)]
+        near = places[(walks > MIN_DETOUR) & (walks <= self._walking.lapse_distance)]
         return [near[self._rng.integers(len(near))]] if len(near) else []
 
     def _towards(self, start: Point, goal: Point) -> list[Point]:
-        """Where one comes nearest to what is behind a wall, (2,), without leaving the room; none in the same room."""
+        """The place of this room, (2,), that is nearest to a goal in another room; none for one in the same room."""
         room = self._house.rooms.room_at(start)
         if room == self._house.rooms.room_at(goal):
             return []
         places = self._house.viewpoints.get(room, start[None])
         gaps = np.linalg.norm(places - goal, axis=1)
-        nearer = gaps.min() < np.linalg.norm(start - goal) - SHORTEST_DETOUR
+        nearer = gaps.min() < np.linalg.norm(start - goal) - MIN_DETOUR
         return [places[gaps.argmin()]] if nearer else []

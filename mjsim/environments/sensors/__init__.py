@@ -34,8 +34,7 @@ BUNDLES = {"state": _VECTORS}
 def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:
     """Sensors by name, by the name of a bundle, or given as they are; without repetition, in order.
 
-    Raises:
-        EnvironmentConfigError: A name is unknown, none is given, or two different sensors share a name.
+    `EnvironmentConfigError` where a name is unknown, none is given, or two different sensors share a name.
     """
     if isinstance(observations, str):
         observations = (observations,)

@@ -17,16 +17,7 @@ _SUBPIXEL = 8  # fractional bits of OpenCV's polygon vertices
 
 
 def occupancy(layout: ObservationLayout, size: int = MAP_SIZE) -> NDArray[np.uint8]:
-    """Occupancy grid of the floor.
-
-    Args:
-        layout: Holds the floor.
-        size: Number of rows and of columns.
-
-    Returns:
-        1 where an obstacle covers or touches the centre of a cell, else 0, shape (size, size). Row 0 is at the
-        minimum y of the floor, column 0 at its minimum x; the bounds of the floor fill the grid.
-    """
+    """Grid (size, size) of 0 and 1, where obstacles are; row 0 is at the minimum y, column 0 at the minimum x."""
     raster = np.zeros((size, size), np.uint8)
     x_min, y_min, x_max, y_max = layout.floor.bounds
     cells = np.array([size / (x_max - x_min), size / (y_max - y_min)])
@@ -40,16 +31,7 @@ def occupancy(layout: ObservationLayout, size: int = MAP_SIZE) -> NDArray[np.uin
 def ray_distances(
     layout: ObservationLayout, position: NDArray[np.float64], heading: float
 ) -> NDArray[np.float64]:
-    """Distance to the nearest obstacle in each of `RAYS` directions.
-
-    Args:
-        layout: Holds the floor.
-        position: Floor point, m, shape (2,).
-        heading: Direction of ray 0, rad; ray k points k / RAYS of a full turn to the left of it.
-
-    Returns:
-        Distances, m, shape (RAYS,), at most `RANGE`.
-    """
+    """Distances (RAYS,), m, at most `RANGE`, from a floor point to obstacles, counter-clockwise from `heading`."""
     start, edge = _edges_in_front(layout, position)
     angles = heading + 2 * math.pi * np.arange(RAYS) / RAYS
     ray = np.column_stack([np.cos(angles), np.sin(angles)])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.sensors.base import Sensor, SensorInput, unit_spec
-from mjsim.visibility import visible_objects
+from mjsim.model.sight import visible_objects
 
 # Numbers of `mjsim.render.Labels`: background -1, house 0, person 1, then receptacles, then the objects by slot.
 MIN_LABEL = -1
@@ -23,8 +23,8 @@ def first_object(layout: ObservationLayout) -> int:
 
 def visible_pixels(inputs: SensorInput) -> dict[str, int]:
     """Object name -> number of its pixels in view, in the episode's order; objects without any are left out."""
-    counts = _pixels(inputs)
-    return {n: int(c) for n, c in zip(inputs.state.object_names, counts, strict=False) if c}
+    counts = inputs.episode.labels.pixel_counts(_rendered(inputs.frame.segmentation, "segmentation"))
+    return {name: counts[name] for name in inputs.state.object_names if name in counts}
 
 
 def _image_spec(

@@ -10,10 +10,10 @@ from mjsim.model.rays import first_hit, receptacle_in_sight
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.validation.compiled import Compiled
 from mjsim.model.validation.findings import Finding
-from mjsim.model.validation.floor import Floor
+from mjsim.model.validation.floor import WalkableFloor
 from mjsim.person_parameters import PersonParameters
 
-USUAL = PersonParameters()  # a study may have others
+DEFAULT = PersonParameters()  # a study may have others
 SNAP = 1.0  # m, from a receptacle's site `approach` to where a person can stand
 MAX_TOP = 1.4  # m, of a receptacle's volume
 ABOVE = 0.3  # m that an object needs on its way down into a receptacle
@@ -24,14 +24,14 @@ _LIFT = np.array([0.0, 0.0, 0.01])
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def check_bins(floor: Floor) -> Iterator[Finding]:
+def check_bins(floor: WalkableFloor) -> Iterator[Finding]:
     """All that is wrong with the receptacles at their mounts."""
     for receptacle in floor.receptacles.values():
         for rule in (_bin_height, _bin_surroundings, _bin_use):
             yield from rule(floor, receptacle)
 
 
-def _bin_height(floor: Floor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
+def _bin_height(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
     subject = _about(floor, receptacle)
     bottom, top = receptacle.center[2] + receptacle.half_size[2] * np.array([-1.0, 1.0])
     if top > MAX_TOP:
@@ -49,29 +49,29 @@ def _bin_height(floor: Floor, receptacle: ReceptacleGeometry) -> Iterator[Findin
             receptacle.center,
         )
     room = floor.rooms.room_at(receptacle.center[:2])
-    said = floor.rooms_of[receptacle.key]
+    expected = floor.rooms_of[receptacle.key]
     if not floor.rooms.contains(receptacle.center[:2], margin=0.01):
         yield subject.error(
-            "rooms", "stands in no room", f"move the site 'mount:{receptacle.key}'", receptacle.center
+            "rooms", "is in no room", f"move the site 'mount:{receptacle.key}'", receptacle.center
         )
-    elif room != said:
+    elif room != expected:
         yield subject.error(
             "rooms",
-            f"stands in room {room!r}, but the catalogue says {said!r}",
+            f"is in room {room!r}, but the catalogue says {expected!r}",
             f"correct its room in the catalogue, or move the site 'mount:{receptacle.key}'",
             receptacle.center,
         )
 
 
-def _bin_surroundings(floor: Floor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
-    """Nothing of the house stands in the volume or just above it, and something bears the receptacle."""
+def _bin_surroundings(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
+    """Nothing of the house is in the volume or just above it, and something supports the receptacle."""
     compiled, subject = floor.compiled, _about(floor, receptacle)
-    names = [compiled.model.body(b).name for b in range(compiled.model.nbody)]
-    own = [b for b, name in enumerate(names) if name.startswith(f"{receptacle.key}/")]
+    model = compiled.model
+    own = model.body(f"{receptacle.key}/receptacle").id
     half = receptacle.half_size
     for x, y in _WITHIN:
         start = receptacle.center + receptacle.rotation @ (half * [x, y, 1.0]) + [0.0, 0.0, ABOVE]
-        distance, geom = first_hit(compiled.model, compiled.data, start, _DOWN, ignore=own)
+        distance, geom = first_hit(model, compiled.data, start, _DOWN, without=own)
         height = start[2] - distance
         if height > receptacle.center[2] - half[2] + INSIDE_GAP:
             yield subject.error(
@@ -82,7 +82,7 @@ def _bin_surroundings(floor: Floor, receptacle: ReceptacleGeometry) -> Iterator[
             )
             return
     mount = compiled.data.site_xpos[compiled.site(f"mount:{receptacle.key}")]
-    gap, _ = first_hit(compiled.model, compiled.data, mount + _LIFT, _DOWN, ignore=own)
+    gap, _ = first_hit(model, compiled.data, mount + _LIFT, _DOWN, without=own)
     if gap > SUPPORT_GAP:
         yield subject.warning(
             "reach",
@@ -92,22 +92,22 @@ def _bin_surroundings(floor: Floor, receptacle: ReceptacleGeometry) -> Iterator[
         )
 
 
-def _bin_use(floor: Floor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
+def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
     """From where a person can stand, its volume is within reach and its top in sight."""
     compiled = floor.compiled
     subject = _about(floor, receptacle)
     stand = floor.navigable.snap(receptacle.approach, math.inf)
     away, gap = float(np.hypot(*(stand - receptacle.approach))), receptacle.distance(stand)
-    if away > SNAP or gap > USUAL.reach:
+    if away > SNAP or gap > DEFAULT.reach:
         yield subject.error(
             "reach",
             f"the nearest place to stand, ({stand[0]:.2f}, {stand[1]:.2f}), is {away:.2f} m from its site "
             f"'approach' and {gap:.2f} m from its volume",
-            f"leave free floor in front of it: at most {SNAP} m from the site, {USUAL.reach} m from the volume",
+            f"leave free floor in front of it: at most {SNAP} m from the site, {DEFAULT.reach} m from the volume",
             (*receptacle.approach, 0.0),
         )
     elif not receptacle_in_sight(
-        compiled.model, compiled.data, np.array([*stand, USUAL.eye_height]), receptacle
+        compiled.model, compiled.data, np.array([*stand, DEFAULT.eye_height]), receptacle
     ):
         yield subject.error(
             "reach",
@@ -117,6 +117,6 @@ def _bin_use(floor: Floor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
         )
 
 
-def _about(floor: Floor, receptacle: ReceptacleGeometry) -> Compiled:
+def _about(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Compiled:
     """The house, with findings about a receptacle."""
     return replace(floor.compiled, subject=f"receptacle {receptacle.key}")

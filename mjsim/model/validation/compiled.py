@@ -33,19 +33,12 @@ _KIND = {
 
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """A compiled model at rest.
+    """A compiled model at rest."""
 
-    Attributes:
-        subject: What findings call it (`object mug`).
-        path: Its MJCF file.
-        model: The compiled model.
-        data: Its state, with the frames of bodies, geoms and sites.
-    """
-
-    subject: str
-    path: Path
-    model: mujoco.MjModel
-    data: mujoco.MjData
+    subject: str  # what findings call it (`object mug`)
+    path: Path  # its MJCF file
+    model: mujoco.MjModel  # the compiled model
+    data: mujoco.MjData  # its state, with the frames of bodies, geoms and sites
 
     @classmethod
     def of(cls, subject: str, path: Path, model: mujoco.MjModel) -> "Compiled":

@@ -125,18 +125,12 @@ def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
 
 
 def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.int32]) -> Iterator[Finding]:
-    """Nothing starts inside of something else.
-
-    Args:
-        episode: The episode.
-        model: Its compiled scene.
-        owner: Object of each geom in the episode's order, or -1, shape (ngeom,).
-    """
+    """Nothing starts inside of something else; `owner` (ngeom,) is the object of each geom, or -1."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     trunk = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, TRUNK)
     deep = np.flatnonzero(data.contact.dist < -OVERLAP) if data.ncon else ()
-    told = set()
+    reported = set()
     for contact in deep:
         first, second = sorted(data.contact.geom[contact].tolist(), key=lambda g: (owner[g] < 0, g))
         # The person pushes objects out of the way, but not walls.
@@ -150,8 +144,8 @@ def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.in
             what = episode.objects[other].name if other >= 0 else "a wall, the floor or a piece of furniture"
             if model.geom(second).name.startswith(PREFIX):
                 continue
-        if (subject, what) not in told:
-            told.add((subject, what))
+        if (subject, what) not in reported:
+            reported.add((subject, what))
             yield Finding(
                 "overlap",
                 subject,

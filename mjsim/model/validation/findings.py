@@ -11,24 +11,16 @@ Severity = Literal["error", "warning"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault.
+    """One fault."""
 
-    Attributes:
-        rule: Convention that is broken (`mass`), a heading of the rules in docs/models.md.
-        subject: What is at fault (`object mug`, `house`, `object_03`).
-        message: Where, and with which value.
-        remedy: What to change.
-        severity: `error` where it cannot be used, `warning` where it can but people would be surprised.
-        file: Name of the file to change; empty where the subject says it.
-        place: Where, m, (x, y) or (x, y, z) in the frame of the house or of the object; None where it has no place.
-    """
-
-    rule: str
-    subject: str
-    message: str
-    remedy: str
+    rule: str  # convention that is broken (`mass`), a heading of the rules in docs/models.md
+    subject: str  # what is at fault (`object mug`, `house`, `object_03`)
+    message: str  # where, and with which value
+    remedy: str  # what to change
+    # `error` where it cannot be used, `warning` where it can but people would be surprised
     severity: Severity = "error"
-    file: str = ""
+    file: str = ""  # name of the file to change; empty where the subject says it
+    # where, m, (x, y) or (x, y, z) in the frame of the house or of the object; None where it has no place
     place: tuple[float, ...] | None = None
 
     def __str__(self) -> str:

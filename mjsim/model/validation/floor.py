@@ -20,22 +20,14 @@ _FINEST = 0.025  # m
 
 
 @dataclass(frozen=True, eq=False)
-class Floor:
-    """A compiled house with its receptacles, and what is derived from it.
+class WalkableFloor:
+    """A compiled house with its receptacles, and what is derived from it."""
 
-    Attributes:
-        compiled: The model.
-        rooms: Which room a point is in.
-        receptacles: Receptacle key -> geometry.
-        rooms_of: Receptacle key -> room that the catalogue gives.
-        navigable: Where one can walk.
-    """
-
-    compiled: Compiled
-    rooms: RoomMap
-    receptacles: dict[str, ReceptacleGeometry]
-    rooms_of: dict[str, str]
-    navigable: NavigableFloor
+    compiled: Compiled  # the model
+    rooms: RoomMap  # which room a point is in
+    receptacles: dict[str, ReceptacleGeometry]  # receptacle key -> geometry
+    rooms_of: dict[str, str]  # receptacle key -> room that the catalogue gives
+    navigable: NavigableFloor  # where one can walk
 
     @cached_property
     def walkable(self) -> tuple[NDArray[np.float64], float]:

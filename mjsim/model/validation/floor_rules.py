@@ -12,12 +12,12 @@ from mjsim.model.clearance import ClearanceField
 from mjsim.model.validation.bin_rules import check_bins
 from mjsim.model.validation.compiled import Compiled
 from mjsim.model.validation.findings import Finding
-from mjsim.model.validation.floor import BODY_BAND, BORDER, Floor
+from mjsim.model.validation.floor import BODY_BAND, BORDER, WalkableFloor
 from mjsim.person_parameters import PersonParameters
 
 USUAL = PersonParameters()  # a study may have others
 PASSAGE = 0.70  # m, width below which people squeeze through
-LEAST_PASSAGE = 0.50  # m, width of the body with the planner's clearance
+MIN_PASSAGE = 0.50  # m, width of the body with the planner's clearance
 ROOM_AREA = 0.25  # m^2 of floor to stand on
 FLOOR_GAP = 0.006  # m, between the floor and z = 0
 HEADROOM = 2.0  # m, the highest eyes
@@ -26,13 +26,13 @@ _HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)  # groups of what collides, an
 _CHEST = 1.0  # m, where rays begin: nothing that a person can stand at is there
 
 
-def check_floor(floor: Floor) -> list[Finding]:
+def check_floor(floor: WalkableFloor) -> list[Finding]:
     """All that is wrong with a house as a place to walk in."""
     return [finding for rule in RULES for finding in rule(floor)]
 
 
-def _shell(floor: Floor) -> Iterator[Finding]:
-    """Nobody and nothing gets out: free space does not reach from a room to the border."""
+def _shell(floor: WalkableFloor) -> Iterator[Finding]:
+    """No way leads out: free space does not reach from a room to the border."""
     free = floor.clearance.distance > 0
     components, _ = label(free)
     indoors = floor.rectangle_of >= 0
@@ -56,7 +56,7 @@ def _shell(floor: Floor) -> Iterator[Finding]:
         )
 
 
-def _rooms(floor: Floor) -> Iterator[Finding]:
+def _rooms(floor: WalkableFloor) -> Iterator[Finding]:
     """Every room has floor to stand on that belongs to the largest island."""
     points, area = floor.walkable
     owner = floor.rectangle_of[tuple(floor.cell_of(points).T)]
@@ -65,19 +65,19 @@ def _rooms(floor: Floor) -> Iterator[Finding]:
         if free < ROOM_AREA:
             yield floor.compiled.error(
                 "rooms",
-                f"nobody can walk into room {key!r}",
-                f"make the way in at least {PASSAGE} m wide ({LEAST_PASSAGE} m is the body), or take it out of [rooms]",
+                f"no way leads into room {key!r}",
+                f"make the way in at least {PASSAGE} m wide ({MIN_PASSAGE} m is the body), or take it out of [rooms]",
                 (*floor.rooms.centers[floor.rectangles_of(key)[0]], 0.0),
             )
 
 
-def _passages(floor: Floor) -> Iterator[Finding]:
+def _passages(floor: WalkableFloor) -> Iterator[Finding]:
     """Ways between rooms that are narrower than `PASSAGE`, by the rooms that a wider person could not enter."""
     field = floor.clearance
     inside = distance_transform_edt(floor.rectangle_of < 0) * field.resolution <= BORDER / 2
     radius = PASSAGE / 2 - field.resolution
     wide, _ = label(inside & (field.distance > radius))
-    body, _ = label(inside & (field.distance > LEAST_PASSAGE / 2 - field.resolution))
+    body, _ = label(inside & (field.distance > MIN_PASSAGE / 2 - field.resolution))
     counts = np.bincount(wide[wide > 0])
     if len(counts) < 2:
         return
@@ -92,7 +92,7 @@ def _passages(floor: Floor) -> Iterator[Finding]:
         yield floor.compiled.warning(
             "passages",
             f"the way into room {key!r} is about {width:.2f} m wide at ({at[0]:.2f}, {at[1]:.2f})",
-            f"make it at least {PASSAGE} m (doorways 0.85 m), so that nobody brushes along",
+            f"make it at least {PASSAGE} m (doorways 0.85 m), so that people do not touch the frame",
             (*at, 0.0),
         )
 
@@ -117,7 +117,7 @@ def _narrowest(
     return (int(row), int(column)), 2 * float(field.distance[row, column])
 
 
-def _level(floor: Floor) -> Iterator[Finding]:
+def _level(floor: WalkableFloor) -> Iterator[Finding]:
     """Wherever one can walk, the floor is at z = 0."""
     points = np.vstack([_places(floor), _low_things(floor)])
     heights = np.array([_CHEST - _free(floor.compiled, p, -1.0) for p in points])
@@ -134,7 +134,7 @@ def _level(floor: Floor) -> Iterator[Finding]:
         )
 
 
-def _headroom(floor: Floor) -> Iterator[Finding]:
+def _headroom(floor: WalkableFloor) -> Iterator[Finding]:
     """Nothing hangs into the way of eyes; what hangs below 1.8 m is walked around."""
     points = _places(floor)
     heights = np.array([_CHEST + _free(floor.compiled, p, 1.0) for p in points])
@@ -148,13 +148,13 @@ def _headroom(floor: Floor) -> Iterator[Finding]:
         )
 
 
-def _places(floor: Floor) -> NDArray[np.float64]:
+def _places(floor: WalkableFloor) -> NDArray[np.float64]:
     """Points (k, 2), m, all over the walkable floor."""
     points, _ = floor.walkable
     return points[:: max(1, len(points) // _RAYS)]
 
 
-def _low_things(floor: Floor) -> NDArray[np.float64]:
+def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
     """Middles (k, 2), m, of colliding geoms that are too low to be walked around, where one can walk."""
     compiled, found = floor.compiled, [np.empty((0, 2))]
     points, area = floor.walkable
@@ -177,7 +177,7 @@ def _free(compiled: Compiled, point: NDArray[np.float64], up: float) -> float:
     return distance if distance >= 0 else math.inf
 
 
-RULES: tuple[Callable[[Floor], Iterator[Finding]], ...] = (
+RULES: tuple[Callable[[WalkableFloor], Iterator[Finding]], ...] = (
     _shell,
     _rooms,
     _passages,

@@ -34,12 +34,7 @@ GRIPS = ("grip_0", "grip_1")
 
 
 def check_object(path: Path, key: str | None = None) -> list[Finding]:
-    """All that is wrong with an object's MJCF file.
-
-    Args:
-        path: The file.
-        key: Its key in the catalogue; None for the file's name.
-    """
+    """All that is wrong with an object's MJCF file; its `key` in the catalogue is by default the file's name."""
     subject = f"object {key or path.stem}"
     compiled = compile_model(subject, path)
     return check_compiled_object(compiled) if isinstance(compiled, Compiled) else compiled
@@ -208,7 +203,7 @@ def _parts(compiled: Compiled) -> Iterator[Finding]:
             yield compiled.warning(
                 "rolling",
                 f"the round geom {compiled.geom_name(int(geom))} has condim {model.geom_condim[geom]}",
-                'give it condim="6" friction="1 0.02 0.002", or it rolls for ever',
+                'give it condim="6" friction="1 0.02 0.002", or it does not stop rolling',
                 compiled.data.geom_xpos[geom],
             )
 

@@ -18,30 +18,21 @@ from mjsim.model.validation.episode_rules import check_fit, check_overlaps, chec
 from mjsim.model.validation.findings import Finding, errors
 from mjsim.model.validation.object_rules import check_object
 from mjsim.model.validation.receptacle_rules import check_receptacle
-from mjsim.model.validation.validate import check_house
-from mjsim.model.validation.verdicts import remember_usable
-from mjsim.model.validation.views import View, floor_view, side_views
+from mjsim.model.validation.validate import check_house, require_usable
+from mjsim.model.validation.views import Drawing, floor_view, side_views
 
 CATALOGUE = "catalogue.toml"
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a check found.
+    """What a check found."""
 
-    Attributes:
-        kind: `house`, `receptacle`, `object` or `episode`.
-        path: What was checked.
-        findings: Every fault, errors first.
-        facts: What is good to know: name -> text.
-        views: Drawings, for a picture; empty where nothing could be compiled.
-    """
-
-    kind: str
-    path: str
-    findings: tuple[Finding, ...]
-    facts: Mapping[str, str] = field(default_factory=dict)
-    views: tuple[View, ...] = ()
+    kind: str  # `house`, `receptacle`, `object` or `episode`
+    path: str  # what was checked
+    findings: tuple[Finding, ...]  # every fault, errors first
+    facts: Mapping[str, str] = field(default_factory=dict)  # what is good to know: name -> text
+    views: tuple[Drawing, ...] = ()  # drawings, for a picture; empty where nothing could be compiled
 
     def __post_init__(self) -> None:
         ordered = sorted(self.findings, key=lambda f: f.severity != "error")
@@ -54,16 +45,7 @@ class Report:
 
 
 def check_path(name: str, house: str | None = None) -> Report:
-    """Recognise what a path leads to, and check it.
-
-    Args:
-        name: A `catalogue.toml`, its folder, the name of a house, the MJCF file of an object, a receptacle or a house,
-            or an episode's JSON.
-        house: House of the episode; None for the one that it names.
-
-    Raises:
-        AssetError: It is none of these.
-    """
+    """Check a catalogue, its folder, a house by name, an MJCF file, or an episode, with the house for it."""
     path = Path(name)
     if path.suffix == ".json":
         return check_episode_file(path, house)
@@ -80,11 +62,10 @@ def check_house_name(name: str) -> Report:
         catalogue = Catalogue.load(name)
     except AssetError as error:
         return Report("house", name, (_unreadable("catalogue", error),))
-    house = CompiledHouse(catalogue)
-    found = check_house(house)
+    house = compiled_house(catalogue)
+    found = house.once("findings", lambda: check_house(house))
     if errors(found):
         return Report("house", name, tuple(found), views=_partial_view(catalogue))
-    remember_usable(catalogue)
     fits, more = _check_sampling(house)
     xmin, ymin, xmax, ymax = house.rooms.bounds
     facts = {
@@ -135,6 +116,7 @@ def check_episode_file(path: Path, house: str | None = None) -> Report:
     try:
         catalogue = Catalogue.load(house or episode.house)
         built = compiled_house(catalogue)
+        require_usable(built)
     except AssetError as error:
         return Report("episode", str(path), (_unreadable("house", error),))
     found = [*check_fit(episode, catalogue), *check_poses(episode, built.rooms)]
@@ -171,7 +153,7 @@ def _check_model(path: Path) -> Report:
     return Report(kind, str(path), tuple(findings), facts, side_views(compiled))
 
 
-def _partial_view(catalogue: Catalogue) -> tuple[View, ...]:
+def _partial_view(catalogue: Catalogue) -> tuple[Drawing, ...]:
     compiled = compile_model("house", catalogue.house_path)
     return (floor_view(compiled),) if isinstance(compiled, Compiled) else ()
 

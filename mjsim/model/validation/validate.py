@@ -1,27 +1,32 @@
-"""One validator of houses, objects and receptacles, for `mjsim check` and for whatever loads them."""
+"""The validator of houses with their objects and receptacles, for `mjsim check` and for houses of users."""
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.errors import AssetError
+from mjsim.model.house import CompiledHouse
 from mjsim.model.validation.compiled import Compiled, compile_model
-from mjsim.model.validation.findings import Finding, errors
-from mjsim.model.validation.floor import Floor
+from mjsim.model.validation.findings import Finding, errors, one_line
+from mjsim.model.validation.floor import WalkableFloor
 from mjsim.model.validation.floor_rules import check_floor
 from mjsim.model.validation.house_rules import check_house_file
 from mjsim.model.validation.object_rules import check_compiled_object
 from mjsim.model.validation.receptacle_rules import check_receptacle
 
-if TYPE_CHECKING:
-    from mjsim.model.house import CompiledHouse
-
 SLOTS = 2.5  # footprints of an average object of the category that a receptacle's floor should have room for
 
 
-def check_house(house: "CompiledHouse") -> list[Finding]:
+def require_usable(house: CompiledHouse) -> None:
+    """Check a house, once per process, unless it comes with the package; `AssetError` gives the first error."""
+    if house.catalogue.is_shipped:
+        return
+    if found := errors(house.once("findings", lambda: check_house(house))):
+        raise AssetError(one_line(found, house.catalogue.name))
+
+
+def check_house(house: CompiledHouse) -> list[Finding]:
     """All that is wrong with a house, its receptacles and its objects.
 
     What needs a sound file is only judged where the file is sound: a house of the wrong size has no floor plan.
@@ -42,10 +47,10 @@ def check_house(house: "CompiledHouse") -> list[Finding]:
     return found if errors(found) else [*found, *_check_composed(house), *_check_sizes(house, footprints)]
 
 
-def _check_composed(house: "CompiledHouse") -> list[Finding]:
+def _check_composed(house: CompiledHouse) -> list[Finding]:
     try:
         compiled = Compiled.of("house", house.catalogue.house_path, house.model)
-        floor = Floor(
+        floor = WalkableFloor(
             compiled,
             house.rooms,
             house.receptacles,
@@ -57,7 +62,7 @@ def _check_composed(house: "CompiledHouse") -> list[Finding]:
     return check_floor(floor)
 
 
-def _check_sizes(house: "CompiledHouse", footprints: Mapping[str, NDArray[np.float64]]) -> Iterator[Finding]:
+def _check_sizes(house: CompiledHouse, footprints: Mapping[str, NDArray[np.float64]]) -> Iterator[Finding]:
     """Every object fits into its receptacle, and a few of them do side by side."""
     for category in house.catalogue.categories.values():
         interior = np.sort(2 * house.receptacles[category.receptacle].half_size[:2])

@@ -20,22 +20,18 @@ _BAND = (0.05, 1.8)  # m, heights of what is drawn of a house
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """A drawing in metres.
+class Drawing:
+    """A drawing in metres."""
 
-    Attributes:
-        title: From where it is seen.
-        axes: Which coordinates of a place it shows, to the right and up: (0, 1) from above.
-        outlines: Convex polygons, each (k, 2).
-        rooms: Corners (4, 2) of each rectangle, with the room's name.
-        marks: Name -> point, of sites, receptacles and objects.
-    """
-
-    title: str
-    axes: tuple[int, int]
-    outlines: tuple[NDArray[np.float64], ...]
-    rooms: tuple[tuple[str, NDArray[np.float64]], ...] = ()
-    marks: Mapping[str, Point] = field(default_factory=dict)
+    title: str  # from where it is seen
+    axes: tuple[int, int]  # which coordinates of a place it shows, to the right and up: (0, 1) from above
+    outlines: tuple[NDArray[np.float64], ...]  # convex polygons, each (k, 2)
+    rooms: tuple[
+        tuple[str, NDArray[np.float64]], ...
+    ] = ()  # corners (4, 2) of each rectangle, with the room's name
+    marks: Mapping[str, Point] = field(
+        default_factory=dict
+    )  # name -> point, of sites, receptacles and objects
 
 
 def floor_view(
@@ -43,20 +39,20 @@ def floor_view(
     rooms: RoomMap | None = None,
     receptacles: Mapping[str, ReceptacleGeometry] | None = None,
     episode: Episode | None = None,
-) -> View:
+) -> Drawing:
     """A house from above: what a person bumps into, rooms, receptacles, and what an episode puts there."""
     marks = {key: _point(r.center, (0, 1)) for key, r in (receptacles or {}).items()}
     if episode is not None:
         marks |= {o.name: _point(o.position, (0, 1)) for o in episode.objects}
         marks["start"] = (episode.start.x, episode.start.y)
-    return View("from above", (0, 1), _outlines(compiled, (0, 1), _BAND), _rectangles(rooms), marks)
+    return Drawing("from above", (0, 1), _outlines(compiled, (0, 1), _BAND), _rectangles(rooms), marks)
 
 
-def side_views(compiled: Compiled) -> tuple[View, ...]:
+def side_views(compiled: Compiled) -> tuple[Drawing, ...]:
     """An object or a receptacle from above, from the front and from the right, with its sites."""
     sites = {compiled.model.site(s).name: compiled.data.site_xpos[s] for s in range(compiled.model.nsite)}
     return tuple(
-        View(title, axes, _outlines(compiled, axes), marks={n: _point(p, axes) for n, p in sites.items()})
+        Drawing(title, axes, _outlines(compiled, axes), marks={n: _point(p, axes) for n, p in sites.items()})
         for title, axes in (("from above", (0, 1)), ("from the front", (0, 2)), ("from the right", (1, 2)))
     )
 

@@ -1,0 +1,153 @@
+"""`mjsim bench`: the benchmarks, one module each in this folder."""
+
+import argparse
+import importlib.util
+import inspect
+import json
+import math
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from experiments.cli.options import add_command, add_force, int_list
+from experiments.errors import ConfigError
+
+FOLDER = Path(__file__).resolve().parent
+
+DESCRIPTION = """\
+Run a benchmark of the source checkout and print what it measured, as ratios where possible, so that the figures hold on
+other machines as well. A benchmark is a module in benchmarks/ that defines measure() -> dict of JSON values, and
+lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, hours, workers, only,
+parts, seeds and objects; the options of the same name set them. picture(result, path) may draw the result."""
+
+
+def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
+    """Names of the benchmarks, sorted."""
+    return tuple(sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")))
+
+
+def benchmark(name: str, folder: Path = FOLDER) -> ModuleType:
+    """Load the benchmark called `name`.
+
+    Raises:
+        ConfigError: There is no such benchmark, or the module is not a benchmark.
+    """
+    names = benchmark_names(folder)
+    if name not in names:
+        raise ConfigError(f"no benchmark {name!r}; there are {', '.join(names)}")
+    module = load(folder / f"{name}.py")
+    if not (hasattr(module, "measure") and hasattr(module, "lines")):
+        raise ConfigError(f"{folder / name}.py is no benchmark; define measure() and lines(result)")
+    return module
+
+
+def load(path: Path) -> ModuleType:
+    """Load a module from a file outside of any package.
+
+    Raises:
+        ConfigError: The file is not a Python module.
+    """
+    spec = importlib.util.spec_from_file_location(f"{path.parent.name}.{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ConfigError(f"{path} cannot be loaded as a module")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(commands, "bench", run, description=DESCRIPTION)
+    names = ", ".join(benchmark_names())
+    parser.add_argument("name", metavar="NAME", help=f"benchmark: {names}")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the result as well")
+    add_force(parser, "replace a picture that exists")
+    group = parser.add_argument_group("size of the benchmark, where it has such an option")
+    for name, kind, metavar, text in OPTIONS:
+        group.add_argument(f"--{name}", type=kind, metavar=metavar, help=text)
+    group.add_argument("--quick", action="store_true", help="a smaller run")
+
+
+def positive(text: str) -> int:
+    """Parse a whole number above 0.
+
+    Raises:
+        argparse.ArgumentTypeError: The text is something else.
+    """
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
+    return int(text)
+
+
+def natural(text: str) -> int:
+    """Parse a whole number, 0 included.
+
+    Raises:
+        argparse.ArgumentTypeError: The text is something else.
+    """
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return int(text)
+
+
+def positive_number(text: str) -> float:
+    """Parse a finite number above 0.
+
+    Raises:
+        argparse.ArgumentTypeError: The text is something else.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
+
+
+OPTIONS = (
+    ("houses", positive, "N", "number of houses"),
+    ("count", positive, "N", "number of cases"),
+    ("hours", positive_number, "H", "simulated hours"),
+    ("workers", positive, "N", "processes"),
+    ("only", natural, "N", "run only the session with this number"),
+    ("parts", lambda text: text.split(","), "NAME,..", "run only the parts of these names"),
+    ("seeds", positive, "N", "houses for each number of objects"),
+    ("objects", int_list, "N,..", "numbers of objects"),
+)
+
+
+def options(module: ModuleType, arguments: argparse.Namespace) -> dict[str, Any]:
+    """The given options, as keywords of the benchmark's `measure`.
+
+    Raises:
+        ConfigError: The benchmark has no such option.
+    """
+    values = {name: getattr(arguments, name) for name in ("quick", *(name for name, *_ in OPTIONS))}
+    given = {name: value for name, value in values.items() if value is not None and value is not False}
+    for name in given:
+        if name not in inspect.signature(module.measure).parameters:
+            raise ConfigError(f"benchmark {arguments.name} has no option --{name}; leave it out")
+    if arguments.picture is not None and not hasattr(module, "picture"):
+        raise ConfigError(f"benchmark {arguments.name} has no option --picture; leave it out")
+    return given
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure and print."""
+    from experiments.record.run_directory import check_file
+
+    module = benchmark(arguments.name)
+    given = options(module, arguments)
+    if arguments.picture is not None:
+        check_file(arguments.picture, replace=arguments.force)
+    result = module.measure(**given)
+    if arguments.picture is not None:
+        module.picture(result, arguments.picture)
+    if arguments.json:
+        print(json.dumps(result, indent=2))
+    else:
+        for line in module.lines(result):
+            print(line)
+    return 0

@@ -1,0 +1,69 @@
+"""Running the trials of a design with a progress bar."""
+
+import argparse
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from experiments.trials.design import Design
+from experiments.trials.workers import EXECUTORS, PROCESSES
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add `--workers` and `--executor`."""
+    parser.add_argument(
+        "--workers",
+        type=int,
+        default=os.cpu_count(),
+        metavar="N",
+        help="trials at a time (default: one per core, %(default)s here)",
+    )
+    parser.add_argument(
+        "--executor",
+        choices=EXECUTORS,
+        default=PROCESSES,
+        help="processes of this machine, or the Ray cluster at RAY_ADDRESS whose machines share OUT "
+        "(default: %(default)s)",
+    )
+
+
+def run_with_progress(
+    design: Design, out: Path, workers: int, executor: str, what: str = "trials"
+) -> tuple[list[Mapping[str, Any]], int]:
+    """Run what is missing of a design; all rows of the folder, and how many trials failed. `what` precedes the bar."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.trials.batch import BatchProgress, run_batch
+
+    failed = 0
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with progress_bars(error_console(), *columns) as bars:
+        bar = bars.add_task(what, total=None)
+
+        def show(progress: BatchProgress) -> None:
+            nonlocal failed
+            failed = progress.failed
+            bars.update(bar, total=progress.total, completed=progress.resumed + progress.done + failed)
+            if progress.failure:
+                bars.console.print(f"failed: {progress.failure}", style="red", soft_wrap=True)
+
+        def note(line: str) -> None:
+            bars.console.print(line, style="yellow", soft_wrap=True)
+
+        rows = run_batch(design, out, workers=workers, executor=executor, on_progress=show, on_note=note)
+    return rows, failed

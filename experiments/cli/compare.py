@@ -1,0 +1,128 @@
+"""`mjsim compare`: the assistance conditions of a batch, paired by seed."""
+
+import argparse
+import csv
+import dataclasses
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.cli.options import add_command, text_list
+from experiments.cli.requirements import require_extra
+from experiments.errors import ConfigError
+from mjsim.files import replacing
+
+if TYPE_CHECKING:
+    from experiments.analysis.comparison import Difference, Interval
+
+METRICS = ("completion_time_s", "task_distance_m", "ipl_stand", "nd_feasible", "total_regret_m")
+FORMATS = (".png", ".svg", ".pdf")  # of a figure
+WIDTH = 160  # characters, where there is no terminal
+
+DESCRIPTION = """\
+Compare every two assistance conditions of a batch. Trials are paired that differ in nothing but the assistance: the
+same three seeds, number of objects, participant, house and so on. Shows for each metric the means, the mean
+difference (second minus first) with its 95 % confidence interval, and the effect size d_z (the difference in standard
+deviations of the differences) with its own. Trials without a counterpart are named and left out."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands,
+        "compare",
+        run,
+        description=DESCRIPTION,
+    )
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a batch")
+    parser.add_argument(
+        "--metrics",
+        type=text_list,
+        default=",".join(METRICS),
+        metavar="NAME,..",
+        help="columns of trials.parquet to compare (docs/metrics.md)",
+    )
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="figure to write: .png, .svg or .pdf")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="table to write")
+    parser.add_argument("--force", action="store_true", help="replace files that exist")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare, show, write."""
+    from rich.console import Console
+
+    from experiments.analysis.comparison import (
+        batch_origin,
+        compare,
+        missing_pairs,
+        read_blocks,
+        unknown_metrics,
+    )
+    from experiments.record.run_directory import check_file
+
+    for path in (arguments.plot, arguments.csv):
+        if path is not None:
+            check_file(path, replace=arguments.force)
+    if arguments.plot is not None:
+        require_extra("study")
+        if arguments.plot.suffix not in FORMATS:
+            raise ConfigError(f"--plot {arguments.plot} must end in one of {', '.join(FORMATS)}")
+    blocks = read_blocks(arguments.folder)
+    differences = compare(blocks, arguments.metrics)
+    origin = batch_origin(blocks)
+    _show(differences, origin)
+    console = Console(stderr=True, highlight=False, markup=False)
+    for line in (*missing_pairs(blocks), *unknown_metrics(blocks, arguments.metrics, differences)):
+        console.print(line, style="yellow", soft_wrap=True)
+    if arguments.csv is not None:
+        _write_csv(arguments.csv, differences, origin)
+    if arguments.plot is not None:
+        from experiments.analysis.comparison_plot import draw_comparison
+
+        draw_comparison(arguments.plot, blocks, arguments.metrics)
+    return 0
+
+
+def _show(differences: "Sequence[Difference]", origin: str) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold", title=origin, title_justify="left")
+    for name in ("", "metric", "conditions", "pairs", "means", "difference [95 %]", "d_z [95 %]", "p"):
+        table.add_column(name.replace("[", r"\["), overflow="fold")
+    for d in differences:
+        table.add_row(
+            d.block,
+            d.metric,
+            " → ".join(d.conditions),
+            str(d.pairs),
+            f"{d.means[0]:.4g} → {d.means[1]:.4g}",
+            _with_interval(d.difference, d.interval),
+            _with_interval(d.effect, d.effect_interval),
+            "-" if d.p is None else "< .001" if d.p < 0.001 else f"{d.p:.3f}",
+        )
+    Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH).print(table)
+
+
+def _with_interval(value: float | None, interval: "Interval") -> str:
+    if value is None:
+        return "-"
+    return f"{value:+.3g}" + (rf" \[{interval[0]:+.3g}, {interval[1]:+.3g}]" if interval else "")
+
+
+def _write_csv(path: Path, differences: "Sequence[Difference]", origin: str) -> None:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        names = ("first", "second", "first_mean", "second_mean", "low", "high", "effect_low", "effect_high")
+        writer.writerow(("origin", "block", "metric", "pairs", "difference", "effect", "p", *names))
+        for d in differences:
+            values = dataclasses.asdict(d)
+            pairs = (*d.conditions, *d.means, *(d.interval or ("", "")), *(d.effect_interval or ("", "")))
+            writer.writerow(
+                (
+                    origin,
+                    *(values[n] for n in ("block", "metric", "pairs", "difference", "effect", "p")),
+                    *pairs,
+                )
+            )

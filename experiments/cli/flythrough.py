@@ -1,0 +1,68 @@
+"""`mjsim flythrough`: film the rooms and bins of a house."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.options import (
+    add_command,
+    add_force,
+    add_frame,
+    add_setting,
+    film_config,
+    seconds,
+)
+from experiments.errors import ConfigError
+
+DESCRIPTION = """\
+Film a tidy house as its guests see it before the task: a camera at eye height goes through all rooms, looks around each
+of them, and rests on each bin; captions name room and bin. Equal options give equal frames."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(commands, "flythrough", run, description=DESCRIPTION)
+    add_setting(parser, "house", default="apartment")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILM.mp4", help="film to write")
+    parser.add_argument(
+        "--seconds",
+        type=seconds,
+        metavar="S",
+        help="how long the film is, 1 or more (default: as long as it takes at walking speed)",
+    )
+    add_force(parser)
+    add_frame(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Film, with a progress bar."""
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.house import House
+    from experiments.procedure.film import write_flythrough
+    from experiments.record.run_directory import check_file
+
+    if arguments.out.suffix != ".mp4":
+        raise ConfigError(f"cannot film to {arguments.out}: name a file that ends in .mp4")
+    check_file(arguments.out, replace=arguments.force)
+    film = film_config(arguments)
+    house = House.load(arguments.house)
+    columns = (
+        TextColumn("frames"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with progress_bars(error_console(), *columns) as bars:
+        bar = bars.add_task("frames", total=None)
+        frames = write_flythrough(
+            house,
+            arguments.out,
+            film,
+            seconds=arguments.seconds,
+            on_progress=lambda done, total: bars.update(bar, completed=done, total=total),
+        )
+    print(f"{arguments.out} (frames {frames})")
+    return 0

@@ -1,0 +1,61 @@
+"""`mjsim import`: objects from mesh files."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.options import HelpFormatter
+from mjsim.importing import require_extra
+from mjsim.importing.values import AXES, UNITS, ImportOptions
+
+DESCRIPTION = """\
+Make an object of a mesh file: in metres and z up, closed, in convex parts, with mass, grips and a look, resting as it
+would on a floor. It joins a category of a house in DIR/catalogue.toml, which every command takes as --house. What was
+decided is printed and kept in DIR/NAME/report.json; DIR/NAME/preview.png shows the result (docs/import.md)."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    top = commands.add_parser("import")
+    kinds = top.add_subparsers(title="what to import", metavar="KIND", required=True)
+    parser = kinds.add_parser(
+        "object", help="an object from a mesh", description=DESCRIPTION, formatter_class=HelpFormatter
+    )
+    parser.set_defaults(run=run)
+    parser.add_argument("file", type=Path, metavar="FILE", help=".glb, .obj, .stl or .ply")
+    add = parser.add_argument
+    add("--category", required=True, metavar="NAME", help="of the house; its bin takes the object")
+    add("--out", type=Path, required=True, metavar="DIR", help="folder of the catalogue, new or not")
+    add("--name", metavar="NAME", help="shown to the person (default: the name of the file)")
+    add("--house", metavar="NAME", help="house to extend, or its catalogue.toml (default: apartment)")
+    add("--force", action="store_true", help="replace an object of the same name")
+    shape = parser.add_argument_group("what the file does not say")
+    shape.add_argument("--units", choices=tuple(UNITS), help="default: m in glTF, else guessed from the size")
+    shape.add_argument("--up", choices=AXES, help="default: y in glTF and OBJ, z in STL and PLY")
+    shape.add_argument("--scale", type=float, default=1.0, metavar="F", help="factor on top of the unit")
+    weight = shape.add_mutually_exclusive_group()
+    weight.add_argument("--mass", type=float, metavar="KG", help="0.03 to 1.5 kg")
+    weight.add_argument(
+        "--density", type=float, metavar="D", help="kg/m3 (default: 400, and a mass that is allowed)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Import, report."""
+    require_extra()  # then trimesh, CoACD and OpenGL are loaded: other commands start fast
+    from rich.console import Console
+    from rich.table import Table
+
+    from mjsim.importing.house_extension import Entry, HouseExtension
+    from mjsim.importing.mesh_import import add_mesh
+
+    entry = Entry.named(arguments.name or arguments.file.stem, arguments.category)
+    options = ImportOptions(arguments.units, arguments.up, arguments.scale, arguments.mass, arguments.density)
+    extension = HouseExtension(arguments.out, arguments.house)
+    decisions = add_mesh(arguments.file, extension, entry, options, force=arguments.force)
+    table = Table("", entry.label, "why")
+    for decision in decisions:
+        table.add_row(decision.what, decision.choice, decision.reason)
+    Console().print(table)
+    print(f"{extension.folder / entry.key} (mjsim run --house {extension.path} samples it)")
+    return 0

@@ -1,0 +1,145 @@
+"""The `mjsim` command: a module of `experiments.cli` for each subcommand, or one of the checkout."""
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from experiments.cli.failures import USAGE_ERROR, drop_output, end_with
+from experiments.cli.requirements import add_checkout_command
+from experiments.session.signals import exit_code, signal_of, signals_raised
+from mjsim.gl_choice import postpone_gl
+
+COMMANDS = {
+    "run": "run one trial and film it",
+    "play": "tidy the apartment yourself, in a browser",
+    "replay": "replay and verify a recorded run; film it in another view",
+    "batch": "run the trials of a design on all cores; resumes",
+    "metrics": "compute the metrics of a run or a batch anew",
+    "compare": "compare the assistance conditions of a batch",
+    "study": "simulate and analyse studies, score them against the published one, plan them",
+    "plan": "solve a routing problem from a JSON file",
+    "house": "write a disorganized house as MJCF",
+    "flythrough": "film the rooms and bins of a house",
+    "check": "check a house, an object or an episode",
+    "import": "make objects from mesh files",
+    "gallery": "make the pictures of the documentation",
+    "bench": "run a benchmark of the source checkout",
+    "doctor": "show versions and whether rendering works",
+}
+MODULES = {"import": "import_"}  # where a module cannot be called as its command
+CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # modules outside the wheel
+
+DESCRIPTION = """\
+A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
+
+A person walks through a disorganized apartment in first person, picks up misplaced objects, at most two at a time,
+and puts each into its bin. A heads-up display, driven by an optimal planner, assists."""
+
+EPILOG = """\
+examples:
+  mjsim run --objects 6 --assistance guided --seed 0 --out runs/demo
+      film one assisted trial, with metrics, event log and floor plan
+  mjsim play --objects 6 --assistance optimal --seed 0
+      tidy the apartment yourself, in a browser
+  mjsim batch --objects 6,12 --assistance none,highlight,optimal --seeds 0:10 --out runs/batch
+      run a factorial design on all cores; the same command continues after an interruption
+  mjsim compare runs/batch
+      compare its assistance conditions, paired by seed, with effect sizes
+  mjsim study analyze runs/study
+      analyse a study between subjects: figures, tests, a report in one file
+  mjsim house --objects 12 --seed 3 --out house.xml
+      write a disorganized house as MJCF for stock MuJoCo
+  mjsim check my_house/catalogue.toml --picture faults.png
+      say what is wrong with a house, an object or an episode, and what to change
+  mjsim plan problem.json
+      solve a pickup-and-delivery problem, with a proof of optimality where possible
+  mjsim doctor
+      show versions, and whether off-screen rendering works"""
+
+
+def parser(command: str | None = None) -> argparse.ArgumentParser:
+    """The command line; with `command`, the module of this one alone is loaded."""
+    top = Parser(
+        prog="mjsim",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action=_Version)
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    if command is None:
+        for name, summary in COMMANDS.items():
+            commands.add_parser(name, help=summary)
+    elif command in CHECKOUT:
+        add_checkout_command(commands, command, CHECKOUT[command])
+    else:
+        importlib.import_module(f"experiments.cli.{MODULES.get(command, command)}").add_parser(commands)
+    return top
+
+
+class _Version(argparse.Action):
+    """Prints the version; looked up only then, so that all else starts fast."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"mjsim {version('mjsim')}")
+        parser.exit()
+
+
+class Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong with a command line."""
+
+    def error(self, message: str) -> NoReturn:
+        """End the process."""
+        text = " ".join(message.split())
+        self.exit(USAGE_ERROR, f"mjsim: {text}; `{self.prog} --help` lists the options\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; 0 done, 1 failed, 2 bad input, 70 a bug of ours, 128 + n stopped by signal n."""
+    words = sys.argv[1:] if argv is None else list(argv)
+    if (here := str(Path.cwd())) not in sys.path:
+        sys.path.append(here)  # where a user's participants, conditions and planners may be
+    postpone_gl()
+    if sys.stderr is None:  # closed; messages must not go to standard output
+        sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - as long as the process
+    with signals_raised():
+        try:
+            return _run(words)
+        except KeyboardInterrupt as stop:
+            number = signal_of(stop)
+            print(f"mjsim: stopped by {number.name}; what was finished is kept", file=sys.stderr)
+            return exit_code(number)
+        except Exception as error:
+            return end_with(error, words)
+
+
+def _run(words: list[str]) -> int:
+    command = words[0] if words and words[0] in COMMANDS else None
+    arguments = parser(command).parse_args(words)
+    if "numba" in sys.modules:
+        from experiments.trials.compile_notice import announce_compiling
+
+        announce_compiling()
+    code = int(arguments.run(arguments))
+    if sys.stdout is not None:
+        try:
+            sys.stdout.flush()
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            drop_output()
+            raise OSError(error.errno, f"cannot write to standard output: {error.strerror}") from error
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

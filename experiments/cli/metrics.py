@@ -1,0 +1,116 @@
+"""`mjsim metrics`: compute the metrics of runs and batches anew."""
+
+import argparse
+import csv
+import io
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.options import add_command, add_force
+from experiments.errors import RecordError, ReplayError
+from mjsim.files import write_text_atomically
+
+DESCRIPTION = """\
+Compute the metrics of a run directory or of a batch folder anew, from event log and trajectory alone. A run is printed
+with a name and a value per line, a batch as CSV with a row per trial; --out writes CSV or JSON instead.
+
+Each file that is read must have the SHA-256 with which it was written (`mjsim replay` checks everything). Metrics that
+can be defined in several ways are shown side by side:
+
+  nd_strict_2n     visits that differ from the suggested next one, over two per object
+  nd_feasible      the same, over the visits at which another one was feasible
+  nd_bin_tied      as nd_feasible, but which object goes first into one bin is no choice
+  nd_regret_10cm   as nd_feasible, but only deviations that cost more than 0.1 m
+  ipl_locations    distances between the places of visits, over the metres walked (the paper's; can exceed 1)
+  ipl_stand        shortest walks between where the person stood, over the metres walked (never exceeds 1)
+
+docs/metrics.md defines all of them, docs/data.md lists every field of every file."""
+FORMATS = (".csv", ".json")
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands,
+        "metrics",
+        run,
+        description=DESCRIPTION,
+    )
+    parser.add_argument("directory", type=Path, metavar="DIR", help="run directory, or folder of a batch")
+    parser.add_argument(
+        "--out", type=_table_file, metavar="FILE", help=f"write to a file: {' or '.join(FORMATS)}"
+    )
+    add_force(parser, "replace a file that exists")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print or write the metrics; 1 if a trial of a batch cannot be measured."""
+    from experiments.record.run_directory import check_file, is_batch, is_run
+
+    if arguments.out is not None:
+        check_file(arguments.out, replace=arguments.force)
+    if is_run(arguments.directory):
+        rows, failures = [_measured(arguments.directory)], 0
+    elif is_batch(arguments.directory):
+        rows, failures = _measure_batch(arguments.directory)
+    else:
+        raise RecordError(f"{arguments.directory} is neither a run directory nor the folder of a batch")
+    if arguments.out is not None:
+        write_text_atomically(arguments.out, _text(rows, arguments.out.suffix))
+    elif is_run(arguments.directory):
+        sys.stdout.writelines(f"{name:<32} {_shown(value)}\n" for name, value in rows[0].items())
+    else:
+        sys.stdout.write(_text(rows, ".csv"))
+    return 1 if failures else 0
+
+
+def _table_file(text: str) -> Path:
+    path = Path(text)
+    if path.suffix not in FORMATS:
+        raise argparse.ArgumentTypeError(f"{text!r} ends neither in .csv nor in .json")
+    return path
+
+
+def _measured(path: Path) -> Mapping[str, Any]:
+    """Metrics of one run; says so where its `metrics.json` says something else."""
+    from experiments.record.verify import check_log
+    from experiments.trials.batch_folder import read_trial
+
+    check_log(path)
+    trial = read_trial(path)
+    if not trial.as_measured:
+        print(f"mjsim: {path}: metrics.json does not say this; these follow from the log", file=sys.stderr)
+    return trial.row
+
+
+def _measure_batch(folder: Path) -> tuple[list[Mapping[str, Any]], int]:
+    from experiments.record.run_directory import TRIALS
+
+    rows, failures = [], 0
+    for path in sorted(p for p in (folder / TRIALS).glob("[!.]*") if p.is_dir()):
+        try:
+            rows.append(_measured(path))
+        except (RecordError, ReplayError) as error:
+            failures += 1
+            print(f"mjsim: {error}", file=sys.stderr)
+    return rows, failures
+
+
+def _text(rows: list[Mapping[str, Any]], suffix: str) -> str:
+    if suffix == ".json":
+        return json.dumps(rows, indent=2) + "\n"
+    text = io.StringIO()
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_shown(row.get(name)) for name in columns] for row in rows)
+    return text.getvalue()
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else json.dumps(value)

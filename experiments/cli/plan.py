@@ -1,0 +1,212 @@
+"""`mjsim plan`: solve a routing problem from a file."""
+
+import argparse
+import gc
+import json
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+from experiments.errors import ConfigError
+from planner.errors import PlannerError, ProblemError
+from planner.plan import Plan, Status
+from planner.problem import RoutingProblem
+from planner.problem_json import claim_from_json, claim_to_json, plan_to_json, problem_from_json
+from planner.solver import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, Solver, solver
+
+T = TypeVar("T")
+GRACE = 0.15  # s beyond a time limit that a planner may take to stop
+REPORT_EVERY = 5.0  # s
+
+DESCRIPTION = """\
+Solve a capacitated pickup-and-delivery problem with an open tour. Input, from FILE or - for standard input:
+  {"capacity": 2, "start": 0, "distances": [[0, 3, 5], [3, 0, 4], [5, 4, 0]],
+   "shipments": [{"pickup": 1, "delivery": 2}], "onboard": [2]}
+Indices count rows of the symmetric matrix distances, in metres or any other unit; onboard holds the delivery index of
+each object that is carried at the start.
+Output, on standard output:
+  {"visits": [1, 2, 2], "cost": 7.0, "lower_bound": 7.0, "status": "optimal", "seconds": 0.001}
+"optimal" says that no tour is shorter than cost by more than a billionth of it, whatever the scale of the distances.
+The exact planner proves tours for capacity 1 and 2, up to 40 objects and distances that keep the triangle inequality.
+OR-Tools plans all other problems, without a proof; a line on standard error says so.
+Progress of a long search goes to standard error. Ctrl-C or SIGTERM ends it with the best tour so far. Malformed input
+exits with 2 and one line that names the fault.
+
+--certificate OUT.json also writes the visits by object and what proves the lower bound. --check OUT.json replays such
+a tour against the constraints, derives the bound anew and examines every state through which a shorter tour could run,
+with code that shares nothing with the planners (about a second at 24 objects). It answers
+  {"holds": true, "cost": 7.0, "lower_bound": 7.0, "status": "optimal", "verified_bound": 7.0, "verified_optimal": true,
+   "unverified": ""}
+verified_bound is what the check has derived; where it is below lower_bound, unverified says why. A claim that
+does not hold exits with 1."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "plan",
+        help="solve a routing problem from a JSON file",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("file", metavar="FILE.json", help="problem to solve, - for standard input")
+    parser.add_argument(
+        "--planner", default=DEFAULT_SOLVER, metavar="NAME", help=f"{', '.join(SOLVERS)} ({DEFAULT_SOLVER})"
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        metavar="S",
+        help="seconds from start to answer, to half a second; without it, the planner's own budget of work",
+    )
+    claim = parser.add_mutually_exclusive_group()
+    claim.add_argument(
+        "--certificate", type=Path, metavar="OUT.json", help="write what the answer claims and what proves it"
+    )
+    claim.add_argument(
+        "--check",
+        metavar="OUT.json",
+        help="plan nothing: check what --certificate wrote, - for standard input",
+    )
+    parser.add_argument("--force", action="store_true", help="replace a certificate that exists")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, solve, print; or check."""
+    if arguments.check is not None:
+        return _check(arguments.file, arguments.check)
+    if arguments.certificate is not None:
+        from experiments.record.run_directory import check_file  # loaded only where it is needed
+
+        check_file(arguments.certificate, replace=arguments.force)
+    started, seconds = time.perf_counter(), arguments.time_limit
+    if seconds is not None:
+        SolveLimit(seconds=seconds)  # refuses what is no limit
+    problem, planner = _read(arguments.file, problem_from_json), solver(arguments.planner)
+    search = _Search(planner, problem, started, seconds)
+    try:
+        plan = search.wait()
+    except KeyboardInterrupt:
+        if search.best is not None:
+            print("mjsim: stopped early; this is the best tour so far", file=sys.stderr)
+            _publish(problem, search.best, arguments.certificate)
+        raise
+    finally:
+        search.end()
+        gc.freeze()  # at its end the process would collect the garbage of all of numba: 0.2 s
+    reason = planner.why_not(problem) if hasattr(planner, "why_not") else ""
+    if reason and plan.status is not Status.OPTIMAL:
+        print(f"mjsim: planned by OR-Tools, not proven optimal: {reason}", file=sys.stderr)
+    _publish(problem, plan, arguments.certificate)
+    return 0
+
+
+class _Search(threading.Thread):
+    """Plans in a thread, so that time limits and signals hold while a planner computes; `best` is the last plan."""
+
+    def __init__(
+        self, planner: Solver, problem: RoutingProblem, started: float, seconds: float | None
+    ) -> None:
+        super().__init__(daemon=True)
+        self.best: Plan | None = None
+        self._error: Exception | None = None
+        self._stop_planning = threading.Event()
+        self._planner, self._problem = planner, problem
+        self._since, self._seconds = started, seconds
+
+    def run(self) -> None:
+        try:
+            for plan in self._plans():
+                self.best = plan
+        except Exception as error:
+            self._error = error
+
+    def _plans(self) -> Iterator[Plan]:
+        """Better and better plans, within a time or a large budget of the exact planner's work."""
+        seconds = self._seconds
+        if seconds is not None:
+            from planner.greedy_solver import first_plan  # loaded only where it is needed
+
+            yield first_plan(self._problem)
+            seconds = max(0.001, self._since + seconds - time.perf_counter())
+        work = PATIENT_WORK if self._planner.name == DEFAULT_SOLVER and seconds is None else None
+        limit = SolveLimit(work, seconds, self._stop_planning)
+        if hasattr(self._planner, "improve"):
+            yield from self._planner.improve(self._problem, limit=limit)
+        else:
+            yield self._planner.solve(self._problem, limit=limit)
+
+    def wait(self) -> Plan:
+        """The best plan, once there is none better to come or the time is over.
+
+        Raises:
+            Exception: The planner failed.
+        """
+        self.start()
+        ends = float("inf") if self._seconds is None else self._since + self._seconds + GRACE
+        report = self._since + REPORT_EVERY
+        while self.is_alive() and (self.best is None or time.perf_counter() < ends):
+            self.join(max(0.01, min(ends, report) - time.perf_counter()))
+            if time.perf_counter() >= report:
+                self._report()
+                report += REPORT_EVERY
+        if self._error is not None:
+            raise self._error
+        if self.best is None:
+            raise PlannerError(f"planner {self._planner.name!r} found no tour")
+        return self.best
+
+    def end(self) -> None:
+        """Stop planning; a planner in the middle of a step may take a moment."""
+        self._stop_planning.set()
+        if self.is_alive():
+            self.join(1.0)
+
+    def _report(self) -> None:
+        text = f"planning for {time.perf_counter() - self._since:.0f} s"
+        if (best := self.best) is not None:
+            gap = 100 * (1 - best.lower_bound / best.cost) if best.cost else 0.0
+            text += f"; the best tour so far is {best.cost:.6g} long, at most {gap:.2g} % of it too much"
+        print(f"mjsim: {text}", file=sys.stderr, flush=True)
+
+
+def _publish(problem: RoutingProblem, plan: Plan, certificate: Path | None) -> None:
+    if certificate is not None:
+        from mjsim.files import write_text_atomically  # loaded only where it is needed
+
+        write_text_atomically(certificate, claim_to_json(problem, plan) + "\n")
+    print(plan_to_json(problem, plan))
+
+
+def _check(problem_name: str, claim_name: str) -> int:
+    """Check a claim about a problem; 1 where it does not hold."""
+    if problem_name == claim_name == "-":
+        raise ConfigError("problem and certificate cannot both come from standard input; give a file for one")
+    from planner.verifier import verify_optimal  # loaded only where it is needed
+
+    problem = _read(problem_name, problem_from_json)
+    plan = _read(claim_name, lambda text: claim_from_json(text, problem))
+    try:
+        seen = verify_optimal(problem, plan)
+    except ProblemError as error:
+        print(json.dumps({"holds": False, "fault": str(error)}))
+        return 1
+    claimed = {"cost": plan.cost, "lower_bound": plan.lower_bound, "status": plan.status.value}
+    verified = {"verified_bound": seen.lower_bound, "verified_optimal": seen.optimal, "unverified": seen.why}
+    print(json.dumps({"holds": True, **claimed, **verified}))
+    return 0
+
+
+def _read(name: str, parse: Callable[[bytes], T]) -> T:
+    try:
+        text = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
+    except OSError as error:
+        raise ConfigError(f"cannot read {name}: {error.strerror}") from error
+    try:
+        return parse(text)
+    except ProblemError as error:
+        raise ProblemError(f"{name}: {error}") from error

@@ -1,0 +1,225 @@
+"""`mjsim play`: a person at the keyboard, in a browser."""
+
+import argparse
+import fcntl
+import logging
+import os
+import socket
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import msgspec
+
+from experiments.cli.options import (
+    add_command,
+    add_task_options,
+    add_trial_options,
+    given_options,
+    seconds,
+    trial_options,
+)
+from experiments.errors import ConfigError, RecordError
+from experiments.procedure.story import story_text
+from experiments.record.origin import HUMAN
+from experiments.record.phases import FLYTHROUGH, PHASES, STORY, TASK, TRAINING, phases_of
+from experiments.trials.trial_config import TrialConfig
+from hud.conditions import condition
+from planner.solver import SOLVERS, solver
+
+OBJECTS = 6
+PORT = 8000
+TRAINING_LIMIT = 24 * 3600.0  # s; as good as none
+
+DESCRIPTION = """\
+Start a server on which people tidy the apartment in a browser: by keyboard and mouse, gamepad or touch. Prints its URL
+on a separate line and opens it. A visit is a story, a film of the house (if --film names one), a training with one
+object, the task, and a page with the result; --phases leaves some out.
+
+Every input is kept in --out at once: after a reload, a lost connection, or a crash of browser or server, the same link
+resumes in the same state. A finished trial leaves a run directory as `mjsim run` does, DIR/<visit>/task and
+DIR/<visit>/training, which `mjsim replay` verifies and films.
+
+The server is reached from this machine alone unless --host is given; docs/play.md explains how to host it for others.
+Ctrl-C ends it; the same command resumes."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(commands, "play", run, description=DESCRIPTION)
+    add_task_options(parser, OBJECTS)
+    parser.add_argument("--user", default=HUMAN, metavar="NAME", help="name of the participant")
+    add_trial_options(parser)
+    group = parser.add_argument_group("server")
+    group.add_argument(
+        "--port", type=_number(0, 65535), default=PORT, help="TCP port; 0 for any that is free"
+    )
+    group.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at")
+    group.add_argument(
+        "--public-url", metavar="URL", help="URL under which a proxy makes the server public (docs/play.md)"
+    )
+    group.add_argument("--no-open", action="store_true", help="open no browser")
+    group.add_argument(
+        "--out", type=Path, default=Path("runs/play"), metavar="DIR", help="folder of visits and their runs"
+    )
+    group.add_argument(
+        "--sessions",
+        type=_number(1, 1000),
+        default=1,
+        metavar="N",
+        help="how many people can play at a time; others wait",
+    )
+    group.add_argument(
+        "--idle",
+        type=seconds,
+        default=1800.0,
+        metavar="S",
+        help="seconds without a sign of the person after which the place is given to another one",
+    )
+    group.add_argument("--film", type=Path, metavar="FILE.mp4", help="film of the house to show first")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until a signal comes."""
+    trials = _trials(arguments)
+    if arguments.film is not None and not arguments.film.is_file():
+        raise ConfigError(f"there is no film {arguments.film}; leave out --film, or name an MP4 file")
+    _check_public(arguments.public_url)
+    with _listen(arguments.host, arguments.port) as listener, _locked(arguments.out):
+        _serve(arguments, trials, listener)
+    return 0
+
+
+def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """Settings of the training and the task."""
+    if arguments.user != HUMAN:
+        raise ConfigError(f"`mjsim play` is for a person; user {arguments.user} belongs to `mjsim run`")
+    task = TrialConfig(
+        assistance=arguments.assistance,
+        seed=arguments.seed,
+        live=True,
+        user=HUMAN,
+        **{
+            "objects": OBJECTS,
+            **given_options(arguments, ("objects",)),
+            **trial_options(arguments),
+            "phases": ",".join(_phases(arguments)),
+        },
+    )
+    from experiments.trials.training import training_config
+
+    condition(task.assistance)
+    if task.planner not in SOLVERS:  # those are loaded by the workers
+        solver(task.planner)
+    training = msgspec.structs.replace(training_config(task), time_limit=TRAINING_LIMIT)
+    return {TRAINING: training.settings(), TASK: task.settings()}
+
+
+def _phases(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """The phases of a visit; a fly-through needs a film.
+
+    Raises:
+        ConfigError: There is no such phase.
+    """
+    names = phases_of(arguments.phases or ",".join(PHASES))
+    return tuple(name for name in names if name != FLYTHROUGH or arguments.film is not None)
+
+
+def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], listener: socket.socket) -> None:
+    from experiments.web.server.pool import WorkerPool  # imported here, so that other commands start fast
+
+    pool = WorkerPool(trials[TASK]["house"])
+    pool.warm_up()  # in parallel to the imports that follow
+
+    import uvicorn
+
+    from experiments.web.protocol import MAX_TEXT
+    from experiments.web.server.app import PlayConfig, PlayServer
+
+    phases = _phases(arguments)
+    config = PlayConfig(
+        phases=phases,
+        trials=trials,
+        folder=arguments.out.absolute(),
+        sessions=arguments.sessions,
+        idle=max(arguments.idle, 1.0),
+        film=arguments.film,
+        story=story_text(arguments.story) if STORY in phases else "",
+    )
+    logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
+    logging.getLogger("mjsim.play").setLevel(logging.INFO)
+    server = uvicorn.Server(
+        uvicorn.Config(
+            PlayServer(config, pool).app(arguments.host, arguments.public_url),
+            log_config=None,
+            access_log=False,  # paths hold tokens
+            log_level="warning",
+            server_header=False,
+            ws="websockets-sansio",
+            ws_max_size=MAX_TEXT,
+            ws_ping_interval=5.0,
+            ws_ping_timeout=10.0,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=3,
+            limit_concurrency=1000,
+        )
+    )
+    url = arguments.public_url or _url(*listener.getsockname()[:2])
+    print(url, flush=True)
+    if not arguments.no_open:
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+    server.run(sockets=[listener])
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """A socket that listens."""
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        return socket.create_server((host, port), family=family, backlog=100)
+    except OSError as error:
+        place = f"cannot listen at {host}, port {port}"
+        raise OSError(
+            error.errno, f"{place}: {error.strerror}; name another --port (0 for any) or --host"
+        ) from error
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Keep other servers away from the folder of visits."""
+    folder.mkdir(parents=True, exist_ok=True)
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError as error:
+        raise RecordError(f"{folder} is in use by another `mjsim play`; choose another --out") from error
+    finally:
+        os.close(handle)
+
+
+def _check_public(url: str | None) -> None:
+    if url is None:
+        return
+    parts = urlsplit(url)
+    if parts.scheme not in ("http", "https") or not parts.netloc or parts.path not in ("", "/"):
+        raise ConfigError(f"public URL {url!r} must be of the form https://play.example.org")
+
+
+def _url(host: str, port: int) -> str:
+    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
+
+
+def _number(smallest: int, largest: int) -> Callable[[str], int]:
+    """Parser of a whole number in a range."""
+
+    def parse(text: str) -> int:
+        if not text.isdecimal() or not smallest <= int(text) <= largest:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number from {smallest} to {largest}")
+        return int(text)
+
+    return parse

@@ -1,0 +1,174 @@
+"""`mjsim replay`: simulate a recorded run again, verify it, film it in another view."""
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.cli.options import (
+    NAMES,
+    add_command,
+    add_force,
+    add_frame,
+    film_config,
+    seconds,
+)
+from experiments.errors import ConfigError, ReplayError
+from experiments.session.film_config import CAMERAS, FIRST_PERSON
+
+if TYPE_CHECKING:
+    from experiments.replay.replay import ReplayReport
+
+DESCRIPTION = """\
+Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one
+bit for bit. DIR is a run directory, however the run ended. Prints for every file of it what was checked, and exits with
+0, or names the first step that differs and exits with 1. Of a session of `mjsim play` that is not over, the run is made
+from its journal, as far as it goes, and replayed.
+
+With --video, the replay is filmed: as it was, or in another size, from another camera, with another HUD."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands,
+        "replay",
+        run,
+        description=DESCRIPTION,
+    )
+    parser.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+    parser.add_argument(
+        "--from",
+        dest="start",
+        type=seconds,
+        default=0.0,
+        metavar="T",
+        help="simulated seconds: start at the last checkpoint at or before T",
+    )
+    parser.add_argument(
+        "--house",
+        metavar="CATALOGUE",
+        help="catalogue.toml of the run's house, where it does not lie where it was; its content must be the same",
+    )
+    parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="film the replay")
+    parser.add_argument("--camera", choices=CAMERAS, default=FIRST_PERSON, help="the view that is filmed")
+    parser.add_argument(
+        "--eye",
+        type=point,
+        metavar="X,Y,Z",
+        help="position of a free camera, m (default: it circles the house)",
+    )
+    parser.add_argument(
+        "--target",
+        type=point,
+        metavar="X,Y,Z",
+        help="point that a free camera looks at, m (default: the middle of the floor)",
+    )
+    parser.add_argument(
+        "--assistance",
+        metavar="NAME",
+        help=f"show the HUD of another assistance condition{NAMES['assistance']()} (default: as recorded)",
+    )
+    add_frame(parser)
+    add_force(parser, "replace a video that exists")
+
+
+def point(text: str) -> tuple[float, float, float]:
+    """Parse `1.5,2,8`.
+
+    Raises:
+        argparse.ArgumentTypeError: It is not three numbers.
+    """
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form X,Y,Z, such as 1.5,2,8") from None
+    return x, y, z
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Replay with a progress bar.
+
+    Raises:
+        ConfigError: A camera is given, but no film.
+        ReplayError: Something differs from the record.
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+
+    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.record.run_directory import check_file
+    from experiments.replay.replay import ReplayFilm, replay
+
+    film = None
+    if arguments.video is not None:
+        check_file(arguments.video, replace=arguments.force)
+        film = ReplayFilm(
+            path=arguments.video,
+            config=film_config(arguments),
+            camera=arguments.camera,
+            eye=arguments.eye,
+            target=arguments.target,
+        )
+    elif arguments.camera != FIRST_PERSON or arguments.eye or arguments.target:
+        raise ConfigError("a camera needs a film; name the file with --video FILE.mp4")
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("steps"), TimeElapsedColumn())
+    try:
+        with ExitStack() as stack, progress_bars(error_console(), "replay", *columns) as bars:
+            bar = bars.add_task("replay", total=None)
+            report = replay(
+                stack.enter_context(_run_of(arguments)),
+                start=arguments.start,
+                film=film,
+                assistance=arguments.assistance,
+                catalogue=arguments.house,
+                on_progress=lambda done, total: bars.update(bar, completed=done, total=total),
+            )
+    except ReplayError as error:
+        for line in error.verdicts:
+            print(line)
+        raise
+    print(_summary(report))
+    if arguments.video is not None:
+        as_run = "; its frames are those of the run's own video" if report.as_filmed else ""
+        print(f"{arguments.video}{as_run}")
+    return 0
+
+
+@contextmanager
+def _run_of(arguments: argparse.Namespace) -> Iterator[Path]:
+    """The run directory; that of a session which is not over is made for as long as it is needed.
+
+    Raises:
+        RecordError: Nothing was played.
+    """
+    from experiments.house import House
+    from experiments.record.run_directory import is_run
+    from experiments.web.worker.live_session import (  # imported late: most runs have no journal
+        journal_of,
+        save_run,
+    )
+
+    journal = None if is_run(arguments.directory) else journal_of(arguments.directory)
+    if journal is None:
+        yield arguments.directory
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder) / "unfinished"
+        save_run(journal, run, None if arguments.house is None else House.load(arguments.house))
+        yield run
+
+
+def _summary(report: "ReplayReport") -> str:
+    text = "\n".join(map(str, report.verdicts)) + f"\n{report.steps} steps verified"
+    if report.first:
+        text += f" from the checkpoint at step {report.first} on"
+    text += f"; the run ended with {report.ended!r}"
+    if report.failure:
+        text += f", and so does the replay: {report.failure}"
+    if unusual := report.person.unusual():
+        text += f"\nthe participant: {unusual}"
+    for difference in report.differences:
+        text += f"\nwithout effect: {difference}"
+    return text

@@ -1,0 +1,33 @@
+"""`mjsim study`: studies with simulated participants or people; their subcommands."""
+
+import argparse
+from typing import Any
+
+from experiments.cli.options import HelpFormatter
+from experiments.cli.requirements import add_checkout_command
+
+# A module each, with `add_parser(commands)`; those outside the wheel need a checkout.
+SUBCOMMANDS = {
+    "simulate": "experiments.cli.study.simulate",
+    "controls": "studies.commands.controls",
+    "analyze": "experiments.cli.study.analyze",
+    "score": "studies.commands.score",
+    "calibrate": "studies.commands.calibrate",
+    "power": "experiments.cli.study.power",
+}
+
+DESCRIPTION = """\
+Studies: who took part, what was found, how it compares with the published study, how many people the next one needs.
+All output from simulated participants is marked as such; it is no evidence about people."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand with its own subcommands."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        "study",
+        description=DESCRIPTION,
+        formatter_class=HelpFormatter,
+    )
+    subcommands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name, module in SUBCOMMANDS.items():
+        add_checkout_command(subcommands, name, module)

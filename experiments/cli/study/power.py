@@ -1,0 +1,103 @@
+"""`mjsim study power`: how many people a study needs, from simulated people."""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.options import add_command, add_force
+from experiments.cli.requirements import require_extra
+
+DESCRIPTION = """\
+Say how many people each cell of a study needs to find an effect, what they cost and how many hours they take. How
+much people differ comes from a pool: a folder of simulated people in the same cells, 200 in each or more.
+
+The wanted effect is a difference of means (--difference), a partial eta squared (--eta-squared), or, with neither, the
+effect that the pool shows. Whether simulated people differ as much as real ones is not known; docs/study.md says what
+follows."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands, "power", run, summary="how many people a study needs", description=DESCRIPTION
+    )
+    parser.add_argument(
+        "study", type=Path, metavar="STUDY.toml", help="the study: its cells (docs/designs.md)"
+    )
+    parser.add_argument("--pool", type=Path, required=True, metavar="DIR", help="folder of simulated people")
+    parser.add_argument(
+        "--measure", default="deviations", metavar="NAME", help="deviations, ipl, distance or time"
+    )
+    parser.add_argument(
+        "--effect", default="assistance", metavar="NAME", help="assistance, objects or interaction"
+    )
+    parser.add_argument(
+        "--difference", type=float, metavar="D", help="of the most different means, in units of the measure"
+    )
+    parser.add_argument("--eta-squared", type=float, metavar="E", help="partial eta squared")
+    parser.add_argument("--power", type=float, default=0.8, metavar="P", help="probability of finding it")
+    parser.add_argument("--alpha", type=float, default=0.05, metavar="P", help="level of the test")
+    parser.add_argument("--pay", type=float, default=7.5, metavar="X", help="of a person who finishes")
+    parser.add_argument("--fee", type=float, default=0.0, metavar="X", help="of the platform, over the pay")
+    parser.add_argument("--minutes", type=float, default=25.0, metavar="M", help="that a person takes")
+    parser.add_argument("--dropout", type=float, default=0.15, metavar="P", help="share who do not finish")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="S", help="seed of what is drawn from the pool"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="JSON file to write")
+    add_force(parser, "replace a file that exists")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Plan, say it, write it."""
+    require_extra("study")
+    from experiments.errors import ConfigError
+    from experiments.record.files import write_json
+    from experiments.record.run_directory import check_file
+    from experiments.study.cost import StudyCost
+    from experiments.study.measures import read_measures
+    from experiments.study.power import Wanted, plan_power
+    from experiments.study.simulate import study_path
+    from experiments.study.table import read_study
+    from experiments.trials.design import read_design
+
+    if arguments.seed < 0:
+        raise ConfigError(f"--seed {arguments.seed} must not be negative")
+    if arguments.out is not None:
+        check_file(arguments.out, replace=arguments.force)
+    wanted = Wanted(
+        arguments.measure,
+        arguments.effect,
+        arguments.difference,
+        arguments.eta_squared,
+        arguments.power,
+        arguments.alpha,
+    )
+    cost = StudyCost(arguments.pay, arguments.fee, arguments.minutes, arguments.dropout)
+    cells = [(trial.assistance, trial.objects) for trial in read_design(study_path(arguments.study)).trials]
+    pool = read_study(arguments.pool, read_measures())
+    found = plan_power(cells, pool, wanted, cost, seed=arguments.seed)
+    _show(found, wanted, pool.sources[wanted.measure])
+    if arguments.out is not None:
+        write_json(arguments.out, {**asdict(wanted), **asdict(cost), **asdict(found)})
+    return 0
+
+
+def _show(plan: Any, wanted: Any, column: str) -> None:
+    print(f"{plan.origin}: the people that this follows from.")
+    print(f"effect      {wanted.effect} on {column}, partial eta squared {plan.eta_squared:.3f}")
+    print(
+        f"people      {plan.per_cell}{_range(plan.interval)} in each of {plan.cells} cells, {plan.people} in all"
+    )
+    print(f"to recruit  {plan.to_recruit}")
+    print(f"cost        {plan.cost:.0f}{_range(plan.cost_interval)}")
+    print(f"hours       {plan.hours:.0f}{_range(plan.hours_interval)}")
+    error = f"{plan.power:.1%} +- {plan.power_error:.1%}"
+    print(
+        f"power       {error} of studies of this size, drawn from the pool, find it ({wanted.power:.0%} wanted)"
+    )
+
+
+def _range(interval: tuple[float, float] | None) -> str:
+    return "" if interval is None else f" [90 % interval: {interval[0]:.0f} to {interval[1]:.0f}]"

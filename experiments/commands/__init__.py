@@ -1,1 +1,0 @@
-"""The subcommands of `mjsim`, one module each."""

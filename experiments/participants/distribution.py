@@ -1,0 +1,200 @@
+"""Distributions of numbers over people, as TOML describes them and as a random number draws from them.
+
+walking_speed = {normal = [1.2, 0.2], min = 0.8}    # mean and standard deviation
+reading_time = {lognormal = [1.35, 0.35]}           # median, and standard deviation of the logarithm
+reach = {uniform = [0.8, 1.1]}                      # lowest and highest
+lapse = {beta = [0.5, 3]}                           # both shape parameters, from 0 to 1
+follows = {mixture = [[0.6, 1.0], [0.4, {beta = [2, 2]}]]}   # kinds of people: weight, distribution
+field_of_view = 1.2                                 # the same for each person
+"""
+
+import math
+import statistics
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from experiments.errors import ConfigError
+
+SHAPES = ("constant", "normal", "lognormal", "uniform", "beta", "mixture")
+_STANDARD = statistics.NormalDist()
+
+_Pair = tuple[float, float]
+_Weight = Annotated[float, msgspec.Meta(ge=0)]
+
+
+class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Distribution of one number: one of its shapes, cut off at `min` and `max`.
+
+    Raises:
+        ConfigError: No shape is given or several, a number is not finite, or no values are left.
+    """
+
+    constant: float | None = None  # the same value for each person
+    normal: _Pair | None = None  # mean and standard deviation
+    lognormal: _Pair | None = None  # median, and standard deviation of the logarithm
+    uniform: _Pair | None = None  # lowest and highest value
+    beta: _Pair | None = None  # both parameters
+    # kinds of people: weight, and a number or a distribution
+    mixture: "tuple[tuple[_Weight, float | Distribution], ...] | None" = None
+    min: float = -math.inf  # smaller values do not occur
+    max: float = math.inf  # larger values do not occur
+
+    def __post_init__(self) -> None:
+        if len([name for name in SHAPES if getattr(self, name) is not None]) != 1:
+            raise ConfigError(f"give a number, or one of {', '.join(SHAPES[1:])}")
+        numbers = self._numbers
+        if not all(map(math.isfinite, numbers)) or math.isnan(self.min) or math.isnan(self.max):
+            raise ConfigError(f"{', '.join(f'{n:g}' for n in numbers)}: every number must be finite")
+        if self.uniform is not None and not numbers[0] <= numbers[1]:
+            raise ConfigError(f"uniform takes the lowest value, then the highest; got {numbers}")
+        if self.shape in ("normal", "lognormal") and not numbers[1] > 0:
+            raise ConfigError(f"the standard deviation of {self.shape} must be positive, got {numbers[1]}")
+        if self.lognormal is not None and not numbers[0] > 0:
+            raise ConfigError(f"the median of lognormal must be positive, got {numbers[0]}")
+        if self.beta is not None and not min(numbers) > 0:
+            raise ConfigError(f"the parameters of beta must be positive, got {numbers}")
+        if self.mixture is not None and not sum(numbers) > 0:
+            raise ConfigError(f"one weight of a mixture must be positive, got {numbers}")
+        if not self.min <= self.max:
+            raise ConfigError(f"min must not exceed max, got {self.min} and {self.max}")
+
+    @property
+    def shape(self) -> str:
+        """The one of `SHAPES` that is given."""
+        return next(name for name in SHAPES if getattr(self, name) is not None)
+
+    @property
+    def _numbers(self) -> list[float]:
+        """The parameters of the shape, or the weights of the kinds."""
+        if self.constant is not None:
+            return [self.constant]
+        if self.mixture is not None:
+            return [weight for weight, _ in self.mixture]
+        return list(getattr(self, self.shape))
+
+    def as_value(self) -> Any:
+        """The description, as in TOML."""
+        return self.constant if self.constant is not None else msgspec.json.decode(msgspec.json.encode(self))
+
+    def quantile(self, share: float, lowest: float = -math.inf, highest: float = math.inf) -> float:
+        """The value below which a share (0 to 1) of the distribution between two values lies.
+
+        Of a mixture, the share first says which kind, and then which value of that kind.
+        """
+        if self.constant is not None:
+            return self.constant
+        if self.mixture is not None:
+            kind, share = self._kind(share)
+            return kind.quantile(share, lowest, highest) if isinstance(kind, Distribution) else kind
+        low, high = max(self.min, lowest), min(self.max, highest)
+        below, above = self._share_below(low), self._share_below(high)
+        if not low <= high or not above - below > 1e-6:
+            raise ConfigError(f"{self.shape} = {self._numbers} has no values from {low:.4g} to {high:.4g}")
+        return min(high, max(low, self._value(below + share * (above - below))))
+
+    def _kind(self, share: float) -> "tuple[float | Distribution, float]":
+        """The kind of a mixture that a share picks, and the share within it."""
+        kinds = [(weight, kind) for weight, kind in self.mixture or () if weight > 0]
+        left = share * sum(weight for weight, _ in kinds)
+        for weight, kind in kinds[:-1]:
+            if left < weight:
+                return kind, left / weight
+            left -= weight
+        weight, kind = kinds[-1]
+        return kind, min(1.0, max(0.0, left / weight))
+
+    def _share_below(self, value: float) -> float:
+        first, second = self._numbers
+        if self.uniform is not None:
+            width = second - first
+            return min(1.0, max(0.0, (value - first) / width)) if width else float(value >= first)
+        if self.beta is not None:
+            from scipy.special import betainc  # imported late: SciPy is slow to import
+
+            return float(betainc(first, second, min(1.0, max(0.0, value))))
+        if self.lognormal is not None:
+            return _STANDARD.cdf((math.log(value / first) if value > 0 else -math.inf) / second)
+        return _STANDARD.cdf((value - first) / second)
+
+    def _value(self, share: float) -> float:
+        first, second = self._numbers
+        if self.uniform is not None:
+            return first + share * (second - first)
+        if self.beta is not None:
+            from scipy.special import betaincinv
+
+            return float(betaincinv(first, second, share))
+        standard = _STANDARD.inv_cdf(min(1.0 - 1e-12, max(1e-12, share)))
+        return (
+            first * math.exp(second * standard) if self.lognormal is not None else first + second * standard
+        )
+
+
+def distribution(name: str, given: object) -> Distribution:
+    """The distribution that a number or a table such as `{"normal": [1.2, 0.2], "min": 0.8}` describes."""
+    try:
+        if isinstance(given, Mapping):
+            return msgspec.convert(given, Distribution)
+        return Distribution(constant=msgspec.convert(given, float))
+    except (msgspec.ValidationError, ConfigError) as error:
+        raise ConfigError(f"{name}: {error}") from error
+
+
+class Distributions(Mapping[str, Distribution]):
+    """Distributions of several values by name, sorted; the values of a group are named `motion.reach_time`."""
+
+    def __init__(self, values: Mapping[str, Distribution] | None = None) -> None:
+        self._values = dict(sorted((values or {}).items()))
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> "Distributions":
+        """Distributions as in TOML; tables of several are joined with a dot: `[compliance] follows = 1`."""
+        found: dict[str, Distribution] = {}
+        for name, value in values.items():
+            if isinstance(value, Mapping) and set(value).isdisjoint(Distribution.__struct_fields__):
+                found |= {f"{name}.{part}": distribution(f"{name}.{part}", v) for part, v in value.items()}
+            else:
+                found[name] = distribution(name, value)
+        return cls(found)
+
+    @classmethod
+    def parse(cls, text: str) -> "Distributions":
+        """Read a TOML file, or a description between braces; a ConfigError where that is not possible."""
+        try:
+            if text.lstrip().startswith("{"):
+                return cls.of(tomllib.loads(f"person = {text}")["person"])
+            return cls.of(tomllib.loads(Path(text).read_text(encoding="utf-8-sig")))
+        except OSError as error:
+            raise ConfigError(
+                f"cannot read {text}: {error.strerror}; name a TOML file, or give values between braces, such as "
+                "'{walking_speed = 1.2}'"
+            ) from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise ConfigError(f"{text!r} is not a description of people in TOML: {error}") from error
+
+    def as_dict(self) -> dict[str, Any]:
+        """The description, as `of` takes it."""
+        return {name: described.as_value() for name, described in self.items()}
+
+    def updated(self, other: "Distributions") -> "Distributions":
+        """These distributions, replaced by those of `other` where it has any."""
+        return Distributions({**self, **other})
+
+    def __getitem__(self, name: str) -> Distribution:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self._values.items()))
+
+    def __repr__(self) -> str:
+        return f"Distributions({self.as_dict()})"

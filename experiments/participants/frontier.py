@@ -1,0 +1,87 @@
+"""Places that a person still has to search: those from which a room can be seen."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.house import House
+from experiments.participants.base import Percept, Point
+from experiments.participants.distances import estimated_distances
+
+SHIFT = 0.15  # m, by which places move at each round, so that objects hidden once are seen later
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place to look around from."""
+
+    room: str  # key of its room
+    point: Point  # m, shape (2,)
+
+
+class Frontier:
+    """Places that have not been searched. When all have been, all are searched again, more closely."""
+
+    def __init__(self, house: House, rng: np.random.Generator) -> None:
+        self._house, self._rng = house, rng
+        self._left, self._round = self._all(), 1
+
+    def places(self) -> list[Place]:
+        """Places to look around from, at least one."""
+        if not self._left:
+            self._left, self._round = self._all(), self._round + 1
+        return self._left
+
+    def _all(self) -> list[Place]:
+        return [
+            Place(room, self._house.navmesh.snap(point + self._rng.normal(0.0, SHIFT, size=2)))
+            for room, points in self._house.viewpoints.items()
+            for point in points
+        ]
+
+    def of_room(self, room: str, position: Point) -> Place:
+        """The place of a room that is nearest to a position, m, shape (2,)."""
+        points = self._house.viewpoints.get(room)
+        if points is None:  # a room without any floor to stand on
+            return Place(room, position)
+        gaps = estimated_distances(self._house, position, list(points))
+        return Place(room, points[int(np.argmin(gaps))])
+
+    def is_left(self, place: Place) -> bool:
+        """Whether it has not been searched yet."""
+        return any(other is place for other in self._left)
+
+    def mark_searched(self, place: Place) -> None:
+        """Mark a place as searched."""
+        self._left = [other for other in self._left if other is not place]
+
+    def mark_seen(self, percept: Percept, room: str, within: float) -> None:
+        """Mark the places of a room that are in view from inside it, no farther away than `within`, m, as searched."""
+        within /= self._round  # a person who has missed something looks more closely
+        walls = self._house.navmesh.outline
+        self._left = [
+            place
+            for place in self._left
+            if place.room != room or not _sees(percept, place.point, within, walls)
+        ]
+
+
+def _sees(percept: Percept, point: Point, within: float, walls: NDArray[np.float64]) -> bool:
+    """Whether a place is near and in front of a person, with no wall in between."""
+    way = point - percept.position
+    aside = (math.atan2(way[1], way[0]) - percept.heading + math.pi) % (2.0 * math.pi) - math.pi
+    in_front = np.linalg.norm(way) <= within and abs(aside) <= percept.person.field_of_view / 2.0
+    return bool(in_front and free_length(walls, percept.position, point) >= np.linalg.norm(way))
+
+
+def free_length(walls: NDArray[np.float64], start: Point, goal: Point) -> float:
+    """Length of the straight way between points (2,), m, up to the first wall; walls have ends x, y, x, y, (e, 4)."""
+    way, along, offset = goal - start, walls[:, 2:] - walls[:, :2], walls[:, :2] - start
+    cross = way[0] * along[:, 1] - way[1] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (offset[:, 0] * along[:, 1] - offset[:, 1] * along[:, 0]) / cross
+        on_wall = (offset[:, 0] * way[1] - offset[:, 1] * way[0]) / cross
+    hits = share[(cross != 0) & (share > 1e-9) & (share <= 1.0) & (on_wall >= 0.0) & (on_wall <= 1.0)]
+    return float(hits.min(initial=1.0)) * float(np.linalg.norm(way))

@@ -1,0 +1,212 @@
+"""The path of the fly-through camera: through all rooms, with a look around each of them and at each bin."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from experiments.house import House
+from mjsim.model.house import compiled_house
+from mjsim.model.sight import FieldOfView, visible_receptacles
+from mjsim.person_parameters import PersonParameters
+from planner.errors import PlannerError
+
+Point = NDArray[np.float64]
+
+EYE_HEIGHT = PersonParameters().eye_height  # m: the same film for all persons
+STEP = 0.04  # s between two rows
+SPEED = 1.3  # m/s
+TURNING = math.radians(75.0)  # rad/s
+LOOK_AHEAD = 0.8  # m along the path that the camera looks while it moves
+BIN_TIME = 2.0  # s that the camera rests on a bin
+BIN_DISTANCES = (1.5, 1.0, 0.6, 0.3, 0.0)  # m of the way that are left to a bin when the camera looks at it
+SMOOTHING = 0.25  # s, standard deviation
+_FIELD = FieldOfView.of(PersonParameters())
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPath:
+    """Pose of the camera and the bin that it looks at, every `STEP` s."""
+
+    positions: NDArray[np.float64]  # m, shape (n, 3)
+    headings: NDArray[np.float64]  # yaw of the gaze, rad, 0 along +x, counter-clockwise, shape (n,)
+    pitches: NDArray[np.float64]  # elevation of the gaze, rad, shape (n,)
+    bins: tuple[str | None, ...]  # receptacle that the camera rests on, or None; length n
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return len(self.headings) * STEP
+
+    def at(self, times: NDArray[np.float64]) -> "CameraPath":
+        """The rows at these times, s, shape (m,)."""
+        rows = np.minimum((times / STEP).astype(np.int64), len(self.headings) - 1)
+        bins = tuple(self.bins[row] for row in rows)
+        return CameraPath(self.positions[rows], self.headings[rows], self.pitches[rows], bins)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stop:
+    """A place (2,), m, where the camera looks at a bin, or around where there is none."""
+
+    place: Point
+    bin: str | None = None
+
+
+class _Camera:
+    """Collects rows: x, y, heading, pitch, and the bin in each."""
+
+    def __init__(self, house: House, start: Point) -> None:
+        self._house = house
+        self.place, self.heading, self.pitch = start, 0.0, 0.0
+        self.rows: list[NDArray[np.float64]] = []
+        self.bins: list[str | None] = []
+
+    def move(self, place: Point) -> None:
+        """Along the shortest path, looking ahead."""
+        points = np.asarray(self._house.geodesics.shortest_path(self.place, place).points)
+        gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        along = np.concatenate([[0.0], np.cumsum(gaps)])
+        if along[-1] < 1e-6:
+            return
+        at = np.arange(0.0, along[-1], SPEED * STEP)
+        ahead = np.minimum(at + LOOK_AHEAD, along[-1])
+        here, there = _interpolate(points, along, at), _interpolate(points, along, ahead)
+        offsets = there - here
+        # Near the end the camera keeps its direction.
+        offsets[np.linalg.norm(offsets, axis=1) < 0.1] = points[-1] - points[-2]
+        headings = np.unwrap(np.arctan2(offsets[:, 1], offsets[:, 0]))
+        self.turn(float(headings[0]))
+        headings += self.heading - headings[0]
+        self._add(np.column_stack([here, headings, np.zeros(len(at))]))
+        self.place = points[-1]
+
+    def turn(self, heading: float, pitch: float = 0.0) -> None:
+        """On the spot, the shorter way round."""
+        change = (heading - self.heading + math.pi) % (2.0 * math.pi) - math.pi
+        self._turn_by(change, pitch)
+
+    def look_around(self) -> None:
+        """A full turn."""
+        self._turn_by(2.0 * math.pi, 0.0)
+
+    def look_at(self, house: House, key: str) -> None:
+        """Turn to a bin and rest on it."""
+        offset = house.receptacles[key].center - np.array([*self.place, EYE_HEIGHT])
+        pitch = math.atan2(offset[2], math.hypot(offset[0], offset[1]))
+        self.turn(math.atan2(offset[1], offset[0]), pitch)
+        rest = np.array([*self.place, self.heading, self.pitch])
+        self._add(np.tile(rest, (round(BIN_TIME / STEP), 1)), key)
+
+    def _turn_by(self, change: float, pitch: float) -> None:
+        count = max(1, math.ceil(max(abs(change), abs(pitch - self.pitch)) / (TURNING * STEP)))
+        share = np.arange(1, count + 1) / count
+        rows = np.empty((count, 4))
+        rows[:, :2] = self.place
+        rows[:, 2] = self.heading + share * change
+        rows[:, 3] = self.pitch + share * (pitch - self.pitch)
+        self._add(rows)
+
+    def _add(self, rows: NDArray[np.float64], key: str | None = None) -> None:
+        self.rows.append(rows)
+        self.bins += [key] * len(rows)
+        self.heading, self.pitch = float(rows[-1, 2]), float(rows[-1, 3])
+
+
+def camera_path(house: House) -> CameraPath:
+    """The way through a house, the same at each call.
+
+    It goes along shortest paths from the middle viewpoint of a room, where it looks around, to the room's bins, always
+    to the nearest one that is left; then to the nearest room that is left.
+    """
+    stops = {room: _stops(house, room) for room in house.viewpoints}
+    room = next(iter(stops))
+    camera = _Camera(house, stops[room][0].place)
+    while True:
+        _visit(camera, house, stops.pop(room))
+        if not stops:
+            break
+        room = min(stops, key=lambda key: _gap(house, camera.place, stops[key][0].place))
+    rows = np.vstack(camera.rows)
+    smooth = gaussian_filter1d(rows, SMOOTHING / STEP, axis=0, mode="nearest")
+    positions = np.column_stack([smooth[:, :2], np.full(len(rows), EYE_HEIGHT)])
+    return CameraPath(positions, smooth[:, 2], smooth[:, 3], tuple(camera.bins))
+
+
+def bins_seen(house: House, path: CameraPath, field: FieldOfView, interval: float) -> dict[str, float]:
+    """Receptacle key -> time at which a person who watches the film, and looks every `interval` s, sees it first, s."""
+    compiled = compiled_house(house.catalogue)
+    times = np.arange(0.0, path.duration, interval)
+    rows, left, seen = path.at(times), dict(house.receptacles), dict[str, float]()
+    for time, position, heading, pitch in zip(
+        times.tolist(), rows.positions, rows.headings.tolist(), rows.pitches.tolist(), strict=True
+    ):
+        found = visible_receptacles(
+            compiled.model, compiled.data, left, position, heading, pitch, field=field
+        )
+        for key in sorted(found):
+            seen[key] = round(time, 6)
+            del left[key]
+        if not left:
+            break
+    return seen
+
+
+def _stops(house: House, room: str) -> list[_Stop]:
+    """The stops of a room, its middle viewpoint first."""
+    middle = house.viewpoints[room][0]
+    keys = [key for key, entry in house.catalogue.receptacles.items() if entry.room == room]
+    return [_Stop(middle), *(_Stop(_bin_place(house, middle, key), key) for key in keys)]
+
+
+def _bin_place(house: House, start: Point, key: str) -> Point:
+    """A place on the way to a bin from which it is seen, (2,), m."""
+    points = np.asarray(house.geodesics.shortest_path(start, house.approaches[key]).points)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    compiled, bin_ = compiled_house(house.catalogue), house.receptacles[key]
+    for left in BIN_DISTANCES:
+        place = _interpolate(points, along, np.array([max(0.0, along[-1] - left)]))[0]
+        eye = np.array([*place, EYE_HEIGHT])
+        offset = bin_.center - eye
+        heading = math.atan2(offset[1], offset[0])
+        pitch = math.atan2(offset[2], math.hypot(offset[0], offset[1]))
+        if visible_receptacles(compiled.model, compiled.data, {key: bin_}, eye, heading, pitch, field=_FIELD):
+            break
+    return np.asarray(place)
+
+
+def _visit(camera: _Camera, house: House, stops: Sequence[_Stop]) -> None:
+    for stop in _nearest_first(house, stops):
+        camera.move(stop.place)
+        if stop.bin is None:
+            camera.look_around()
+        else:
+            camera.look_at(house, stop.bin)
+
+
+def _nearest_first(house: House, stops: Sequence[_Stop]) -> Iterator[_Stop]:
+    """The first stop, then always the nearest one that is left."""
+    left = list(stops)
+    stop = left.pop(0)
+    yield stop
+    while left:
+        gaps = [_gap(house, stop.place, other.place) for other in left]
+        stop = left.pop(int(np.argmin(gaps)))
+        yield stop
+
+
+def _gap(house: House, start: Point, goal: Point) -> float:
+    try:
+        return house.geodesics.shortest_path(start, goal).geodesic_distance
+    except PlannerError:
+        return math.inf
+
+
+def _interpolate(
+    points: NDArray[np.float64], along: NDArray[np.float64], at: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Points (m, 2) of a polyline (k, 2) at these lengths (m,), where `along` (k,) are those of its corners, m."""
+    return np.asarray(np.column_stack([np.interp(at, along, points[:, i]) for i in range(2)]))

@@ -1,0 +1,130 @@
+"""The columns of a record: one row per control step in `trajectory.npz`, hashes and checkpoints in `recording.npz`."""
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import RecordError
+from experiments.record.files import TEXT, Layout
+from mjsim.actions import Move, Pick, Place, StepAction
+from mjsim.errors import ActionError
+from mjsim.observation import ObjectStatus
+from mjsim.steps import States
+from mjsim.world_state import WorldState
+
+OBJECTS = -1  # in a shape: the number of objects
+
+# Row t is the state before action t. Type and shape of a row of each column:
+TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "time": ("f8", ()),  # s
+    "position": ("f8", (2,)),  # m
+    "heading": ("f8", ()),  # rad
+    "pitch": ("f8", ()),  # rad
+    "hands": ("i2", (2,)),  # object index, or -1
+    "object_position": ("f8", (OBJECTS, 3)),  # m
+    "object_quaternion": ("f8", (OBJECTS, 4)),  # wxyz
+    "object_status": ("i1", (OBJECTS,)),  # index in STATUSES
+    # kind (0 move, 1 pick, 2 place), object index or -1, then forward, left (m/s), turn, look (rad/s); an object index
+    # of n + i means the i-th of `unknown_objects`: names in actions that are no object of the house
+    "action": ("f8", (6,)),
+    # as in `HealthSample`, NaN where there is none
+    "penetration_m": ("f8", ()),
+    "trunk_penetration_m": ("f8", ()),
+    "weld_error_m": ("f8", (2,)),
+    "weld_error_rad": ("f8", (2,)),
+    "settle_s": ("f8", ()),
+}
+# Further columns while a record is written: hash of the state, and entries of the log before the control step.
+_WRITTEN = {"state_hash": ("u8", ()), "logged": ("i8", ())}
+HEALTH = ("penetration_m", "trunk_penetration_m", "weld_error_m", "weld_error_rad", "settle_s")
+STATUSES = (ObjectStatus.LOOSE, ObjectStatus.CARRIED, ObjectStatus.DELIVERED)
+
+# Arrays of `recording.npz`. The hash of a state or action has a row per control step; size and hash of the log before
+# each control step have one more for the end.
+RECORDING_LAYOUT: dict[str, Layout] = {
+    "state_hash": ("u8", (None,)),
+    "action_hash": ("u8", (None,)),
+    "log_size": ("i8", (None,)),
+    "log_hash": ("u8", (None,)),
+    "checkpoint_step": ("i8", (None,)),
+    "checkpoint_physics": ("f8", (None, None)),
+    "checkpoint_details": (TEXT, (None,)),
+    "checkpoint_hash": ("u8", (None,)),
+}
+
+
+def trajectory_layout(objects: int) -> dict[str, Layout]:
+    """Types and shapes of the arrays of `trajectory.npz`."""
+    rows: dict[str, Layout] = {
+        name: (kind, (None, *row_shape(row, objects))) for name, (kind, row) in TRAJECTORY_COLUMNS.items()
+    }
+    return {**rows, "unknown_objects": (TEXT, (None,))}
+
+
+def row_shape(shape: tuple[int, ...], objects: int) -> tuple[int, ...]:
+    """The shape of a row for a number of objects."""
+    return tuple(objects if size == OBJECTS else size for size in shape)
+
+
+def row_type(objects: int) -> np.dtype[Any]:
+    """The type of a row while a record is written, for a number of objects."""
+    columns = {**TRAJECTORY_COLUMNS, **_WRITTEN}
+    return np.dtype([(name, kind, row_shape(row, objects)) for name, (kind, row) in columns.items()])
+
+
+def state_columns(states: States) -> Iterator[tuple[str, NDArray[Any]]]:
+    """The columns that states determine, shape (n, ...)."""
+    columns = states._asdict()
+    health = columns.pop("health")
+    yield from columns.items()
+    first = 0
+    for name in HEALTH:
+        shape = TRAJECTORY_COLUMNS[name][1]
+        width = math.prod(shape)
+        yield name, health[:, first : first + width].reshape(-1, *shape)
+        first += width
+
+
+def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """`hash64` of each row of actions (T, 6), shape (T,)."""
+    content, size, sha1 = actions.tobytes(), actions.itemsize * 6, hashlib.sha1
+    rows = (content[i : i + size] for i in range(0, len(content), size))
+    digests = [sha1(row, usedforsecurity=False).digest()[:8] for row in rows]
+    return np.frombuffer(b"".join(digests), "<u8").astype(np.uint64)
+
+
+def checkpoint_arrays(checkpoints: Mapping[int, WorldState]) -> dict[str, NDArray[Any]]:
+    """The arrays of `recording.npz` that hold the checkpoints before these control steps."""
+    states = list(checkpoints.values())
+    return {
+        "checkpoint_step": np.array(list(checkpoints), np.int64),
+        "checkpoint_physics": np.array([s.physics for s in states]) if states else np.zeros((0, 0)),
+        "checkpoint_details": np.array([s.details_json() for s in states], np.str_),
+        "checkpoint_hash": np.array([s.hash for s in states], np.uint64),
+    }
+
+
+def decode_action(row: NDArray[Any], names: Sequence[str]) -> StepAction:
+    """The action of a row (6,) of a trajectory.
+
+    Args:
+        row: kind, object index, forward, left, turn, look.
+        names: Names of the objects, then the `unknown_objects`.
+
+    Raises:
+        RecordError: The row describes no action.
+    """
+    kind, number = float(row[0]), float(row[1])
+    if kind == 0.0:
+        try:
+            return Move(*(float(v) for v in row[2:]))
+        except ActionError as error:
+            raise RecordError(f"an action is unusable: {error}") from error
+    if kind not in (1.0, 2.0) or not number.is_integer() or not -1 <= number < len(names):
+        raise RecordError(f"{row.tolist()} describes no action of an episode with {len(names)} object names")
+    name = None if number < 0 else names[int(number)]
+    return Pick(name) if kind == 1.0 else Place(name)

@@ -1,0 +1,254 @@
+"""Reads the record of a session: from a run directory, or as far as a session that is not over has come."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.errors import RecordError, ReplayError
+from experiments.record import records
+from experiments.record.columns import (
+    RECORDING_LAYOUT,
+    STATUSES,
+    TRAJECTORY_COLUMNS,
+    action_hashes,
+    checkpoint_arrays,
+    decode_action,
+    row_type,
+    trajectory_layout,
+)
+from experiments.record.events import check_event
+from experiments.record.files import read_arrays
+from experiments.record.journal import Entry, Header
+from experiments.record.records import Event, EventLog
+from mjsim.actions import StepAction
+from mjsim.episode import Episode
+from mjsim.errors import EpisodeError, PersonError
+from mjsim.observation import Observation
+from mjsim.person_parameters import PersonParameters
+from mjsim.world_state import WorldState
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """The record of a session: the content of the four files of a run directory from which all others follow.
+
+    Attributes:
+        episode: The disorganized house.
+        log: The lines of `events.jsonl`.
+        trajectory: Arrays of `trajectory.npz`, as in `columns.TRAJECTORY_COLUMNS`, and `unknown_objects`.
+        recording: Arrays of `recording.npz`, as in `columns.RECORDING_LAYOUT`.
+        participant: State of the participant after the last control step, where the record is that of a journal.
+    """
+
+    episode: Episode
+    log: bytes
+    trajectory: Mapping[str, NDArray[Any]]
+    recording: Mapping[str, NDArray[Any]]
+    participant: Any = None
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """The events of the log."""
+        return tuple(json.loads(line) for line in self.log.splitlines())
+
+    @cached_property
+    def steps_of_events(self) -> list[int]:
+        """The control step that logged each event."""
+        steps = np.searchsorted(self.recording["log_size"][:-1], self._offsets, side="right") - 1
+        return [int(step) for step in np.maximum(0, steps)]
+
+    def events_before(self, step: int) -> int:
+        """Number of events that were logged before a control step."""
+        return int(np.searchsorted(self._offsets, self.recording["log_size"][step]))
+
+    def events_of(self, step: int) -> tuple[Event, ...]:
+        """The events that a control step logged; the first one has those before it, too."""
+        return self.events[self.events_before(step) if step else 0 : self.events_before(step + 1)]
+
+    @cached_property
+    def _offsets(self) -> NDArray[np.int64]:
+        """Where each line of the log starts, bytes."""
+        return np.cumsum([0, *(len(line) for line in self.log.splitlines(keepends=True)[:-1])])
+
+    @cached_property
+    def start(self) -> Event:
+        """The first event: configuration, versions, fingerprints."""
+        start: Event = json.loads(self.log.split(b"\n", 1)[0])
+        return start
+
+    @property
+    def end(self) -> Event:
+        """The last event."""
+        return self.events[-1]
+
+    @property
+    def plans(self) -> list[Event]:
+        """Every plan that was logged."""
+        return [event for event in self.events if event["event"] == "plan"]
+
+    @cached_property
+    def person(self) -> PersonParameters:
+        """The participant, with every value that was drawn.
+
+        Raises:
+            ReplayError: The log does not describe it.
+        """
+        try:
+            logged = next(event for event in self.events if event["event"] == records.PARTICIPANT)
+            return PersonParameters.from_dict(logged["person"])
+        except (StopIteration, PersonError, KeyError, TypeError) as error:
+            what = str(error) or "no event describes the participant"
+            raise ReplayError(f"{records.EVENTS}: {what}; the first bad step is 0", 0) from error
+
+    @property
+    def steps(self) -> int:
+        """Number of recorded control steps, including the final state."""
+        return len(self.recording["state_hash"])
+
+    @property
+    def reason(self) -> str | None:
+        """Why the session ended, or None while it is not over."""
+        return str(self.end.get("reason")) if self.end["event"] == "end" else None
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the objects."""
+        return tuple(placed.name for placed in self.episode.objects)
+
+    def action(self, step: int) -> StepAction:
+        """The action of a control step; raises `RecordError` if the row is not an action."""
+        unknown = map(str, self.trajectory["unknown_objects"])
+        return decode_action(self.trajectory["action"][step], [*self.names, *unknown])
+
+    def observation(self, step: int) -> Observation:
+        """The state before a control step; eye height and velocity are nominal, as the assistant ignores them."""
+        row = {name: column[step] for name, column in self.trajectory.items() if name in TRAJECTORY_COLUMNS}
+        left, right = (None if i < 0 else self.names[i] for i in row["hands"])
+        return Observation(
+            time=float(row["time"]),
+            position=row["position"],
+            heading=float(row["heading"]),
+            pitch=float(row["pitch"]),
+            eye=np.array([*row["position"], self.person.eye_height]),
+            velocity=np.zeros(2),
+            object_names=self.names,
+            object_positions=row["object_position"],
+            object_quaternions=row["object_quaternion"],
+            object_status=tuple(STATUSES[code] for code in row["object_status"]),
+            hands=(left, right),
+            busy=False,
+        )
+
+    @property
+    def checkpoint_steps(self) -> list[int]:
+        """Control steps before which there is a checkpoint, ascending."""
+        return [int(step) for step in self.recording["checkpoint_step"]]
+
+    def checkpoint(self, step: int) -> WorldState:
+        """The checkpoint before a control step.
+
+        Raises:
+            StateError: It is not the state of a world of this version.
+        """
+        number = self.checkpoint_steps.index(step)
+        physics, details = (self.recording[f"checkpoint_{part}"][number] for part in ("physics", "details"))
+        return WorldState.from_json(physics, str(details))
+
+    def checkpoint_before(self, time: float) -> int | None:
+        """The control step of the last checkpoint at or before a time, s, or None."""
+        times = self.trajectory["time"]
+        return max((step for step in self.checkpoint_steps if times[step] <= time + 1e-9), default=None)
+
+
+def assemble(
+    episode: Episode,
+    rows: NDArray[Any],
+    log: EventLog,
+    unknown: Sequence[str],
+    checkpoints: Mapping[int, WorldState],
+    participant: Any = None,
+) -> Record:
+    """The record of rows of `columns.row_type`, a log, unknown names in actions, and states by control step."""
+    trajectory = {name: np.ascontiguousarray(rows[name]) for name in TRAJECTORY_COLUMNS}
+    log_size, log_hash = log.at([*rows["logged"], log.entries])
+    recording = {
+        "state_hash": np.ascontiguousarray(rows["state_hash"]),
+        "action_hash": action_hashes(trajectory["action"]),
+        "log_size": log_size,
+        "log_hash": log_hash,
+        # An interruption can leave a checkpoint without its control step.
+        **checkpoint_arrays({step: state for step, state in checkpoints.items() if step < len(rows)}),
+    }
+    names = {"unknown_objects": np.array(unknown, np.str_)}
+    return Record(episode, log.content, {**trajectory, **names}, recording, participant)
+
+
+def read_journal(entries: Sequence[Header | Entry]) -> Record:
+    """The record of a journal, as far as its session has come.
+
+    Raises:
+        RecordError: The journal is empty.
+    """
+    if not entries or not isinstance(entries[0], Header):
+        raise RecordError("the journal is empty")
+    episode, log = Episode.from_json(entries[0].episode), EventLog()
+    added = [entry for entry in entries if isinstance(entry, Entry)]
+    log.restore([json.loads(line) for entry in added for line in entry.events])
+    rows = np.frombuffer(b"".join(entry.rows for entry in added), row_type(len(episode.objects)))
+    checkpoints = {
+        state.step: WorldState.from_json(np.frombuffer(state.physics), state.details)
+        for entry in added
+        for state in entry.checkpoints
+    }
+    unknown, participant = (added[-1].unknown, added[-1].participant) if added else ([], None)
+    return assemble(episode, rows, log, unknown, checkpoints, participant)
+
+
+def read_run(directory: Path) -> Record:
+    """Read the record of a run directory; `verify` checks whether it is as written.
+
+    Raises:
+        RecordError: It is not a run directory.
+        ReplayError: A file cannot be read, or has the log format of another version.
+    """
+    log = read_log(directory)
+    try:
+        check_event(log.split(b"\n", 1)[0])
+        episode = Episode.load(directory / records.EPISODE)
+        trajectory = read_arrays(directory / records.TRAJECTORY, trajectory_layout(len(episode.objects)))
+        recording = read_arrays(directory / records.RECORDING, RECORDING_LAYOUT)
+    except (RecordError, EpisodeError, OSError, UnicodeDecodeError) as error:
+        raise ReplayError(f"{directory}: {error}; the first bad step is 0", 0) from error
+    return Record(episode, log, trajectory, recording)
+
+
+def read_log(directory: Path) -> bytes:
+    """The log of a run directory, if it has the format of this version.
+
+    Raises:
+        RecordError: It is not a run directory.
+        ReplayError: The log does not begin with a start event, or has the format of another version.
+    """
+    if not (directory / records.EVENTS).is_file():
+        raise RecordError(f"{directory} is not a run directory: it has no {records.EVENTS}")
+    log = (directory / records.EVENTS).read_bytes()
+    try:
+        start = json.loads(log.split(b"\n", 1)[0])
+    except (ValueError, RecursionError):
+        start = None
+    if not isinstance(start, dict) or start.get("event") != "start":
+        raise ReplayError(f"{records.EVENTS} does not begin with a start event; the first bad step is 0", 0)
+    if (found := start.get("format")) != records.LOG_FORMAT:
+        versions = start.get("versions")
+        version = versions.get("mjsim", "unknown") if isinstance(versions, dict) else "unknown"
+        raise ReplayError(
+            f"{directory} has log format {found!r} of mjsim {version}; this version replays format "
+            f"{records.LOG_FORMAT} only: replay it with the version that wrote it, or run the trial again"
+        )
+    return log

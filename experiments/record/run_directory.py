@@ -1,0 +1,199 @@
+"""Where commands write: files that exist are kept, and a run directory is complete or absent."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from experiments.errors import RecordError
+from experiments.record import records
+from experiments.record.checksums import CHECKSUMS, write_checksums
+from mjsim.files import exchange, work_folder
+
+SHOWN_NAMES = 3  # of what is in the way
+TRIALS = "trials"  # folder of a batch
+
+
+def is_run(directory: Path) -> bool:
+    """Whether `directory` holds the record of a trial."""
+    return (directory / records.EPISODE).is_file() and (directory / records.EVENTS).is_file()
+
+
+def is_batch(directory: Path) -> bool:
+    """Whether `directory` is the folder of a batch: its trials are runs, and nothing else lies among them."""
+    trials = directory / TRIALS
+    if not trials.is_dir():
+        return False
+    inside = [path for path in trials.iterdir() if not path.name.startswith(".")]
+    if not inside:  # a batch that was killed before its first trial was done has no table either
+        return not list(directory.glob(f"{TRIALS}.*"))
+    return all(is_run(path) for path in inside)
+
+
+def check_run_directory(path: Path, *, replace: bool = False) -> Path:
+    """Check that a run may be written to `path`; `replace` allows the place of an earlier run. Links are followed.
+
+    Raises:
+        RecordError: Something is in the way; the message says what, and what to do.
+        OSError: The path is unusable: too long, below a file, not to be read.
+    """
+    place = _place(path)
+    if not place.exists():
+        return place
+    if not place.is_dir():
+        raise RecordError(f"{path} is a file; name a folder that does not exist yet")
+    if Path.cwd().is_relative_to(place) or place.is_mount():
+        raise RecordError(f"{path} is in use as a folder; name a new one inside it, such as {path / 'run'}")
+    names = sorted(entry.name for entry in place.iterdir())
+    if not names:
+        return place
+    ours = {*records.FILES, CHECKSUMS, *([records.TRAINING] if is_run(place / records.TRAINING) else [])}
+    foreign = [name for name in names if name not in ours]
+    if is_batch(place):
+        raise RecordError(f"{path} holds a batch, which a run never replaces; choose another --out")
+    if foreign or not is_run(place):
+        raise RecordError(
+            f"{path} holds {_listed(foreign or names)}, which no run wrote; choose another --out or move it away "
+            "(--force replaces only a run)"
+        )
+    if not replace:
+        raise RecordError(f"{path} holds a run; choose another --out, or replace that run with --force")
+    return place
+
+
+def check_batch_folder(path: Path) -> None:
+    """Check that a batch may be written to `path`, or added to one that is there.
+
+    Raises:
+        RecordError: Something else is in the way.
+        OSError: The folder cannot be written.
+    """
+    place = _place(path)
+    if place.exists() and not place.is_dir():
+        raise RecordError(f"{path} is a file; name a folder for --out")
+    if place.exists() and any(place.iterdir()) and not is_batch(place):
+        what = "a run" if is_run(place) else _listed(sorted(entry.name for entry in place.iterdir()))
+        raise RecordError(
+            f"{path} holds {what} and is not the folder of a batch; choose another --out or move it away"
+        )
+    _check_writable(_existing(place / TRIALS))
+
+
+def check_file(path: Path, *, replace: bool = False) -> None:
+    """Check that a file may be written to `path`.
+
+    Raises:
+        RecordError: Something is in the way.
+        OSError: The folder of the file cannot be written.
+    """
+    place = _place(path)
+    if place.exists() and not place.is_file():
+        raise RecordError(f"{path} is not a regular file; name a file that does not exist yet")
+    if place.exists() and not replace:
+        raise RecordError(f"{path} exists; name another file, or replace it with --force")
+    _check_writable(_existing(place.parent))
+
+
+@contextmanager
+def run_directory(path: Path, *, replace: bool = False) -> Iterator[Path]:
+    """Yield a working folder; with metrics in it, it is moved to `path` in the end, also where the block raises.
+
+    A folder without metrics is removed. `replace` allows the place of an earlier run.
+
+    Raises:
+        RecordError: Something is in the way. If it came there during the run, the run is kept next to it.
+        OSError: The folder cannot be written.
+    """
+    place = check_run_directory(path, replace=replace)
+    with _folder(place.parent), work_folder(place.parent) as folder:
+        try:
+            yield folder
+        finally:
+            if (folder / records.METRICS).is_file():
+                folder.chmod(0o755)
+                _move(folder, place, replace=replace)
+
+
+def add_files(folder: Path, path: Path) -> None:
+    """Add the files of a work folder, and the checksums of all, to a run directory: at once, or not at all.
+
+    Afterwards the folder holds the run as it was.
+    """
+    place = Path(os.path.realpath(path))
+    shutil.copytree(place, folder, copy_function=_link, dirs_exist_ok=True)
+    write_checksums(folder, records.FILES)
+    exchange(folder, place)
+
+
+def free_name(path: Path) -> Path:
+    """`path`, or with the first number that makes it a name of nothing that exists."""
+    number, free = 1, path
+    while os.path.lexists(free):
+        number += 1
+        free = path.with_name(f"{path.name}-{number}")
+    return free
+
+
+def _move(folder: Path, place: Path, *, replace: bool) -> None:
+    try:
+        check_run_directory(place, replace=replace)
+        if place.exists() and any(place.iterdir()):
+            exchange(folder, place)
+        else:
+            folder.replace(place)
+    except (OSError, RecordError) as error:
+        kept = free_name(place)
+        folder.replace(kept)
+        raise RecordError(f"{error}; the run is kept in {kept}") from error
+
+
+def _link(source: str, target: str) -> None:
+    """The same file under a second name, or a copy on a file system without links."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
+
+
+@contextmanager
+def _folder(folder: Path) -> Iterator[None]:
+    """Make `folder` and those above it; those that are empty afterwards are removed again."""
+    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        _check_writable(folder)
+        yield
+    finally:
+        for parent in made:
+            with suppress(OSError):  # not empty
+                parent.rmdir()
+
+
+def _place(path: Path) -> Path:
+    """The target of a path, links followed; raises `RecordError` for a link that leads nowhere."""
+    if path.is_symlink() and not path.exists():
+        raise RecordError(f"{path} is a symbolic link that leads nowhere; remove it or choose another --out")
+    return Path(os.path.realpath(path))
+
+
+def _existing(folder: Path) -> Path:
+    """The folder, or the lowest one above it that exists."""
+    while not folder.exists():
+        folder = folder.parent
+    return folder
+
+
+def _check_writable(folder: Path) -> None:
+    try:
+        with tempfile.TemporaryFile(dir=folder):  # has no name, so nothing can be left behind
+            pass
+    except OSError as error:
+        raise OSError(error.errno, f"cannot be written to ({error.strerror})", str(folder)) from error
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - SHOWN_NAMES
+    shown = ", ".join(names[:SHOWN_NAMES])
+    return f"{shown} and {more} more" if more > 0 else shown

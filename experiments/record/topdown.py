@@ -1,0 +1,205 @@
+"""Floor plan of a trial: rooms, objects, receptacles, the planned and the walked path. Drawn with OpenCV."""
+
+import contextlib
+import functools
+import math
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.house import House
+from experiments.record.records import Event
+from hud.text import Typeface
+from hud.theme import Face
+from mjsim.episode import Episode
+from mjsim.files import replacing
+from mjsim.kernels import cache_base
+from mjsim.sources import source_digest
+
+# Okabe-Ito colours, distinct for all common kinds of colour vision.
+CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
+PLANNED, WALKED = "#D55E00", "#1B1B1B"
+ORIGIN, LABEL, BLACK, WHITE = "#B00020", "#333333", "#000000", "#FFFFFF"
+PIXELS_PER_METRE = 90  # of a house of usual size
+MAX_SIDE = 1920  # of the picture of the house, px; larger houses are drawn at a smaller scale
+MARGIN, ROW, COLUMN = 28, 24, 240  # px: frame around the house, a line and a column of the legend
+DASH, PERIOD = 8, 15  # px of a dashed line
+_SAMPLE = np.array([[-18.0, 0.0], [18.0, 0.0]])  # px: a line in the legend
+_SHIFT = 4  # OpenCV draws at sixteenths of a pixel
+
+_Points = NDArray[np.float64]
+
+
+def draw_topdown(
+    path: Path, house: House, episode: Episode, plan: Event, walked: _Points, origin: str
+) -> None:
+    """Write a PNG of the house with the plan at the start and the path walked.
+
+    Args:
+        path: PNG file to write.
+        house: The house.
+        episode: What lay where at the start.
+        plan: The first `plan` event of the log.
+        walked: Positions of the person, m, shape (T, 2).
+        origin: Whether the participant is simulated (`experiments.record.origin`).
+    """
+    planned = planned_path(house, episode, plan)
+    drawing = _Drawing(house)
+    drawing.line(planned, PLANNED, dashed=True)
+    drawing.line(walked, WALKED)
+    drawing.star(drawing.pixels(walked[:1])[0])
+    kinds = list(zip(CATEGORY_COLOURS, house.catalogue.categories.values(), strict=False))
+    for colour, category in kinds:
+        for placed in (o for o in episode.objects if o.category == category.key):
+            drawing.dot(drawing.pixels(np.array(placed.position))[0], colour)
+        drawing.square(drawing.pixels(house.receptacles[category.receptacle].center)[0], colour)
+    for key, label in house.rooms.labels.items():
+        centre = house.rooms.centers[house.rooms.keys.index(key)]
+        drawing.text(label, drawing.pixels(centre)[0], Face(17, 700), LABEL, halo=True)
+    drawing.text(origin, np.array([drawing.width - MARGIN - 30.0, MARGIN / 2]), Face(12, 500), ORIGIN)
+    present = {o.category for o in episode.objects}
+    drawing.legend(
+        [f"planned at the start, {_length(planned):.1f} m", f"walked, {_length(walked):.1f} m"],
+        [(colour, category.label) for colour, category in kinds if category.key in present],
+    )
+    with replacing(path) as temporary:
+        cv2.imwrite(str(temporary), cv2.cvtColor(drawing.image, cv2.COLOR_RGB2BGR))
+
+
+def planned_path(house: House, episode: Episode, plan: Event) -> _Points:
+    """Floor points of the tour of a `plan` event, m, shape (k, 2)."""
+    places = {o.name: np.array(o.position[:2]) for o in episode.objects}
+    here = house.navmesh.snap(np.array([episode.start.x, episode.start.y]))
+    points = [here[None]]
+    for kind, name in plan["visits"]:
+        target = places[name] if kind == "pick" else house.receptacles[episode.targets[name]].approach
+        there = house.navmesh.snap(target)
+        points.append(house.geodesics.shortest_path(here, there).points)
+        here = there
+    return np.vstack(points)
+
+
+class _Drawing:
+    """The house from above with a frame around it, RGB, and room for a legend below."""
+
+    def __init__(self, house: House) -> None:
+        x_min, y_min, x_max, y_max = house.bounds
+        self._corner = np.array([x_min, y_max])
+        self._scale = min(PIXELS_PER_METRE, MAX_SIDE / max(x_max - x_min, y_max - y_min))
+        self._type = Typeface(1.0)
+        picture = house_picture(house, self._scale)
+        self._bottom = MARGIN + len(picture)
+        size = self._bottom + 4 * ROW, max(picture.shape[1] + 2 * MARGIN, 3 * COLUMN)
+        self.image = np.full((*size, 3), 255, np.uint8)
+        self.image[MARGIN : self._bottom, MARGIN : MARGIN + picture.shape[1]] = picture
+
+    @property
+    def width(self) -> int:
+        """Of the image, px."""
+        return int(self.image.shape[1])
+
+    def pixels(self, points: _Points) -> _Points:
+        """Points of the house, m, shape (k, 2 or more), as columns and rows, shape (k, 2)."""
+        scale = np.array([self._scale, -self._scale])
+        return np.asarray((np.atleast_2d(points)[:, :2] - self._corner) * scale + MARGIN)
+
+    def line(self, points: _Points, colour: str, *, dashed: bool = False) -> None:
+        """A path through points, m, shape (k, 2), with a white halo."""
+        path = self.pixels(points)
+        parts = list(_dashes(path)) if dashed else [path]
+        for tone, thickness in ((WHITE, 5), (colour, 2)):
+            self._strokes(parts, tone, thickness)
+
+    def dot(self, centre: _Points, colour: str) -> None:
+        """An object."""
+        turn = np.linspace(0.0, math.tau, 32, endpoint=False)
+        self._shape(centre + 8 * np.column_stack([np.cos(turn), np.sin(turn)]), colour)
+
+    def square(self, centre: _Points, colour: str) -> None:
+        """A receptacle."""
+        self._shape(centre + 9 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), colour)
+
+    def star(self, centre: _Points) -> None:
+        """The start."""
+        turn = np.arange(10) * math.pi / 5
+        radius = np.where(np.arange(10) % 2, 5.0, 12.0)
+        self._shape(centre + np.column_stack([radius * np.sin(turn), -radius * np.cos(turn)]), WHITE)
+
+    def text(self, text: str, middle: _Points, face: Face, colour: str, *, halo: bool = False) -> None:
+        """A line of text around a point."""
+        mask, baseline = self._type.rasterise(text, face)
+        width, top = self._type.width(text, face), middle[1] - baseline + face.size / 3
+        left = min(middle[0] - width / 2, self.width - width - 4)
+        if halo:
+            self._cover(cv2.dilate(mask, np.ones((5, 5), np.uint8)), left, top, WHITE)
+        self._cover(mask, left, top, colour)
+
+    def legend(self, lines: Sequence[str], categories: Sequence[tuple[str, str]]) -> None:
+        """Both paths, the start, and the colours of the categories, column by column."""
+        draws: list[tuple[Callable[[_Points], None], str]] = [
+            (lambda at: self._strokes(_dashes(at + _SAMPLE), PLANNED, 2), lines[0]),
+            (lambda at: self._strokes([at + _SAMPLE], WALKED, 2), lines[1]),
+            (self.star, "start"),
+            *((functools.partial(self.dot, colour=tone), label) for tone, label in categories),
+        ]
+        for number, (draw, label) in enumerate(draws):
+            column, row = divmod(number, 3)
+            at = np.array([MARGIN + 20.0 + column * COLUMN, self._bottom + ROW * (row + 0.8)])
+            draw(at)
+            mask, baseline = self._type.rasterise(label, Face(14, 400))
+            self._cover(mask, at[0] + 28, at[1] - baseline + 5, BLACK)
+
+    def _strokes(self, parts: Sequence[_Points], colour: str, thickness: int) -> None:
+        cv2.polylines(self.image, _fixed(parts), False, _rgb(colour), thickness, cv2.LINE_AA, _SHIFT)
+
+    def _shape(self, corners: _Points, colour: str) -> None:
+        cv2.fillPoly(self.image, _fixed([corners]), _rgb(colour), cv2.LINE_AA, _SHIFT)
+        cv2.polylines(self.image, _fixed([corners]), True, _rgb(BLACK), 1, cv2.LINE_AA, _SHIFT)
+
+    def _cover(self, mask: NDArray[np.uint8], left: float, top: float, colour: str) -> None:
+        """Colour the pixels of a mask, 0 to 255, as far as it lies in the image."""
+        x, y = max(0, round(left)), max(0, round(top))
+        under = self.image[y : y + len(mask), x : x + mask.shape[1]]
+        share = mask[: under.shape[0], : under.shape[1], None] / 255.0
+        under[:] = np.rint(under + share * (np.array(_rgb(colour)) - under)).astype(np.uint8)
+
+
+def house_picture(house: House, scale: float) -> NDArray[np.uint8]:
+    """The tidy house from above, RGB, from the cache folder where it was drawn before."""
+    name = f"{house.catalogue.content}-{scale:g}.png"
+    kept = cache_base() / f"mjsim-floorplans-{source_digest('mjsim')}" / name
+    if (picture := cv2.imread(str(kept)) if kept.is_file() else None) is not None:
+        return cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)  # type: ignore[no-any-return]
+    from mjsim.render import render_house_map  # OpenGL takes a while to load
+
+    drawn = render_house_map(house.catalogue, house.bounds, scale)[..., :3]
+    with contextlib.suppress(OSError), replacing(kept) as temporary:
+        cv2.imwrite(str(temporary), cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR))
+        os.utime(kept.parent)  # in use
+    return drawn
+
+
+def _dashes(path: _Points) -> list[_Points]:
+    """The drawn pieces of a dashed line, px."""
+    along = np.concatenate([[0.0], np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum()])
+    steps = np.arange(0.0, along[-1])
+    points = np.column_stack([np.interp(steps, along, path[:, k]) for k in range(2)])
+    return [points[k : k + DASH] for k in range(0, len(points), PERIOD)]
+
+
+def _fixed(parts: Sequence[_Points]) -> list[NDArray[np.int32]]:
+    return [np.rint(part * (1 << _SHIFT)).astype(np.int32) for part in parts]
+
+
+def _rgb(colour: str) -> tuple[int, int, int]:
+    red, green, blue = bytes.fromhex(colour[1:])
+    return red, green, blue
+
+
+def _length(points: NDArray[Any]) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

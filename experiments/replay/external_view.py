@@ -1,0 +1,121 @@
+"""Films a run from outside: from above, or from around the house, with the person and the guidance drawn."""
+
+import math
+from collections.abc import Callable
+from types import TracebackType
+
+import numpy as np
+
+from experiments.session.film_config import TOP_DOWN, FilmConfig
+from experiments.session.video import VideoWriter
+from hud.projection import CameraView
+from hud.state import HudState, Marker, Rgba, Vec3
+from mjsim.model.scene import Scene
+from mjsim.observation import Observation
+from mjsim.person_parameters import PersonParameters
+from mjsim.render import CameraPose, LayeredRenderer
+from mjsim.render.rasteriser import TOP_DOWN_GROUPS
+from mjsim.world import World
+
+# Simulated time, s -> where the camera is.
+CameraPath = Callable[[float], CameraPose]
+Bounds = tuple[float, float, float, float]
+
+_TOP_DOWN_FOV = math.radians(20.0)  # narrow, from far away, so that walls hide little of the floor
+_FREE_FOV = math.radians(50.0)
+_MARGIN = 1.12  # the tops of the walls are nearer to the camera than the floor
+_ORBIT_PERIOD = 90.0  # s
+_ELEVATION = math.radians(52.0)
+_BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # nothing in a house has this colour
+_HEAD_COLOUR: Rgba = (0.93, 0.74, 0.22, 1.0)
+
+
+def camera_path(
+    camera: str, bounds: Bounds, aspect: float, eye: Vec3 | None = None, target: Vec3 | None = None
+) -> CameraPath:
+    """Where an external camera is over time.
+
+    Args:
+        camera: `top-down`, or `free`.
+        bounds: Bounds of the floor: x_min, y_min, x_max, y_max, m.
+        aspect: Width of the frames divided by their height.
+        eye: Position of a free camera, m; None for one that circles the house.
+        target: Point that a free camera looks at, m; None for the middle of the floor.
+    """
+    x_min, y_min, x_max, y_max = bounds
+    middle = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0])
+    width, depth = x_max - x_min, y_max - y_min
+    if camera == TOP_DOWN:
+        height = 0.5 * _MARGIN * max(depth, width / aspect) / math.tan(_TOP_DOWN_FOV / 2)
+        pose = CameraPose.looking_at(middle + np.array([0.0, 0.0, height]), middle, _TOP_DOWN_FOV)
+        return lambda _: pose
+    aim = middle if target is None else np.array(target)
+    if eye is not None:
+        fixed = CameraPose.looking_at(eye, aim, _FREE_FOV)
+        return lambda _: fixed
+    # A sphere around the floor fits into the view.
+    half_angle = math.atan(math.tan(_FREE_FOV / 2) * min(1.0, aspect))
+    distance = 0.5 * math.hypot(width, depth) / math.sin(half_angle)
+
+    def circle(time: float) -> CameraPose:
+        angle = 2.0 * math.pi * time / _ORBIT_PERIOD - math.pi / 2
+        out = math.cos(_ELEVATION)
+        offset = np.array([out * math.cos(angle), out * math.sin(angle), math.sin(_ELEVATION)])
+        return CameraPose.looking_at(aim + distance * offset, aim, _FREE_FOV)
+
+    return circle
+
+
+class ExternalViewer:
+    """A viewer of a session that films it from outside, without ceilings. Use as a context manager.
+
+    Args:
+        scene: The scene to render.
+        film: Frame size and render profile.
+        camera: Simulated time -> pose of the camera.
+        video: Takes the frames.
+
+    Raises:
+        RenderError: No off-screen GL context could be made, or the size or profile is unusable.
+    """
+
+    def __init__(self, scene: Scene, film: FilmConfig, camera: CameraPath, video: VideoWriter) -> None:
+        self._renderer = LayeredRenderer(
+            scene.model, width=film.width, height=film.height, profile=film.profile, groups=TOP_DOWN_GROUPS
+        )
+        self._camera, self._person = camera, scene.person
+        self._video = video
+
+    def camera(self, world: World) -> CameraView | None:  # noqa: ARG002 - part of the protocol
+        """None, as the HUD is not seen from outside."""
+        return None
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
+        """Film one frame: house, person, and the world-locked markers of the HUD."""
+        markers = [*hud_state.markers, *figure(observation, self._person)]
+        self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
+
+    def close(self) -> None:
+        """Free the GL context."""
+        self._renderer.close()
+
+    def __enter__(self) -> "ExternalViewer":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def figure(observation: Observation, person: PersonParameters) -> tuple[Marker, ...]:
+    """Markers for the person: body, head, and a nose that shows the heading."""
+    x, y = (float(v) for v in observation.position)
+    c, s = math.cos(observation.heading), math.sin(observation.heading)
+    height, radius = person.eye_height, person.body_radius
+    body = height - 0.25
+    return (
+        Marker("cylinder", (x, y, body / 2), (radius, body / 2, 0.0), _BODY_COLOUR, "person", x_ray=True),
+        Marker("sphere", (x, y, height), (0.14, 0.0, 0.0), _HEAD_COLOUR, "person"),
+        Marker("sphere", (x + 0.15 * c, y + 0.15 * s, height), (0.06, 0.0, 0.0), _BODY_COLOUR, "person"),
+    )

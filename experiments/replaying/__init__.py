@@ -1,1 +1,0 @@
-"""Simulating recorded runs again: reading them, comparing every step, filming them in other views."""

@@ -1,0 +1,169 @@
+"""Logs the plans of a session and its visits, with what was suggested and what each visit costs."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.house import House
+from experiments.record.records import EventLog
+from experiments.session.reach_bound import reach_bound
+from mjsim.episode import Episode
+from planner.plan import Status, Visit, VisitKind
+from planner.route import Route, TaskState
+from planner.service import Planner
+
+
+class TaskLog:
+    """Asks for plans and logs them in every condition, as deviations are counted in all of them (PAPER section 6).
+
+    A line takes its place in the log at once, and is filled in when the planner has answered.
+
+    Args:
+        planner: Makes the plans, and the regrets of visits.
+        log: Takes the events.
+        house: The house.
+        episode: The disorganized house.
+        capacity: How many objects the person carries at most.
+        regrets: Whether the regret of every visit is logged.
+    """
+
+    def __init__(
+        self, planner: Planner, log: EventLog, house: House, episode: Episode, *, capacity: int, regrets: bool
+    ) -> None:
+        self._planner, self._log, self._house, self._episode = planner, log, house, episode
+        self._capacity, self._regrets = capacity, regrets
+        self._state: TaskState | None = None
+        self._visits = 0
+
+    def plan(self, time: float, state: TaskState, position: NDArray[Any], *, shown: bool) -> None:
+        """Ask for the plan for a state, and log it if it is a new one.
+
+        Args:
+            time: Simulated time, s.
+            state: The task as it is now.
+            position: Where the person is, m, shape (2,).
+            shown: Whether the plan is shown.
+
+        Raises:
+            UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
+        """
+        line, first = self._log.reserve(), self._state is None
+        if first:
+            self._last_visit_at = position
+            self._last_place = state.position
+        self._state = state
+
+        def fill(route: Route, new: bool) -> None:
+            if new:
+                line.update(_fields(time, "plan", _plan_fields(route)))
+            if first:
+                bound = reach_bound(round(route.plan.lower_bound, 6), self._house, self._episode)
+                line["reach_bound_m"] = round(bound, 6)
+
+        self._planner.ask(state, shown=shown, then=fill)
+
+    def improve(self, time: float, state: TaskState) -> bool:
+        """Follow a better plan for the same task if there is one; whether its visits are others."""
+        before, better = self._planner.route, self._planner.improve(state)
+        if better is None:
+            return False
+        self._log.append(time, "plan", **_plan_fields(better), improved=True)
+        return before is None or better.visits != before.visits
+
+    def visit(self, time: float, made: Visit, position: NDArray[Any]) -> None:
+        """Log a visit, and the plan that was there before it.
+
+        Args:
+            time: Simulated time, s.
+            made: The visit.
+            position: Where the person is, m, shape (2,).
+        """
+        assert self._state is not None  # noqa: S101 - for the type checker
+        line, state, number = self._log.reserve(), self._state, self._visits
+        walk = self._house.body_geodesics.shortest_path(self._last_visit_at, position)
+        location = self._distance_to(state, made)
+
+        def fill(route: Route | None) -> None:
+            suggested = route.next if route else None
+            fields = {
+                "kind": made.kind.value,
+                "object": made.object,
+                "suggested": _as_json(suggested) if suggested else None,
+                "deviated": route is not None and suggested != made,
+                **self._alternatives(state, made, suggested),
+                **(self._regret_fields(number, made, route) if self._regrets else {}),
+                "position": [round(float(v), 6) for v in position],
+                "geodesic_m": round(walk.geodesic_distance, 6),
+                "location_m": round(location, 6),
+            }
+            line.update(_fields(time, "visit", fields))
+
+        self._planner.do(fill)
+        self._visits += 1
+        self._last_visit_at = position
+
+    def finish(self, time: float) -> None:
+        """The task is over: log the regrets of visits that were not known in time."""
+        for (number, names), regret in self._planner.finish():
+            self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
+
+    def _distance_to(self, state: TaskState, made: Visit) -> float:
+        """Planner's distance from the place of the visit before to this one: an object's, or in front of a bin, m."""
+        place = state.deliveries[made.object]
+        if made.kind is VisitKind.PICK:
+            place = state.loose.get(made.object, state.position)
+        snap = self._house.geodesics.navmesh.snap
+        here, there = snap(np.array(self._last_place)), snap(np.array(place))
+        self._last_place = place
+        return float(self._house.geodesics.shortest_path(here, there).geodesic_distance)
+
+    def _alternatives(self, state: TaskState, made: Visit, suggested: Visit | None) -> dict[str, int | bool]:
+        """How many other visits were feasible, and how many of them place another object into the suggested bin."""
+        feasible = len(state.carried) + (len(state.loose) if len(state.carried) < self._capacity else 0)
+        tied: set[str] = set()
+        if suggested is not None and suggested.kind is VisitKind.PLACE:
+            targets = self._episode.targets
+            tied = {name for name in state.carried if targets[name] == targets[suggested.object]}
+        return {
+            "alternatives": max(feasible - 1, 0),
+            "tied_alternatives": max(len(tied) - 1, 0),
+            "tied": made != suggested and made.kind is VisitKind.PLACE and made.object in tied,
+        }
+
+    def _regret_fields(self, number: int, made: Visit, route: Route | None) -> dict[str, float | None]:
+        """Extra cost of a visit and of the suggested one; the next visit of a proven plan has none."""
+        proven = route is not None and route.plan.status is Status.OPTIMAL
+        suggested = route.next if route else None
+        names: dict[Visit, tuple[str, ...]] = {made: ("regret_m",)}
+        other = suggested or made
+        names[other] = (*names.get(other, ()), "suggested_regret_m")
+        fields: dict[str, float | None] = {}
+        for visit, keys in names.items():
+            known = proven and visit == suggested
+            regret = 0.0 if known else _rounded(self._planner.judge(visit, (number, keys)))
+            fields |= dict.fromkeys(keys, regret)
+        return fields
+
+
+def _fields(time: float, event: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {"t": round(time, 6), "event": event, **fields}
+
+
+def _plan_fields(route: Route) -> dict[str, Any]:
+    """Fields of a plan in the log; cost and bound are those of the state that it was made for."""
+    return {
+        "cost_m": round(route.plan.cost, 6),
+        "lower_bound_m": round(route.plan.lower_bound, 6),
+        "status": route.plan.status.value,
+        "visits": [_as_json(v) for v in route.visits],
+    }
+
+
+def _as_json(visit: Visit) -> list[str]:
+    return [visit.kind.value, visit.object]
+
+
+def _rounded(metres: float | None) -> float | None:
+    return None if metres is None else round(metres, 6)

@@ -1,0 +1,146 @@
+"""Figures of a study as inline SVG: no links, no scripts, equal bytes for equal data."""
+
+import io
+import re
+from collections.abc import Mapping, Sequence
+
+import matplotlib
+import numpy as np
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from experiments.analysis.comparison import mean_interval
+from experiments.analysis.comparison_plot import mark_origin
+from experiments.study.analysis import Analysis
+from experiments.study.measures import LIKERT_PREFIX
+from experiments.study.table import ANSWERS, StudyTable
+
+# Okabe-Ito colours, distinct for all common kinds of colour vision.
+COLOURS = ("#666666", "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")
+MARKERS = ("o", "s", "^", "D", "v", "P")
+ANSWER_COLOURS = ("#B35806", "#F1A340", "#D8DAEB", "#998EC3", "#542788")
+PANEL = (3.0, 2.6)  # inches
+JITTER = 0.12  # of a category's width
+
+
+def by_condition(table: StudyTable, labels: Mapping[str, str], objects: int) -> Markup:
+    """A panel per measure: each person as a dot, and means with their 95 % confidence intervals."""
+    names = [name for name in labels if table.groups(name, objects)]
+    figure = Figure(figsize=(PANEL[0] * max(len(names), 1), PANEL[1]), layout="constrained")
+    for axes, name in zip(_panels(figure, len(names)), names, strict=True):
+        for place, (condition, values) in enumerate(table.groups(name, objects).items()):
+            colour = _colour(table, condition)
+            # A fixed jitter: equal data give equal figures.
+            shift = JITTER * np.sin(np.arange(len(values)) * 2.4)
+            axes.plot(place + shift, values, ".", color=colour, ms=3, alpha=0.5)
+            low, high = mean_interval(values) or (values.mean(), values.mean())
+            error = [[values.mean() - low], [high - values.mean()]]
+            axes.errorbar(place + 0.28, values.mean(), error, fmt="o", color="black", capsize=3, ms=5)
+        shown = list(table.groups(name, objects))
+        axes.set_xticks(range(len(shown)), shown)
+        axes.set_title(labels[name], fontsize=9)
+    return _svg(figure, f"Measures by condition with {objects} objects", table)
+
+
+def interactions(table: StudyTable, labels: Mapping[str, str]) -> Markup:
+    """A panel per measure: means by number of objects, a line per condition, with 95 % confidence intervals."""
+    figure = Figure(figsize=(PANEL[0] * len(labels), PANEL[1] + 0.3), layout="constrained")
+    for axes, name in zip(_panels(figure, len(labels)), labels, strict=True):
+        for k, condition in enumerate(table.conditions()):
+            _draw_line(axes, table, name, condition, shift=0.25 * (k - (len(table.conditions()) - 1) / 2))
+        axes.set_xticks(table.levels())
+        axes.set_xlabel("objects", fontsize=8)
+        axes.set_title(labels[name], fontsize=9)
+    figure.axes[0].legend(fontsize=7, frameon=False)
+    return _svg(figure, "Means by number of objects and condition", table)
+
+
+def variances(table: StudyTable, name: str, label: str) -> Markup:
+    """Distribution of a measure in each cell: a row of histograms per condition."""
+    levels, conditions = table.levels(), table.conditions()
+    figure = Figure(figsize=(2.2 * len(levels), 1.3 * len(conditions) + 0.5), layout="constrained")
+    panels = figure.subplots(len(conditions), len(levels), squeeze=False, sharex=True)
+    values = table.columns[name][~np.isnan(table.columns[name])]
+    edges = np.linspace(values.min(), values.max() if np.ptp(values) else values.min() + 1.0, 16)
+    for row, condition in zip(panels, conditions, strict=True):
+        for axes, objects in zip(row, levels, strict=True):
+            found = table.groups(name, objects).get(condition)
+            if found is not None:
+                axes.hist(found, edges, color=_colour(table, condition))
+            axes.set_yticks([])
+        row[0].set_ylabel(condition, fontsize=8)
+    for axes, objects in zip(panels[0], levels, strict=True):
+        axes.set_title(f"{objects} objects", fontsize=8)
+    figure.supxlabel(label, fontsize=9)
+    return _svg(figure, f"Distribution of {label.lower()}", table)
+
+
+def answers(analysis: Analysis) -> Markup:
+    """Shares of the answers to every survey item by condition, all numbers of objects together."""
+    table = analysis.table
+    items = [name for name in table.columns if name.startswith(LIKERT_PREFIX)]
+    figure = Figure(figsize=(7.0, 0.9 * len(items) + 0.6), layout="constrained")
+    for axes, item in zip(_panels(figure, len(items), stacked=True), items, strict=True):
+        groups = table.groups(item)
+        for place, values in enumerate(groups.values()):
+            left = 0.0
+            for answer, colour in zip(range(ANSWERS[0], ANSWERS[1] + 1), ANSWER_COLOURS, strict=True):
+                share = float((values == answer).mean())
+                axes.barh(-place, share, left=left, color=colour, height=0.8)
+                left += share
+        axes.set_yticks([-k for k in range(len(groups))], list(groups))
+        axes.set_title(analysis.measures.likert[item.removeprefix(LIKERT_PREFIX)], fontsize=9, loc="left")
+        axes.set_xlim(0, 1)
+    return _svg(figure, "Shares of answers from 1 (brown) to 5 (violet)", table)
+
+
+def svg(figure: Figure, title: str) -> Markup:
+    """A figure as an element of a page."""
+    FigureCanvasSVG(figure)
+    text = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "mjsim", "svg.fonttype": "path"}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    found = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
+    found = found[found.index("<svg") :]
+    found = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", found)
+    return Markup(found.replace("<svg", f'<svg role="img" aria-label="{title}"', 1))
+
+
+def _svg(figure: Figure, title: str, table: StudyTable) -> Markup:
+    mark_origin(figure, table.origin)
+    return svg(figure, f"{title}. {table.origin}.")
+
+
+def _panels(figure: Figure, count: int, *, stacked: bool = False) -> Sequence[Axes]:
+    shape = (max(count, 1), 1) if stacked else (1, max(count, 1))
+    panels: list[Axes] = figure.subplots(*shape, squeeze=False).ravel().tolist()
+    for axes in panels:
+        axes.tick_params(labelsize=7)
+        axes.spines[["top", "right"]].set_visible(False)
+    return panels[:count]
+
+
+def _colour(table: StudyTable, condition: str) -> str:
+    return COLOURS[table.conditions().index(condition) % len(COLOURS)]
+
+
+def _draw_line(axes: Axes, table: StudyTable, name: str, condition: str, shift: float) -> None:
+    found = [(n, table.groups(name, n).get(condition)) for n in table.levels()]
+    known = [(n, v) for n, v in found if v is not None]
+    if not known:
+        return
+    means = np.array([v.mean() for _, v in known])
+    bounds = np.array([mean_interval(v) or (v.mean(), v.mean()) for _, v in known])
+    axes.errorbar(
+        [n + shift for n, _ in known],
+        means,
+        [means - bounds[:, 0], bounds[:, 1] - means],
+        color=_colour(table, condition),
+        marker=MARKERS[table.conditions().index(condition) % len(MARKERS)],
+        ms=4,
+        lw=1.3,
+        capsize=2,
+        label=condition,
+    )

@@ -1,0 +1,94 @@
+"""Files of an analysis: statistics, a tidy table of people, a table of tests, the report."""
+
+import csv
+import io
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from experiments.analysis.statistics.effects import FTest
+from experiments.record.files import write_json
+from experiments.record.run_directory import check_file
+from experiments.study.analysis import Analysis, Result
+from experiments.study.table import StudyTable
+from experiments.trials.trial_config import SEEDS
+from mjsim.files import replacing, write_text_atomically
+
+FOLDER = "analysis"
+REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "tests.csv"
+FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)
+TEST_COLUMNS = (
+    *("origin", "measure", "column", "test", "effect", "objects", "statistic", "df1", "df2", "people", "p"),
+    *("partial_eta_squared", "low", "high", "reason"),
+)
+
+
+def check_files(folder: Path, *, replace: bool) -> None:
+    """Raise a RecordError if an analysis may not be written to `folder`: files are there and may not be replaced."""
+    for name in FILES:
+        check_file(folder / name, replace=replace)
+
+
+def write_analysis(folder: Path, analysis: Analysis, report: str) -> None:
+    """Write all files, each whole or not at all; `report` is the page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_json(folder / STATISTICS, analysis.as_json())
+    table = people_table(analysis.table)
+    with replacing(folder / f"{PEOPLE}.parquet") as temporary:
+        pa.parquet.write_table(table, temporary)
+    with replacing(folder / f"{PEOPLE}.csv") as temporary:
+        pa.csv.write_csv(table, temporary)
+    write_text_atomically(folder / TESTS, _tests_csv(analysis))
+    write_text_atomically(folder / REPORT, report)
+
+
+def people_table(table: StudyTable) -> pa.Table:
+    """A row per person: seeds, cell, and all measures under the names of the analysis."""
+    columns: dict[str, Any] = {
+        "origin": [table.origin] * len(table.rows),
+        **{name: [row.get(name) for row in table.rows] for name in ("user", "house", *SEEDS)},
+        "assistance": table.assistance,
+        "objects": table.objects,
+        **table.columns,
+    }
+    found = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
+    # A column without values has no type.
+    return found.select([c for c in found.column_names if not pa.types.is_null(found.schema.field(c).type)])
+
+
+def f_tests(result: Result) -> Iterator[tuple[str, FTest]]:
+    """F tests of a result with the names of their effects."""
+    if isinstance(result.value, FTest):
+        yield "assistance", result.value
+    elif isinstance(result.value, dict):
+        yield from ((effect, test) for effect, test in result.value.items() if isinstance(test, FTest))
+
+
+def _tests_csv(analysis: Analysis) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, TEST_COLUMNS, lineterminator="\n", restval="")
+    writer.writeheader()
+    for result in analysis.results:
+        same = {
+            "origin": analysis.table.origin,
+            "measure": result.measure,
+            "column": analysis.table.sources.get(result.measure, result.measure),
+            "test": result.kind,
+            "objects": result.objects,
+        }
+        if result.reason is not None:
+            writer.writerow({**same, "reason": result.reason})
+        for effect, test in f_tests(result):
+            writer.writerow({**same, "effect": effect, **_test_row(test)})
+    return text.getvalue()
+
+
+def _test_row(test: FTest) -> Mapping[str, Any]:
+    values = test.as_json()
+    low, high = values.pop("interval") or ("", "")
+    size = values.pop("eta_squared")
+    return {**values, "partial_eta_squared": size, "low": low, "high": high}

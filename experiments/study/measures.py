@@ -1,0 +1,50 @@
+"""Which columns of a table of trials are analysed: experiments/study/designs/metrics.toml."""
+
+from collections.abc import Collection
+
+import msgspec
+
+from experiments.study.designs import FOLDER
+
+FILE = FOLDER / "metrics.toml"
+LIKERT_PREFIX = "likert_"  # columns of answers
+
+
+class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A measure of the paper and its column."""
+
+    label: str  # its name in figures and tables
+    column: str  # the column that is scored
+    why: str = ""  # reason for it
+    unit: str = ""  # unit of the column, or nothing
+    without: str | None = None  # the column used instead if that one has no values
+    others: tuple[str, ...] = ()  # other readings of the measure, reported as well
+
+    def axis(self) -> str:
+        """Label of an axis."""
+        return f"{self.label} ({self.unit})" if self.unit else self.label
+
+
+class Equivalence(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Largest effects that count as none: of a pair, in standard deviations within groups; partial eta squared."""
+
+    pair: float
+    eta_squared: float
+
+
+class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The measures of an analysis by short name, and labels of survey items (columns `likert_` and the name)."""
+
+    objective: dict[str, Measure] = msgspec.field(name="measures")
+    likert: dict[str, str]
+    equivalence: Equivalence
+
+
+def read_measures() -> Measures:
+    """The committed choice."""
+    return msgspec.toml.decode(FILE.read_bytes(), type=Measures)
+
+
+def resolve(measure: Measure, known: Collection[str]) -> str | None:
+    """The column of a measure among those with values; None where it has none."""
+    return next((c for c in (measure.column, measure.without) if c is not None and c in known), None)

@@ -1,0 +1,205 @@
+"""The report of a study: one HTML file with all figures, tests and models."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from experiments.analysis.page import Block, Paragraph, Table, p_value, page, shown, table
+from experiments.analysis.statistics.effects import FTest
+from experiments.analysis.statistics.models import MixedModel, OrdinalModel
+from experiments.errors import ExperimentError
+from experiments.record.origin import RECORDED
+from experiments.study.analysis import STRICT, Analysis, Result
+from experiments.study.figures import answers, by_condition, interactions, variances
+from experiments.study.files import f_tests
+from experiments.study.measures import LIKERT_PREFIX
+from experiments.study.paths import paths_figure
+from mjsim.errors import MjsimError
+
+TITLE = "Study of assistance and difficulty"
+CAUTION = (
+    "These people were simulated. The numbers follow from a model of people and are no evidence about people; "
+    "answers to survey questions are not simulated."
+)
+TEST_HEAD = ("measure", "test", "effect", "objects", "F", "df", "p", "partial η²", "90 % interval")
+PAIR_HEAD = (
+    "measure",
+    "objects",
+    "pair",
+    "difference",
+    "95 % interval",
+    "Tukey p",
+    "Games-Howell p",
+    "Holm p",
+)
+PAIR_HEAD_MORE = ("g", "95 % interval", "equivalence p", "verdict")
+
+
+def report(analysis: Analysis, folder: Path) -> str:
+    """The page; paths are drawn where `folder` holds run directories."""
+    parts = (
+        ("People", _people(analysis)),
+        ("Measures by condition", _figures(analysis)),
+        ("Answers", _answers(analysis)),
+        ("Analyses of variance", _tests(analysis)),
+        ("Pairs of conditions", _pairs(analysis)),
+        ("Kinds of people by acceptance", _mixtures(analysis)),
+        ("Houses as a random factor", _mixed(analysis)),
+        ("Sensitivity of such a study", _power(analysis)),
+        ("Optimal and walked paths", _paths(analysis, folder)),
+        ("What could not be computed", _missing(analysis)),
+    )
+    return page(TITLE, analysis.table.origin, parts)
+
+
+def _people(analysis: Analysis) -> Iterator[Block]:
+    found, levels = analysis.table, analysis.table.levels()
+    if found.origin != RECORDED:
+        yield Paragraph(CAUTION)
+    sizes = found.sizes()
+    rows = [(condition, *(sizes[condition, n] for n in levels)) for condition in found.conditions()]
+    yield table(("people", *(f"{n} objects" for n in levels)), rows)
+    yield from map(Paragraph, found.notes)
+    measures = analysis.measures.objective
+    yield table(
+        ("measure", "column", "why"),
+        [(measures[n].label, found.sources[n], measures[n].why) for n in measures if n in found.sources],
+    )
+
+
+def _labels(analysis: Analysis) -> dict[str, str]:
+    """Axis labels of the measures that are known."""
+    found = {}
+    for name, measure in analysis.measures.objective.items():
+        if name in analysis.table.columns:
+            seconds = analysis.table.sources[name] == measure.without
+            found[name] = f"{measure.label} (s)" if seconds else measure.axis()
+    return found
+
+
+def _figures(analysis: Analysis) -> Iterator[Block]:
+    found, labels = analysis.table, _labels(analysis)
+    if not labels:
+        return
+    yield by_condition(found, labels, found.levels()[0])
+    if len(found.levels()) > 1:
+        yield interactions(found, labels)
+    name = next(iter(labels))
+    if found.groups(name):
+        yield variances(found, name, labels[name])
+    rows = [d for d in analysis.descriptions if d.measure in labels]
+    yield table(
+        ("measure", "condition", "objects", "people", "mean", "95 % interval", "deviation", "median"),
+        [
+            (labels[d.measure], d.assistance, d.objects, d.people, d.mean, d.interval, d.deviation, d.median)
+            for d in rows
+        ],
+    )
+
+
+def _answers(analysis: Analysis) -> tuple[Block, ...]:
+    if not any(name.startswith(LIKERT_PREFIX) for name in analysis.table.columns):
+        simulated = analysis.table.origin != RECORDED
+        return (Paragraph("Not simulated." if simulated else "No answers are recorded."),)
+    models = [(r, r.value) for r in analysis.results if isinstance(r.value, OrdinalModel)]
+    rows = [
+        (
+            analysis.measures.likert[r.measure.removeprefix(LIKERT_PREFIX)],
+            r.objects,
+            m.people,
+            m.test.statistic,
+            m.test.df,
+            p_value(m.test.p),
+            ", ".join(f"{name} {shown(ratio)}" for name, ratio in m.odds_ratios.items()),
+        )
+        for r, m in models
+    ]
+    head = ("answer", "objects", "people", "χ²", "df", "p", "odds of a higher answer")
+    return answers(analysis), table(head, rows)
+
+
+def _tests(analysis: Analysis) -> tuple[Block, ...]:
+    rows = [
+        (
+            r.measure,
+            r.kind,
+            effect,
+            r.objects,
+            t.statistic,
+            _freedom(t),
+            p_value(t.p),
+            t.eta_squared,
+            t.interval,
+        )
+        for r in analysis.results
+        for effect, t in f_tests(r)
+    ]
+    return (Table(TEST_HEAD, rows),)
+
+
+def _freedom(test: FTest) -> str:
+    return f"{test.df1}, {test.df2:.4g}"
+
+
+def _pairs(analysis: Analysis) -> tuple[Block, ...]:
+    rows = []
+    for result in (r for r in analysis.results if r.kind == "pairs" and r.value):
+        for p in result.value:
+            corrected = (p_value(p.tukey_p), p_value(p.games_howell_p), p_value(p.holm_p))
+            size = (p.g, p.g_interval, p_value(p.equivalence_p), p.verdict)
+            pair = f"{p.second} - {p.first}"
+            rows.append((result.measure, result.objects, pair, p.difference, p.interval, *corrected, *size))
+    bound = analysis.measures.equivalence.pair
+    about = Paragraph(
+        f"Equivalent: Tukey's test finds no difference, and two one-sided tests show that it is below {bound:g} "
+        "standard deviations. Undecided: neither is shown; that is no evidence of no effect."
+    )
+    return (Table((*PAIR_HEAD, *PAIR_HEAD_MORE), rows), *([about] if rows else []))
+
+
+def _mixtures(analysis: Analysis) -> tuple[Block, ...]:
+    rows = [
+        (r.kind.removeprefix("acceptance, "), len(m.shares), m.shares, m.means, m.log_likelihood, m.bic)
+        for r in analysis.results
+        if r.measure == STRICT and r.kind.startswith("acceptance") and r.value
+        for m in r.value
+    ]
+    about = Paragraph(
+        "Mixtures of beta-binomial distributions of accepted visits; the smallest BIC fits best."
+    )
+    head = ("condition", "kinds", "shares", "mean acceptance", "log likelihood", "BIC")
+    return (about, Table(head, rows)) if rows else ()
+
+
+def _mixed(analysis: Analysis) -> tuple[Block, ...]:
+    rows = [
+        (r.measure, effect, t.statistic, t.df, p_value(t.p), m.house_variance, m.residual_variance, m.houses)
+        for r in analysis.results
+        if isinstance(m := r.value, MixedModel)
+        for effect, t in m.tests.items()
+    ]
+    head = ("measure", "effect", "Wald χ²", "df", "p", "variance of houses", "of people in a house", "houses")
+    return (Table(head, rows),)
+
+
+def _power(analysis: Analysis) -> tuple[Block, ...]:
+    rows = []
+    for r in (r for r in analysis.results if r.kind == "power"):
+        equivalence = analysis.find(r.measure, "equivalence", r.objects)
+        p = None if equivalence is None else p_value(equivalence.value["p"])
+        rows.append((r.measure, r.objects, r.value["detectable_eta_squared"], p))
+    bound = analysis.measures.equivalence.eta_squared
+    head = ("measure", "objects", "partial η² found in 80 % of such studies", f"p of η² ≥ {bound:g}")
+    return (Table(head, rows),)
+
+
+def _paths(analysis: Analysis, folder: Path) -> tuple[Block, ...]:
+    try:
+        return (paths_figure(analysis.table, folder),)
+    except (ExperimentError, MjsimError) as error:
+        return (Paragraph(f"Not drawn: {error}.", "missing"),)
+
+
+def _missing(analysis: Analysis) -> tuple[Block, ...]:
+    rows: list[Result] = [r for r in analysis.results if r.reason is not None]
+    reasons = [(r.measure, r.kind, r.objects, r.reason) for r in rows]
+    return (Table(("measure", "test", "objects", "reason"), reasons),)

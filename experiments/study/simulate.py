@@ -1,0 +1,40 @@
+"""Studies with simulated people: the cells of a design file, in the order in which people would arrive."""
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+from experiments.errors import ConfigError
+from experiments.record.origin import HUMAN, is_simulated
+from experiments.study.designs import FOLDER
+from experiments.trials.design import Design, read_design
+from experiments.trials.trial_config import TrialConfig
+
+
+def study_path(name: str) -> Path:
+    """The file of a study: a path, or the name of one that comes with the package (`paper`); folders do not count."""
+    own, packaged = Path(name), FOLDER / f"{name}.toml"
+    if not own.is_file() and not packaged.is_file():
+        raise ConfigError(
+            f"no study {name!r}; `paper` is the published one, or give the path of a design file"
+        )
+    return own if own.is_file() else packaged
+
+
+def read_study(path: Path, people: int | None = None) -> Design:
+    """The simulated people of a study file, all or the first `people`; cells take people in turn.
+
+    A ConfigError names what is unusable: the file, the number, or a person who is to take part in person.
+    """
+    cells: dict[Any, list[TrialConfig]] = {}
+    for trial in read_design(path).trials:
+        if not is_simulated(trial.user):
+            raise ConfigError(f"{path}: user {HUMAN} cannot be simulated; name a participant model")
+        cells.setdefault((trial.assistance, trial.objects, trial.user, trial.house), []).append(trial)
+    turns = itertools.zip_longest(*cells.values())
+    in_turn = [trial for turn in turns for trial in turn if trial is not None]
+    if people is None:
+        return Design(tuple(in_turn))
+    if not 1 <= people <= len(in_turn):
+        raise ConfigError(f"--people {people} must be 1 to {len(in_turn)}, the people of {path}")
+    return Design(tuple(in_turn[:people]))

@@ -1,0 +1,192 @@
+"""The people of a study: one row each of trials.parquet, as plain columns."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from experiments.errors import RecordError
+from experiments.record.origin import RECORDED, origin_of
+from experiments.session.endings import ALL_DELIVERED
+from experiments.study.measures import LIKERT_PREFIX, Measures, resolve
+from experiments.trials.design import confounded_rows, counted
+from experiments.trials.table import NAME
+from experiments.trials.trial_config import SEEDS
+
+REQUIRED = ("assistance", "objects", "user")
+CONDITIONS = ("none", "highlight", "optimal")  # of the paper, in its order
+ANSWERS = (1, 5)  # of Likert items, from and to
+
+
+@dataclass(frozen=True)
+class StudyTable:
+    """People of a study, in the order of its table."""
+
+    rows: Sequence[Mapping[str, Any]]  # their rows, with all columns of the file
+    assistance: NDArray[Any]  # assistance condition of each, (n,)
+    objects: NDArray[np.int64]  # number of objects of each, (n,)
+    houses: NDArray[Any]  # name of the disorganized house of each, (n,)
+    # measures and answers by short name, (n,) each; NaN where unknown
+    columns: Mapping[str, NDArray[np.float64]]
+    sources: Mapping[str, str]  # column of the file by short name
+    origin: str  # whether people were simulated: `Simulated`, `Partly simulated` or `Recorded from people`
+    notes: tuple[str, ...]  # remarks about the table, a sentence each
+
+    def conditions(self) -> list[str]:
+        """Assistance conditions, those of the paper first and in its order."""
+        present = dict.fromkeys(self.assistance.tolist())
+        return [c for c in CONDITIONS if c in present] + [c for c in present if c not in CONDITIONS]
+
+    def levels(self) -> list[int]:
+        """Numbers of objects, rising."""
+        return sorted(set(self.objects.tolist()))
+
+    def take(self, people: NDArray[np.int64]) -> "StudyTable":
+        """The people of these numbers, (m,), which may repeat."""
+        return replace(
+            self,
+            rows=[self.rows[k] for k in people],
+            assistance=self.assistance[people],
+            objects=self.objects[people],
+            houses=self.houses[people],
+            columns={name: values[people] for name, values in self.columns.items()},
+        )
+
+    def groups(self, name: str, objects: int | None = None) -> dict[str, NDArray[np.float64]]:
+        """Known values of a column by condition, of one level or all; conditions without any are left out."""
+        values, known = self.columns[name], ~np.isnan(self.columns[name])
+        here = known if objects is None else known & (self.objects == objects)
+        found = {c: values[here & (self.assistance == c)] for c in self.conditions()}
+        return {c: v for c, v in found.items() if len(v)}
+
+    def sizes(self) -> dict[tuple[str, int], int]:
+        """People by condition and number of objects, empty cells included."""
+        count = Counter(zip(self.assistance.tolist(), self.objects.tolist(), strict=True))
+        return {(c, n): count[(c, n)] for c in self.conditions() for n in self.levels()}
+
+
+def read_study(folder: Path, measures: Measures) -> StudyTable:
+    """Read the people of a study or a batch; a RecordError names a missing column or an invalid value."""
+    path = folder / f"{NAME}.parquet"
+    try:
+        rows = pq.read_table(path).to_pylist()
+    except (OSError, ValueError) as error:
+        raise RecordError(f"{folder} is not a study: {path} cannot be read ({error})") from error
+    if not rows:
+        raise RecordError(f"{path} has no rows; there are no participants yet")
+    missing = [name for name in REQUIRED if name not in rows[0]]
+    if missing:
+        raise RecordError(f"{path} has no column {', '.join(missing)}; it is not a table of people")
+    return study_table(rows, measures, path)
+
+
+def study_table(rows: Sequence[Mapping[str, Any]], measures: Measures, path: Path) -> StudyTable:
+    """People by their rows; a RecordError names `path` and a value that is invalid."""
+    _check_design(rows, path)
+    numbers = {column: _numbers(rows, column, path) for column in _candidates(measures) if column in rows[0]}
+    known = {column for column, values in numbers.items() if not np.isnan(values).all()}
+    sources = {}
+    for name, measure in measures.objective.items():
+        if (column := resolve(measure, known)) is not None:
+            sources[name] = column
+        sources |= {other: other for other in measure.others if other in known}
+    sources |= {name: name for name in _likert_columns(measures) if name in known}
+    if not sources:
+        wanted = ", ".join(m.column for m in measures.objective.values())
+        raise RecordError(f"{path} has none of the measures {wanted}")
+    columns = {name: numbers[column] for name, column in sources.items()}
+    origin = origin_of(row["user"] for row in rows)
+    answers = [name for name in columns if name.startswith(LIKERT_PREFIX)]
+    if origin != RECORDED and answers:
+        raise RecordError(f"{path} has answers of simulated people ({answers[0]}); nothing simulates answers")
+    for name in answers:
+        _check_answers(columns[name], name, path)
+    return StudyTable(
+        rows,
+        np.array([str(row["assistance"]) for row in rows]),
+        np.array([row["objects"] for row in rows]),
+        np.array([f"{row.get('house')}/{row.get('house_seed')}" for row in rows]),
+        columns,
+        sources,
+        origin,
+        tuple(_notes(rows, columns)),
+    )
+
+
+def _check_design(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    for k, row in enumerate(rows):
+        if not isinstance(row["assistance"], str) or not row["assistance"]:
+            raise RecordError(f"{path}: row {k} has the assistance {row['assistance']!r}, not a name")
+        if not isinstance(row["objects"], int) or isinstance(row["objects"], bool) or row["objects"] < 1:
+            raise RecordError(f"{path}: row {k} has {row['objects']!r} objects, not a whole number from 1 on")
+
+
+def _likert_columns(measures: Measures) -> list[str]:
+    return [LIKERT_PREFIX + name for name in measures.likert]
+
+
+def _candidates(measures: Measures) -> list[str]:
+    """All columns that may be analysed."""
+    objective = [
+        c for m in measures.objective.values() for c in (m.column, m.without, *m.others) if c is not None
+    ]
+    return [*objective, *_likert_columns(measures)]
+
+
+def _numbers(rows: Sequence[Mapping[str, Any]], column: str, path: Path) -> NDArray[np.float64]:
+    """A column (n,), with NaN for unknown values."""
+    for k, row in enumerate(rows):
+        value = row.get(column)
+        if value is not None and (isinstance(value, str | bool) or not isinstance(value, int | float)):
+            raise RecordError(f"{path}: row {k} has the {column} {value!r}, which is no number")
+        if value is not None and math.isinf(value):
+            raise RecordError(f"{path}: row {k} has an infinite {column}")
+    return np.array([np.nan if row.get(column) is None else row[column] for row in rows], float)
+
+
+def _check_answers(values: NDArray[np.float64], name: str, path: Path) -> None:
+    given = values[~np.isnan(values)]
+    bad = given[(given != np.round(given)) | (given < ANSWERS[0]) | (given > ANSWERS[1])]
+    if len(bad):
+        raise RecordError(f"{path}: {name} has the answer {bad[0]:g}; answers are whole numbers from 1 to 5")
+
+
+def _notes(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, NDArray[np.float64]]) -> list[str]:
+    notes = []
+    unfinished = sum(row.get("ended", ALL_DELIVERED) != ALL_DELIVERED for row in rows)
+    if unfinished:
+        notes.append(
+            f"{counted(unfinished, 'trial')} ended before everything was delivered; times and distances of these are "
+            "smaller than those of the whole task."
+        )
+    for name, values in columns.items():
+        gaps = int(np.isnan(values).sum())
+        if gaps:
+            notes.append(f"{name} is not known for {gaps} of {len(values)}; tests of it leave these out.")
+    cells = Counter(
+        cell for _, cell in {_person_and_cell(row) for row in rows if row.get("person_seed") is not None}
+    )
+    people = {
+        person for person, _ in {_person_and_cell(row) for row in rows if row.get("person_seed") is not None}
+    }
+    if sum(cells.values()) > len(people):
+        notes.append(
+            "The same people are in several cells. These tests treat them as different people, which costs power; "
+            "`mjsim compare` pairs them."
+        )
+    if confounded := confounded_rows(rows):
+        notes.append(confounded[0].upper() + confounded[1:] + ".")
+    return notes
+
+
+def _person_and_cell(row: Mapping[str, Any]) -> tuple[Any, Any]:
+    return (row["user"], *(row.get(s) for s in SEEDS if s != "house_seed")), (
+        row["assistance"],
+        row["objects"],
+    )

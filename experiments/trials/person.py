@@ -1,0 +1,52 @@
+"""How the bodies and habits of people differ: which values of `mjsim.PersonParameters` a trial draws.
+
+Names and units are those of `PersonParameters`; values of a group are `motion.reach_time` and so on. A value that no
+description names is the same for each person.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from experiments.errors import ConfigError
+from experiments.participants.behaviour import Parameter, draw, quantiles
+from experiments.participants.distribution import Distributions
+from mjsim.errors import PersonError
+from mjsim.motion_parameters import GROUPS
+from mjsim.person_parameters import RANGES, PersonParameters
+
+if TYPE_CHECKING:
+    import numpy as np
+
+_DEFAULT = PersonParameters()
+PARAMETERS: Mapping[str, Parameter] = {
+    **{name: Parameter(getattr(_DEFAULT, name), *RANGES[name]) for name in RANGES},
+    **{
+        f"{group}.{name}": Parameter(value, 0.0, math.inf, "")
+        for group in GROUPS
+        for name, value in getattr(_DEFAULT, group)._asdict().items()
+    },
+}
+
+
+def check_person(described: Distributions) -> None:
+    """Check a description of people by the person in the middle of it; a ConfigError says what is wrong."""
+    _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
+
+
+def drawn_person(described: Distributions, rng: "np.random.Generator") -> PersonParameters:
+    """A person; a ConfigError where a name is unknown, or a value cannot be drawn."""
+    return _person(draw(PARAMETERS, described, rng, "a person"))
+
+
+def _person(values: Mapping[str, float]) -> PersonParameters:
+    own: dict[str, Any] = {name: values[name] for name in RANGES}
+    for group, kind in GROUPS.items():
+        numbers: dict[str, Any] = {name: values[f"{group}.{name}"] for name in kind._fields}
+        if "withdraw_steps" in numbers:
+            numbers["withdraw_steps"] = round(numbers["withdraw_steps"])
+        own[group] = kind(**numbers)
+    try:
+        return PersonParameters(**own)
+    except PersonError as error:
+        raise ConfigError(str(error)) from error

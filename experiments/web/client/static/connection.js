@@ -1,0 +1,130 @@
+// The WebSocket: reconnects after a failure, numbers inputs, and repeats them until they are taken.
+
+/** @import { Frame, FromBrowser, Input, ToBrowser } from "./protocol.js" */
+
+import { CODECS, FRAME_HEAD_BYTES, IDLE, KEY_FLAG, MAX_INPUTS, REFUSED, REPLACED, TOO_MUCH } from "./protocol.js";
+
+const FIRST_WAIT = 250; // ms before the first attempt to reconnect
+const MAX_WAIT = 500; // ms; a server that was restarted listens within a second
+const FINAL = new Set([REFUSED, REPLACED, IDLE, TOO_MUCH]); // codes after which the page does not reconnect by itself
+
+/** @typedef {{ type: "closed", code: number, final: boolean }} Closed */
+/** @typedef {ToBrowser | Frame | Closed} Received */
+
+export class Connection {
+  /** @type {WebSocket | null} */
+  #socket = null;
+  #wait = FIRST_WAIT;
+  /** @type {Input[]} */
+  #waiting = []; // inputs that are not taken yet
+  #next = 1;
+  #open = false; // whether the session takes inputs
+  #hello;
+  #on;
+
+  /**
+   * @param {() => FromBrowser} hello gives the first message
+   * @param {(message: Received) => void} on takes messages
+   */
+  constructor(hello, on) {
+    this.#hello = hello;
+    this.#on = on;
+  }
+
+  open() {
+    const socket = new WebSocket(location.href.replace(/^http/, "ws").replace(/[?#].*$/, ""));
+    socket.binaryType = "arraybuffer";
+    this.#socket = socket;
+    socket.onopen = () => socket.send(JSON.stringify(this.#hello()));
+    socket.onmessage = ({ data }) => {
+      if (socket === this.#socket) this.#take(data);
+    };
+    socket.onclose = ({ code }) => {
+      if (socket === this.#socket) this.#closed(code);
+    };
+  }
+
+  /**
+   * Sends a message; it is lost if there is no connection.
+   * @param {FromBrowser} message
+   */
+  send(message) {
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(message));
+  }
+
+  /**
+   * Sends an input, repeatedly until it is taken.
+   * @param {Omit<Input, "number">} values
+   * @returns {number} its number
+   */
+  input(values) {
+    const input = { number: this.#next++, ...values };
+    this.#waiting.push(input);
+    if (this.#open) this.send({ type: "inputs", inputs: [input] });
+    return input.number;
+  }
+
+  /** Number of inputs that are not safe yet. */
+  get pending() {
+    return this.#waiting.length;
+  }
+
+  /** Closes the connection for good. */
+  close() {
+    const socket = this.#socket;
+    this.#socket = null;
+    socket?.close(1000);
+  }
+
+  /** @param {string | ArrayBuffer} data */
+  #take(data) {
+    this.#wait = FIRST_WAIT;
+    /** @type {Received} */
+    const message = typeof data === "string" ? JSON.parse(data) : readFrame(data);
+    if (message.type === "state") {
+      this.#next = Math.max(this.#next, message.input + 1);
+      const open = message.phase === "running" || message.phase === "paused";
+      if (open && !this.#open) this.#repeat();
+      this.#open = open;
+    } else if (message.type === "taken") {
+      this.#waiting = this.#waiting.filter((input) => input.number > message.input);
+    }
+    this.#on(message);
+  }
+
+  #repeat() {
+    for (let i = 0; i < this.#waiting.length; i += MAX_INPUTS) {
+      this.send({ type: "inputs", inputs: this.#waiting.slice(i, i + MAX_INPUTS) });
+    }
+  }
+
+  /** @param {number} code */
+  #closed(code) {
+    this.#open = false;
+    const final = FINAL.has(code);
+    this.#on({ type: "closed", code, final });
+    if (final) return;
+    setTimeout(() => this.#socket && this.open(), this.#wait * (0.75 + 0.5 * Math.random()));
+    this.#wait = Math.min(2 * this.#wait, MAX_WAIT);
+  }
+}
+
+/**
+ * @param {ArrayBuffer} buffer
+ * @returns {Frame}
+ */
+export function readFrame(buffer) {
+  const head = new DataView(buffer, 0, FRAME_HEAD_BYTES);
+  return {
+    type: "frame",
+    codec: CODECS[head.getUint8(1)] ?? "none",
+    key: (head.getUint8(2) & KEY_FLAG) !== 0,
+    width: head.getUint16(4, true),
+    height: head.getUint16(6, true),
+    number: head.getUint32(8, true),
+    step: head.getUint32(12, true),
+    input: Number(head.getBigUint64(16, true)),
+    milliseconds: head.getFloat32(24, true),
+    data: new Uint8Array(buffer, FRAME_HEAD_BYTES),
+  };
+}

@@ -1,0 +1,114 @@
+// The texts of all dialogs.
+
+/** @typedef {{ title: string, texts: string[], buttons?: [string, string][] }} Dialog buttons: label and action */
+
+/** @type {Record<string, string>} */
+const PAUSED = {
+  asked: "The clock is stopped.",
+  hidden: "Paused while the page was hidden.",
+  disconnected: "Paused while there was no connection.",
+  "taken over": "Paused while the session moved to this page.",
+};
+
+/** @param {boolean} interrupted @returns {Dialog} */
+export const loading = (interrupted) => ({
+  title: "One moment",
+  texts: [interrupted ? "Your session is being restored. Nothing is lost." : "The apartment is being loaded."],
+});
+
+/**
+ * @param {string} trial
+ * @param {number} objects
+ * @param {string} controls
+ * @returns {Dialog}
+ */
+export function instructions(trial, objects, controls) {
+  if (trial === "training") {
+    return {
+      title: "Training",
+      texts: ["Find one object, pick it up and put it into its bin. There is no time limit.", controls],
+      buttons: [["Start the training", "run"], ["Skip the training", "leave"]],
+    };
+  }
+  const what = objects === 1 ? "Put the object into its bin" : `Put all ${objects} objects into their bins`;
+  return {
+    title: "Your task",
+    texts: [`${what} as fast as you can. The clock starts when you choose Start.`],
+    buttons: [["Start", "run"]],
+  };
+}
+
+export const TOUCH_CONTROLS =
+  "Walk and turn with the buttons at the lower left. Drag across the view to look around. “Pick or place” picks up an object or puts it into its bin. “Help” shows all controls.";
+
+/** @param {(action: string) => string} key names of the keys of an action */
+export const keyControls = (key) =>
+  `Walk with ${key("forward")}, ${key("left")}, ${key("back")}, ${key("right")}. Turn with the mouse, or with ${key("turnLeft")} and ${key("turnRight")}. ${key("act")} picks up an object or puts it into its bin. ${key("help")} shows all keys.`;
+
+/** @param {string} reason @returns {Dialog} */
+export const paused = (reason) => ({
+  title: "Paused",
+  texts: [PAUSED[reason] ?? ""],
+  buttons: [["Continue", "run"]],
+});
+
+/** @param {string} trial @returns {Dialog} */
+export const ending = (trial) => ({
+  title: `End the ${trial} now?`,
+  texts: ["What you did so far is kept."],
+  buttons: [["Continue", "hide"], [`End the ${trial}`, "leave"]],
+});
+
+/** @param {boolean} saved @returns {Dialog} */
+export const over = (saved) => ({
+  title: "Done",
+  texts: ["The next page opens in a moment."],
+  buttons: saved ? [["Continue", "reload"]] : [],
+});
+
+/** @param {number} position @returns {Dialog} */
+export const queue = (position) => ({
+  title: "All places are taken",
+  texts: [
+    position === 1 ? "You are next." : `You are number ${position} in the queue.`,
+    "Please keep this page open. It continues by itself.",
+  ],
+});
+
+/** @type {Dialog} */
+export const OCCUPIED = {
+  title: "This session is open in another page",
+  texts: ["Only one page at a time can show it."],
+  buttons: [["Continue here", "takeover"]],
+};
+
+/** @type {Dialog} */
+export const REPLACED = {
+  title: "This session continues in another page",
+  texts: ["You can close this page."],
+  buttons: [["Continue here", "reload"]],
+};
+
+/** @type {Dialog} */
+export const OFFLINE = { title: "No connection", texts: ["This page reconnects by itself. Nothing is lost."] };
+
+/** @type {Dialog} */
+export const CLOSED = {
+  title: "The connection was closed",
+  texts: ["Your session is kept."],
+  buttons: [["Reconnect", "reload"]],
+};
+
+/** @type {Dialog} */
+export const IDLE = {
+  title: "You were away for a long time",
+  texts: ["Your session is kept."],
+  buttons: [["Continue", "reload"]],
+};
+
+/** @param {string} message @returns {Dialog} */
+export const failed = (message) => ({
+  title: "Something went wrong",
+  texts: [message],
+  buttons: [["Try again", "reload"]],
+});

@@ -1,0 +1,49 @@
+// A gamepad of the standard layout: left stick walks, right stick turns and looks, buttons as in the table.
+
+/** @import { Inputs } from "./inputs.js" */
+
+import { ACTIONS } from "./bindings.js";
+
+const DEAD = 0.15; // of a stick's way, around its middle
+
+/**
+ * @param {Inputs} inputs
+ * @param {Record<string, () => void>} commands of the page itself
+ * @param {() => boolean} listens whether inputs are for the view
+ */
+export function connectGamepad(inputs, commands, listens) {
+  /** @type {boolean[]} */
+  let before = [];
+  let running = false;
+
+  const stick = (/** @type {number} */ value) => {
+    const beyond = Math.max(0, Math.abs(value) - DEAD) / (1 - DEAD);
+    return Math.round(Math.sign(value) * Math.min(1, beyond) * 20) / 20; // few steps, so that few inputs are sent
+  };
+  const poll = () => {
+    const pad = navigator.getGamepads().find((found) => found?.mapping === "standard");
+    if (!pad) {
+      running = false;
+      inputs.hold("gamepad", {});
+      return;
+    }
+    const pressed = pad.buttons.map((button) => button.pressed);
+    if (listens()) {
+      const [x = 0, y = 0, turn = 0, look = 0] = pad.axes.map(stick);
+      inputs.hold("gamepad", { forward: -y, left: -x, turn: -turn, look: -look });
+    }
+    for (const action of ACTIONS) {
+      if (action.button === undefined || !pressed[action.button] || before[action.button]) continue;
+      if (!action.press && !action.rows) commands[action.name]?.();
+      else if (!listens() && action.name === "act") commands.confirm?.();
+      else if (listens() && action.press) inputs.press(action.press);
+      else if (listens() && action.rows) inputs.scroll(action.rows);
+    }
+    before = pressed;
+    requestAnimationFrame(poll);
+  };
+  window.addEventListener("gamepadconnected", () => {
+    if (!running) requestAnimationFrame(poll);
+    running = true;
+  });
+}

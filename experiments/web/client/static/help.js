@@ -1,0 +1,105 @@
+// The table of controls, and changing its keys.
+
+/** @import { Action, Bindings } from "./bindings.js" */
+
+import { ACTIONS, keyName } from "./bindings.js";
+import { made, within } from "./dom.js";
+
+export class Help {
+  #dialog;
+  #bindings;
+  /** @type {Action | null} */
+  #changing = null;
+
+  /**
+   * @param {HTMLDialogElement} dialog
+   * @param {Bindings} bindings
+   * @param {() => void} closed is called when it was closed
+   */
+  constructor(dialog, bindings, closed) {
+    this.#dialog = dialog;
+    this.#bindings = bindings;
+    dialog.addEventListener("close", closed);
+    dialog.addEventListener("keydown", (event) => this.#key(event));
+    this.#part("#help-close").addEventListener("click", () => dialog.close());
+    this.#part("#help-reset").addEventListener("click", () => {
+      bindings.reset();
+      this.#fill();
+      this.#report("All keys were reset.");
+    });
+  }
+
+  get open() {
+    return this.#dialog.open;
+  }
+
+  show() {
+    this.#changing = null;
+    this.#fill();
+    this.#report("");
+    if (!this.#dialog.open) this.#dialog.showModal();
+    this.#part("#help-close").focus({ preventScroll: true });
+    this.#dialog.scrollTop = 0;
+  }
+
+  hide() {
+    this.#dialog.close();
+  }
+
+  #fill() {
+    this.#part("#keys").replaceChildren(...ACTIONS.map((action) => this.#row(action)));
+  }
+
+  /** @param {Action} action */
+  #row(action) {
+    const row = document.createElement("tr");
+    const what = made("th", action.text);
+    what.scope = "row";
+    const change = made("button", "Change");
+    change.type = "button";
+    change.dataset.action = action.name;
+    change.setAttribute("aria-label", `Change the key for: ${action.text}`);
+    change.addEventListener("click", () => {
+      this.#changing = action;
+      this.#report(`Press the new key for: ${action.text}. Esc keeps the old one.`);
+    });
+    const cell = document.createElement("td");
+    cell.append(change);
+    const pad = made("td", action.pad);
+    pad.className = "pads";
+    row.append(what, made("td", this.#bindings.label(action.name)), pad, cell);
+    return row;
+  }
+
+  /** @param {KeyboardEvent} event */
+  #key(event) {
+    const action = this.#changing;
+    if (!action) {
+      if (this.#bindings.action(event.code)?.name !== "help") return;
+      event.stopPropagation(); // else the view, which listens again, opens the table anew
+      this.hide();
+      return;
+    }
+    if (event.code === "Tab") return;
+    event.preventDefault();
+    this.#changing = null;
+    if (event.code === "Escape") {
+      this.#report("");
+      return;
+    }
+    this.#bindings.bind(action, event.code);
+    this.#fill();
+    this.#report(`${action.text}: ${keyName(event.code)}`);
+    this.#part(`[data-action="${action.name}"]`).focus();
+  }
+
+  /** @param {string} text */
+  #report(text) {
+    this.#part("#remap").textContent = text;
+  }
+
+  /** @param {string} selector */
+  #part(selector) {
+    return within(this.#dialog, selector, HTMLElement);
+  }
+}

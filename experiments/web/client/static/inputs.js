@@ -1,0 +1,108 @@
+// Joins keyboard, mouse, gamepad and touch into one stream of inputs.
+
+/** @import { Input } from "./protocol.js" */
+/** @import { Axes } from "./bindings.js" */
+
+import { summed } from "./bindings.js";
+
+const PERIOD = 20; // ms between two inputs of mouse and wheel
+/** @type {(keyof Axes)[]} */
+const AXES = ["forward", "left", "turn", "look"];
+const MAX_ANGLE = 7; // rad
+const MAX_SCROLL = 100; // rows
+
+export class Inputs {
+  #send;
+  /** @type {Map<string, Axes>} */
+  #held = new Map(); // source -> axes
+  #yaw = 0;
+  #pitch = 0;
+  #rows = 0;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  #timer;
+
+  /** @param {(input: Omit<Input, "number">) => void} send */
+  constructor(send) {
+    this.#send = send;
+  }
+
+  /**
+   * Sets what a source holds down from now on.
+   * @param {string} source
+   * @param {Axes} axes
+   */
+  hold(source, axes) {
+    const before = JSON.stringify(this.#axes());
+    this.#held.set(source, axes);
+    if (JSON.stringify(this.#axes()) !== before) this.#flush();
+  }
+
+  /** Sends what is held down, to a session that may still have the state of an earlier page. */
+  repeat() {
+    this.#flush();
+  }
+
+  /** Releases everything. */
+  release() {
+    const some = Object.keys(this.#axes()).length > 0;
+    this.#held.clear();
+    if (some) this.#flush();
+  }
+
+  /**
+   * Presses the action key or the key of a hand.
+   * @param {NonNullable<Input["press"]>} press
+   */
+  press(press) {
+    this.#flush({ press });
+  }
+
+  /**
+   * Turns and looks by angles, rad.
+   * @param {number} yaw
+   * @param {number} pitch
+   */
+  look(yaw, pitch) {
+    this.#yaw += yaw;
+    this.#pitch += pitch;
+    this.#soon();
+  }
+
+  /**
+   * Scrolls the list.
+   * @param {number} rows
+   */
+  scroll(rows) {
+    this.#rows += rows;
+    this.#soon();
+  }
+
+  #soon() {
+    this.#timer ??= setTimeout(() => this.#flush(), PERIOD);
+  }
+
+  /** @param {Pick<Input, "press">} more */
+  #flush(more = {}) {
+    clearTimeout(this.#timer);
+    this.#timer = undefined;
+    /** @type {Omit<Input, "number">} */
+    const input = { ...this.#axes(), ...more };
+    if (this.#yaw) input.yaw = limited(this.#yaw, MAX_ANGLE);
+    if (this.#pitch) input.pitch = limited(this.#pitch, MAX_ANGLE);
+    if (this.#rows) input.scroll = limited(this.#rows, MAX_SCROLL);
+    this.#yaw = this.#pitch = this.#rows = 0;
+    this.#send(input);
+  }
+
+  #axes() {
+    const sum = summed([...this.#held.values()]);
+    for (const axis of AXES) {
+      if (sum[axis]) sum[axis] = limited(sum[axis], 1);
+      else delete sum[axis];
+    }
+    return sum;
+  }
+}
+
+/** @param {number} value @param {number} limit */
+const limited = (value, limit) => Math.max(-limit, Math.min(limit, value));

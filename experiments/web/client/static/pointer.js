@@ -1,0 +1,93 @@
+// Mouse look with pointer lock, the wheel, and touch.
+
+/** @import { Inputs } from "./inputs.js" */
+
+import { ACTIONS, summed } from "./bindings.js";
+
+const TURN_PER_PIXEL = 0.0025; // rad
+const TURN_PER_TOUCHED_PIXEL = 0.006; // rad
+const LINE = 40; // px of the wheel for one row
+
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @param {Inputs} inputs
+ * @param {() => boolean} listens whether inputs are for the view
+ */
+export function connectMouse(canvas, inputs, listens) {
+  canvas.addEventListener("click", (event) => {
+    if ((event instanceof PointerEvent && event.pointerType === "touch") || !listens()) return;
+    canvas.focus();
+    // Refused right after Esc; the next click asks again.
+    if (document.pointerLockElement !== canvas) canvas.requestPointerLock?.()?.catch?.(() => {});
+  });
+  document.addEventListener("mousemove", (event) => {
+    if (document.pointerLockElement !== canvas || !listens()) return;
+    inputs.look(-event.movementX * TURN_PER_PIXEL, -event.movementY * TURN_PER_PIXEL);
+  });
+  let rolled = 0;
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      if (!listens()) return;
+      rolled += event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : event.deltaY * LINE;
+      const rows = Math.trunc(rolled / LINE);
+      if (rows) inputs.scroll(rows);
+      rolled -= rows * LINE;
+    },
+    { passive: false },
+  );
+}
+
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @param {HTMLElement} buttons
+ * @param {Inputs} inputs
+ * @param {() => boolean} listens whether inputs are for the view
+ */
+export function connectTouch(canvas, buttons, inputs, listens) {
+  /** @type {PointerEvent | null} */
+  let last = null;
+  canvas.addEventListener("pointerdown", (event) => {
+    if (event.pointerType !== "touch") return;
+    last = event;
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (event.pointerType !== "touch" || !last || last.pointerId !== event.pointerId || !listens()) return;
+    inputs.look(
+      (event.clientX - last.clientX) * TURN_PER_TOUCHED_PIXEL,
+      (event.clientY - last.clientY) * TURN_PER_TOUCHED_PIXEL,
+    );
+    last = event;
+  });
+  /** @type {Set<string>} */
+  const held = new Set();
+  const hold = () => {
+    inputs.hold("touch", summed(ACTIONS.filter((action) => held.has(action.name)).map((action) => action.axes ?? {})));
+  };
+  for (const button of buttons.querySelectorAll("button")) {
+    const { hold: name, press, scroll } = button.dataset;
+    if (!name) {
+      button.addEventListener("click", () => {
+        if (!listens()) return;
+        const action = ACTIONS.find((found) => found.press === press);
+        if (press && action?.press) inputs.press(action.press);
+        else inputs.scroll(Number(scroll));
+      });
+      continue;
+    }
+    button.addEventListener("pointerdown", (event) => {
+      event.preventDefault();
+      if (!listens()) return;
+      button.setPointerCapture(event.pointerId);
+      held.add(name);
+      hold();
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      button.addEventListener(end, () => {
+        if (held.delete(name)) hold();
+      });
+    }
+  }
+}

@@ -1,0 +1,56 @@
+// Types and constants of docs/protocol.md, made by `make client-protocol`; change them in experiments/web/protocol.py.
+
+/** @typedef {"jpeg" | "h264" | "none"} Codec */
+/** @typedef {"asked" | "hidden" | "disconnected" | "taken over"} PauseReason */
+/** @typedef {"loading" | "ready" | "running" | "paused" | "over" | "failed"} Phase */
+/** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; snapshots?: boolean }} View How a page wants to see the session: size in px, how frames are compressed, whether snapshots are sent. */
+/** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page, which may reconnect, its trial and its view. */
+/** @typedef {{ type: "takeover" }} TakeOver Continue here with a session that is open in another page; the answer to `occupied`. */
+/** @typedef {{ type: "run" }} Run Start the clock, or let it run again. */
+/** @typedef {{ number: number; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input A change at the keyboard, the mouse, a gamepad or a touch screen. */
+/** @typedef {{ type: "inputs"; inputs: Array<Input> }} Inputs What the person pressed, in order, each once. */
+/** @typedef {{ type: "seen"; frame: number }} Seen The browser has shown a frame, by its number. */
+/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "taken over" }} Pause Stop the clock; the reason is logged. */
+/** @typedef {{ type: "blur"; away: boolean }} Blur The page lost the keyboard to another window, or got it back; this is only logged. */
+/** @typedef {{ type: "leave" }} Leave End the trial now. */
+/** @typedef {{ type: "state"; phase: Phase; reason: string; input: number }} State The state of the session, why it is paused, over or failed, and the number of the last input that it received. */
+/** @typedef {{ type: "taken"; input: number; step: number }} Taken Everything up to this input and control step counts, and is safe on the disk. */
+/** @typedef {{ text: string; detail: string; picture: string | null; target_picture: string | null; number: number | null; done: boolean; current: boolean }} ChecklistItem A row of the task list. */
+/** @typedef {{ label: string; place: string; picture: string | null }} BinEntry A receptacle in the list that every condition shows: picture, name and semantic location. */
+/** @typedef {{ label: string | null; picture: string | null }} InventorySlot One hand: what it holds, or nothing. */
+/** @typedef {{ text: string; kind: "info" | "success" | "refusal"; opacity: number }} HudMessage Text of the message bar, and its opacity at this moment: 1 opaque, 0 gone. */
+/** @typedef {{ shape: "box" | "cylinder" | "sphere"; position: [number, number, number]; size: [number, number, number]; rgba: [number, number, number, number]; role: string; x_ray: boolean; object: string | null }} Marker A world-locked digital object. */
+/** @typedef {{ angle: number }} Pointer An arrow at the edge of the view towards a goal that is out of view. */
+/** @typedef {{ picture: string; bounds: [number, number, number, number]; position: [number, number]; heading: number; path: Array<[number, number]>; objects: Array<[number, number]>; goal: [number, number] | null }} MiniMap The house from above with north (+y) up. */
+/** @typedef {{ checklist_title: string; checklist: Array<ChecklistItem>; bins: Array<BinEntry>; inventory: [InventorySlot | null, InventorySlot]; message: HudMessage | null; markers: Array<Marker>; rerouted: boolean; delivered: number; total: number; clock: number | null; pointer: Pointer | null; minimap: MiniMap | null; scroll: number }} HudState Everything that is shown. */
+/** @typedef {{ type: "snapshot"; step: number; input: number; time: number; eye: Array<number>; objects: Record<string, Array<number>>; hud: HudState }} Snapshot Poses and HUD at the start of a control step, for clients that draw by themselves. */
+/** @typedef {{ type: "text"; message: string; title: string; rows: Array<string>; hands: Array<string> }} Text The HUD for screen readers: the message bar, the list's heading, its rows, the hands. */
+/** @typedef {{ type: "busy"; busy: boolean }} Busy Whether a pick or place is under way; keys pressed then are handled afterwards. */
+/** @typedef {{ type: "saved" }} Saved The run directory of a session that is over has been written. */
+/** @typedef {{ type: "queue"; position: number }} Queue All places are taken; the session opens by itself when it is its turn. Position 1 is next. */
+/** @typedef {{ type: "occupied" }} Occupied The session is open in another page; `takeover` continues here. */
+/** @typedef {{ type: "replaced" }} Replaced Another page took the session over; this connection is closed. */
+/** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was refused and does not count: a code, and the reason in words. */
+/** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} Frame A frame of a view, by number from 1: the start of a control step, the last input that counts, and the picture. */
+/** @typedef {Hello | TakeOver | Run | Inputs | View | Seen | Pause | Blur | Leave} FromBrowser */
+/** @typedef {State | Taken | Snapshot | Text | Busy | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
+
+export const FRAME_HEAD_BYTES = 28;
+/** @type {Record<number, Codec>} */
+export const CODECS = { 1: "jpeg", 2: "h264" };
+export const MAX_INPUTS = 64;
+export const KEY_FLAG = 1;
+export const REFUSED = 4000;
+export const REPLACED = 4001;
+export const IDLE = 4002;
+export const TOO_MUCH = 4003;
+export const SLOW = 4004;
+/** @type {Record<Phase, Record<string, Phase>>} phase -> trigger -> phase that follows */
+export const TRANSITIONS = {
+  loading: { opened: "ready", restored: "paused", end: "over", fail: "failed" },
+  ready: { run: "running", end: "over", fail: "failed" },
+  running: { pause: "paused", end: "over", fail: "failed" },
+  paused: { run: "running", end: "over", fail: "failed" },
+  over: { fail: "failed" },
+  failed: {  },
+};

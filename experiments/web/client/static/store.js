@@ -1,0 +1,31 @@
+// Values kept in this browser; where it keeps none (private windows), nothing is kept.
+
+/**
+ * @param {string} name
+ * @returns {any} null where nothing is kept
+ */
+export function load(name) {
+  try {
+    return JSON.parse(localStorage.getItem(name) ?? "null");
+  } catch {
+    return null;
+  }
+}
+
+/** @param {string} name @param {unknown} value */
+export function save(name, value) {
+  try {
+    localStorage.setItem(name, JSON.stringify(value));
+  } catch {
+    // Nothing is kept.
+  }
+}
+
+/** @param {string} name */
+export function remove(name) {
+  try {
+    localStorage.removeItem(name);
+  } catch {
+    // Nothing was kept.
+  }
+}

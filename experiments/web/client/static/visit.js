@@ -1,0 +1,14 @@
+// The link of the visit that was started in this browser, kept in this browser only.
+
+import { load, remove, save } from "./store.js";
+
+const NAME = "mjsim-visit";
+
+export const rememberVisit = () => save(NAME, location.pathname);
+export const forgetVisit = () => remove(NAME);
+
+/** The link, or null. */
+export function lastVisit() {
+  const link = load(NAME);
+  return typeof link === "string" && /^\/play\/[\w-]{43}$/.test(link) ? link : null;
+}

@@ -1,0 +1,62 @@
+// @vitest-environment happy-dom
+import { beforeEach, describe, expect, test, vi } from "vitest";
+
+import * as dialogs from "../static/dialogs.js";
+import { Panel } from "../static/panel.js";
+import { showText } from "../static/texts.js";
+
+/** @param {string} id */
+const text = (id) => document.getElementById(id)?.textContent;
+
+describe("the text of the display", () => {
+  beforeEach(() => {
+    document.body.innerHTML = '<p id="message"></p><h2 id="list-title"></h2><ul id="list"></ul><p id="hands"></p>';
+  });
+
+  test("has message, list and hands", () => {
+    showText({ type: "text", message: "Picked up.", title: "Your plan", rows: ["Mug.", "Done: Pan."], hands: ["Mug", "empty"] });
+    expect(["message", "list-title", "list", "hands"].map(text)).toEqual([
+      "Picked up.", "Your plan", "Mug.Done: Pan.", "Left hand: Mug. Right hand: empty.",
+    ]);
+  });
+
+  test("names one hand where there is one", () => {
+    showText({ type: "text", message: "", title: "", rows: [], hands: ["empty"] });
+    expect(text("hands")).toBe("Hand: empty.");
+  });
+});
+
+describe("dialogs", () => {
+  test.each(["asked", "hidden", "disconnected", "taken over"])("say why a session is paused: %s", (reason) => {
+    expect(dialogs.paused(reason)).toMatchObject({ title: "Paused", texts: [expect.stringMatching(/\.$/)] });
+  });
+
+  test("count objects and places", () => {
+    expect(dialogs.instructions("task", 1, "").texts[0]).toContain("the object into its bin");
+    expect(dialogs.instructions("task", 6, "").texts[0]).toContain("all 6 objects into their bins");
+    expect(dialogs.queue(1).texts[0]).toBe("You are next.");
+    expect(dialogs.queue(3).texts[0]).toBe("You are number 3 in the queue.");
+  });
+
+  test("explain the controls in the training", () => {
+    expect(dialogs.instructions("training", 1, dialogs.keyControls((name) => `<${name}>`)).texts[1]).toContain("<act> picks up");
+    expect(dialogs.loading(true).texts).not.toEqual(dialogs.loading(false).texts);
+  });
+
+  test("run the actions of their buttons", () => {
+    document.body.innerHTML =
+      '<dialog><h2></h2><div id="panel-text"></div><div id="panel-actions"></div></dialog>';
+    const dialog = document.querySelector("dialog");
+    if (!dialog) throw new Error("no dialog");
+    const run = vi.fn();
+    const closed = vi.fn();
+    const panel = new Panel(dialog, { run }, closed);
+    panel.show(dialogs.paused("asked"));
+    expect([panel.open, panel.title, document.activeElement?.textContent]).toEqual([true, "Paused", "Continue"]);
+    dialog.querySelector("button")?.click();
+    expect(run).toHaveBeenCalledOnce();
+    panel.hide();
+    panel.hide();
+    expect(closed).toHaveBeenCalledOnce();
+  });
+});

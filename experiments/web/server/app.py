@@ -1,0 +1,193 @@
+"""The server of `mjsim play`: pages, links, WebSockets. It simulates nothing; workers do (`experiments.web.worker`)."""
+
+import asyncio
+import logging
+import re
+import time
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
+
+from experiments.errors import RecordError
+from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
+from experiments.web.server.browser_socket import BrowserSocket
+from experiments.web.server.guards import Guards, Rate, allowed_hosts
+from experiments.web.server.limit import SessionLimit
+from experiments.web.server.pages import STATIC, message_page, page
+from experiments.web.server.pool import WorkerPool
+from experiments.web.server.sessions import Sessions
+from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, token_hash
+
+LOG = logging.getLogger("mjsim.play")
+MAX_QUEUE = 100  # visits that may wait for a place
+OPENED = re.compile(r"\d{1,15}")  # ms since 1970
+MAX_READING = 24 * 3600.0  # s; a page may stay open over night
+NEW_VISITS = 30, 60.0  # visits from one address, within this time, s
+INTERNAL_ERROR = "Internal server error"
+
+
+@dataclass(frozen=True)
+class PlayConfig:
+    """Settings of a server: the options of `mjsim play`, and the settings of the trials `training` and `task`."""
+
+    phases: Sequence[str]
+    trials: Mapping[str, dict[str, Any]]
+    folder: Path
+    sessions: int = 1
+    idle: float = 1800.0
+    film: Path | None = None
+    story: str = ""
+
+
+class PlayServer:
+    """Pages and sockets, and all sessions."""
+
+    def __init__(self, config: PlayConfig, pool: WorkerPool) -> None:
+        self._config = config
+        self._visits = Visits(config.folder)
+        self._pool, self._limit = pool, SessionLimit(config.sessions)
+        self.sessions = Sessions(pool, self._limit, config.idle)
+        self._new = Rate(*NEW_VISITS)
+
+    def app(self, host: str, public: str | None = None) -> Starlette:
+        """The ASGI application that listens at `host`; `public` is the URL under which a proxy makes it public."""
+        return Starlette(
+            routes=[
+                Route("/", self._story),
+                Route("/visits", self._begin, methods=["POST"]),
+                Route("/play/{token}", self._visit),
+                Route("/play/{token}/film", self._film),
+                Route("/play/{token}/film", self._film_seen, methods=["POST"]),
+                Route("/play/{token}/floor-plan.png", self._floor_plan),
+                WebSocketRoute("/play/{token}", self._play),
+                Mount("/static", StaticFiles(directory=STATIC)),
+            ],
+            middleware=[
+                Middleware(
+                    TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, public), www_redirect=False
+                ),
+                Middleware(Guards, public=public),
+            ],
+            exception_handlers={
+                404: _not_found,
+                RecordError: _damaged,
+                OSError: _damaged,
+                Exception: _failed,
+            },
+            lifespan=self._lifespan,
+        )
+
+    @asynccontextmanager
+    async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
+        watching = asyncio.create_task(self.sessions.watch())
+        try:
+            yield
+        finally:
+            watching.cancel()
+            with suppress(asyncio.CancelledError):
+                await watching
+            await self.sessions.release()
+            await self._pool.close()
+
+    async def _story(self, request: Request) -> Response:
+        return page(
+            request,
+            "story",
+            story=[text for text in self._config.story.split("\n\n") if text.strip()],
+            condition=str(self._config.trials[TASK]["assistance"]).split("-")[0],
+            training=TRAINING in self._config.phases,
+            opened=round(1000.0 * time.time()),
+        )
+
+    async def _begin(self, request: Request) -> Response:
+        if not self._new.allows(request.client.host if request.client else ""):
+            return message_page(request, 429, "Too many visits", "Please wait a minute, then try again.")
+        if self._limit.waiting >= MAX_QUEUE:
+            return message_page(request, 503, "All places are taken", "Please come back later.")
+        left_out = (STORY,) if self._config.film else (STORY, FLYTHROUGH)
+        phases = [name for name in self._config.phases if name not in left_out]
+        token = self._visits.create(phases, self._config.trials, self._reading(await request.body()))
+        LOG.info("session %s begins", token_hash(token)[:12])
+        return RedirectResponse(f"/play/{token}", 303)
+
+    def _reading(self, form: bytes) -> list[Ended]:
+        """The phase of reading the story; its form tells when the page was made."""
+        if STORY not in self._config.phases:
+            return []
+        opened = parse_qs(form.decode("ascii", "replace")).get("opened", [""])[0]
+        seconds = time.time() - int(opened) / 1000.0 if OPENED.fullmatch(opened) else 0.0
+        return [Ended(STORY, round(min(max(0.0, seconds), MAX_READING), 3))]
+
+    async def _visit(self, request: Request) -> Response:
+        visit = self._visits.find(request.path_params["token"])
+        if visit is None:
+            return await _not_found(request, None)
+        if visit.phase == FLYTHROUGH and self._config.film is None:
+            visit.finish(FLYTHROUGH)
+        if visit.phase == FLYTHROUGH:
+            visit.show()
+            return page(request, "film")
+        if visit.phase in PLAYED:
+            objects = visit.settings(visit.phase)["objects"]
+            return page(request, "play", trial=visit.phase, objects=objects)
+        return page(request, "result", metrics=visit.metrics(TASK))
+
+    async def _film(self, request: Request) -> Response:
+        visit = self._visits.find(request.path_params["token"])
+        if visit is None or self._config.film is None:
+            return await _not_found(request, None)
+        return FileResponse(self._config.film, media_type="video/mp4")
+
+    async def _film_seen(self, request: Request) -> Response:
+        visit = self._visits.find(request.path_params["token"])
+        if visit is None:
+            return await _not_found(request, None)
+        visit.finish(FLYTHROUGH)
+        return RedirectResponse(request.url.path.removesuffix("/film"), 303)
+
+    async def _floor_plan(self, request: Request) -> Response:
+        visit = self._visits.find(request.path_params["token"])
+        if visit is None or visit.phase != RESULT or not visit.floor_plan.is_file():
+            return await _not_found(request, None)
+        return FileResponse(visit.floor_plan, media_type="image/png")
+
+    async def _play(self, socket: WebSocket) -> None:
+        try:
+            visit = self._visits.find(socket.path_params["token"])
+        except (RecordError, OSError) as error:
+            LOG.error("%s", error)
+            visit = None
+        if visit is None:
+            await socket.close(1008)
+            return
+        await socket.accept()
+        await BrowserSocket(socket).serve(self.sessions.of(visit), visit.phase)
+
+
+async def _not_found(request: Request, _: Any) -> Response:
+    if request.url.path.startswith("/static"):
+        return PlainTextResponse("not found\n", 404)
+    return message_page(request, 404, "This page does not exist", "The link may be incomplete.")
+
+
+async def _damaged(request: Request, error: Exception) -> Response:
+    LOG.error("%s", error)
+    return message_page(
+        request, 500, INTERNAL_ERROR, "The server cannot read or write its files at the moment."
+    )
+
+
+async def _failed(request: Request, _: Exception) -> Response:
+    return message_page(request, 500, INTERNAL_ERROR, "What you did so far is kept. Please try again.")

@@ -1,0 +1,139 @@
+"""The WebSocket of a browser: checks what comes in, and sends without ever waiting for a slow browser."""
+
+import asyncio
+import time
+from contextlib import suppress
+from typing import NoReturn
+
+import msgspec
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from experiments.web import protocol
+from experiments.web.protocol import Error, Hello, Occupied, Saved, Snapshot, State, TakeOver, WireMessage
+from experiments.web.server.played_session import PlayedSession
+from experiments.web.state import OVER
+
+HELLO_TIMEOUT = 10.0  # s for the first message
+CLOSE_TIMEOUT = 0.5  # s that the connection before has to end, as when a page is reloaded
+MAX_WAITING = 300  # messages that wait to be sent
+MAX_WAITING_FOR_SNAPSHOTS = 8  # with more than these waiting, no snapshots are sent
+RATE, BURST = 200.0, 400.0  # messages a second, and at once
+MAX_ERRORS = 50  # refused messages of one connection
+
+
+class BrowserSocket:
+    """An accepted connection of a browser. A separate task sends the messages in order."""
+
+    def __init__(self, socket: WebSocket) -> None:
+        self._tab = ""
+        self._socket = socket
+        self._waiting: asyncio.Queue[WireMessage | tuple[int, str]] = asyncio.Queue()
+        self._allowed, self._at = BURST, time.monotonic()
+        self._errors = 0
+
+    def send(self, message: WireMessage) -> None:
+        """Send a message, without waiting; a browser that does not keep up is disconnected."""
+        waiting = self._waiting.qsize()
+        if isinstance(message, Snapshot) and waiting > MAX_WAITING_FOR_SNAPSHOTS:
+            return
+        if waiting < MAX_WAITING:
+            self._waiting.put_nowait(message)
+        elif waiting == MAX_WAITING:
+            self.close(protocol.SLOW, "too slow")
+
+    def close(self, code: int, reason: str) -> None:
+        """Close the connection once all is sent."""
+        self._waiting.put_nowait((code, reason))
+
+    async def serve(self, session: PlayedSession, trial: str) -> None:
+        """Serve until the browser is gone; `trial` is the phase of the visit that is under way."""
+        sending = asyncio.create_task(self._send_all())
+        receiving = asyncio.create_task(self._receive_all(session, trial))
+        try:
+            await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
+            session.detach(self)
+            self.close(protocol.REFUSED, "")
+            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # the last message is still to be sent
+        finally:
+            session.detach(self)
+            for task in (sending, receiving):
+                task.cancel()
+                with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError):
+                    await task
+
+    async def _send_all(self) -> None:
+        with suppress(WebSocketDisconnect, RuntimeError, OSError):  # the browser is gone
+            while isinstance(item := await self._waiting.get(), WireMessage):
+                if isinstance(item, protocol.Frame):
+                    await self._socket.send_bytes(item.packed())
+                else:
+                    await self._socket.send_text(protocol.encode_to_browser(item).decode())
+            await self._socket.close(*item)
+
+    async def _receive_all(self, session: PlayedSession, trial: str) -> None:
+        try:
+            hello = await asyncio.wait_for(self._hello(), HELLO_TIMEOUT)
+        except TimeoutError:
+            self._end(Error("idle", "no hello was received"))
+        if hello.trial != trial:
+            self.send(State(OVER))
+            self.send(Saved())
+            return
+        self._tab = hello.tab
+        await self._wait_for_place(session)
+        session.attach(self, hello.view)
+        while True:
+            message = await self._receive()
+            if isinstance(message, Hello | TakeOver):
+                self._refuse(Error("out of order", "the connection is open already"))
+            elif (error := session.take(message)) is not None:
+                self._refuse(error)
+
+    async def _hello(self) -> Hello:
+        while not isinstance(message := await self._receive(), Hello):
+            self._refuse(Error("too early", "the first message must be hello"))
+        return message
+
+    async def _wait_for_place(self, session: PlayedSession) -> None:
+        """Wait until no other page has the session, or this one is to take it over."""
+        until = time.monotonic() + CLOSE_TIMEOUT
+        while (before := session.browser) is not None and before._tab != self._tab:
+            if time.monotonic() < until:
+                await asyncio.sleep(0.05)
+                continue
+            self.send(Occupied())
+            while not isinstance(await self._receive(), TakeOver):
+                self._refuse(Error("too early", "the session is open in another page"))
+            return
+
+    async def _receive(self) -> WireMessage:
+        """The next well-formed message; `WebSocketDisconnect` is raised once the browser is gone."""
+        while True:
+            event = await self._socket.receive()
+            if event["type"] != "websocket.receive":
+                raise WebSocketDisconnect(event.get("code", 1006))
+            self._check_rate()
+            try:
+                message: WireMessage = protocol.decode_from_browser(event.get("text") or "")
+            except (msgspec.DecodeError, RecursionError) as error:
+                self._refuse(Error("malformed", str(error) or "nested too deeply"))
+            else:
+                return message
+
+    def _check_rate(self) -> None:
+        now = time.monotonic()
+        self._allowed = min(BURST, self._allowed + (now - self._at) * RATE) - 1.0
+        self._at = now
+        if self._allowed < 0.0:
+            self._end(Error("too much", f"at most {RATE:.0f} messages a second"))
+
+    def _refuse(self, error: Error) -> None:
+        self._errors += 1
+        if self._errors > MAX_ERRORS:
+            self._end(Error("too much", f"more than {MAX_ERRORS} messages were refused"))
+        self.send(error)
+
+    def _end(self, error: Error) -> NoReturn:
+        self.send(error)
+        self.close(protocol.TOO_MUCH, error.code)
+        raise WebSocketDisconnect(protocol.TOO_MUCH)

@@ -1,0 +1,115 @@
+"""Checks of every request before the pages see it, and the headers of every answer."""
+
+import socket
+import time
+from collections.abc import Mapping, Sequence
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+MAX_BODY = 4096  # bytes of a form
+HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; media-src 'self'; "
+    "connect-src 'self' {sockets}; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+)
+
+
+def allowed_hosts(host: str, public: str | None) -> Sequence[str]:
+    """Names of a server that listens at `host`; any other would be that of another site, rebound to this address."""
+    addresses = {host, "127.0.0.1", "::1"}
+    if host in ("0.0.0.0", "::"):
+        addresses |= _own_addresses()
+    names = {f"[{address}]" if ":" in address else address for address in addresses}
+    public_name = urlsplit(public or "").hostname
+    return sorted({*names, "localhost", socket.gethostname().lower(), public_name or "localhost"})
+
+
+def _own_addresses() -> set[str]:
+    found = set()
+    for family, target in ((socket.AF_INET, "192.0.2.1"), (socket.AF_INET6, "2001:db8::1")):
+        try:
+            with socket.socket(family, socket.SOCK_DGRAM) as probe:
+                probe.connect((target, 9))  # sends nothing; chooses the interface that leads outside
+                found.add(str(probe.getsockname()[0]))
+            found |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None, family)}
+        except OSError:
+            continue  # no network of this family
+    return found
+
+
+class Guards:
+    """ASGI middleware: checks `Origin`, limits bodies, adds headers."""
+
+    def __init__(self, app: ASGIApp, public: str | None) -> None:
+        self._app = app
+        self._public = urlsplit(public or "")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handle a request or a WebSocket."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        origin = self._origin(headers.get("host", ""))
+        refusal = _refusal(scope, headers, origin)
+        if scope["type"] == "websocket" and refusal is not None:
+            await receive()
+            await send({"type": "websocket.close", "code": 1008})
+            return
+
+        async def send_guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                _add_headers(MutableHeaders(scope=message), origin)
+            await send(message)
+
+        app = self._app if refusal is None else PlainTextResponse(f"{refusal[1]}\n", refusal[0])
+        await app(scope, receive, send_guarded)
+
+    def _origin(self, host: str) -> str:
+        """Origin of the pages that are served under a `Host`."""
+        public = host == self._public.netloc and self._public.scheme == "https"
+        return f"{'https' if public else 'http'}://{host}"
+
+
+class Rate:
+    """Limits to `count` times in `period` seconds what is done from one address."""
+
+    def __init__(self, count: int, period: float) -> None:
+        self._count, self._period = count, period
+        self._log: list[tuple[float, str]] = []
+
+    def allows(self, address: str) -> bool:
+        """Whether once more is allowed; that counts."""
+        now = time.monotonic()
+        self._log = [(at, who) for at, who in self._log if now - at < self._period]
+        allowed = sum(who == address for _, who in self._log) < self._count
+        self._log += [(now, address)] * allowed
+        return allowed
+
+
+def _refusal(scope: Scope, headers: Mapping[str, str], origin: str) -> tuple[int, str] | None:
+    """Status and text where a request is refused."""
+    changes = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
+    if changes and headers.get("origin") != origin:
+        return 403, "This request does not come from a page of this server."
+    length = headers.get("content-length", "0")
+    if "transfer-encoding" in headers or not length.isdecimal() or int(length) > MAX_BODY:
+        return 413, f"At most {MAX_BODY} bytes are accepted."
+    return None
+
+
+def _add_headers(headers: MutableHeaders, origin: str) -> None:
+    for name, value in HEADERS.items():
+        headers[name] = value
+    headers.setdefault("Cache-Control", "no-store")
+    headers["Content-Security-Policy"] = POLICY.format(sockets=origin.replace("http", "ws", 1))

@@ -1,0 +1,199 @@
+"""A session under way: joins a visit, its worker, and the browser that is connected."""
+
+import asyncio
+import logging
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from experiments.web import protocol
+from experiments.web.protocol import Error, Inputs, Leave, Open, Pause, Run, Saved, State, Taken, View
+from experiments.web.server.limit import SessionLimit
+from experiments.web.server.pool import WorkerPool, WorkerProcess
+from experiments.web.server.visits import PLAYED, Visit
+from experiments.web.state import FAILED, LOADING, READY, Trigger
+
+if TYPE_CHECKING:
+    from experiments.web.server.browser_socket import BrowserSocket
+
+LOG = logging.getLogger("mjsim.play")
+MAX_CRASHES = 3  # of workers in a row, without an input taken in between, after which a session fails
+QUEUE_TIMEOUT = 10.0  # s that a place in the queue is kept without a connection
+MAX_AHEAD = 1000  # inputs that may be on their way
+FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
+
+
+class PlayedSession:
+    """The training or the task of a visit.
+
+    Attributes:
+        visit: The visit.
+        browser: The one that is connected, or None.
+        heard: When the person last did something, as `time.monotonic` has it.
+        state: Copy of the worker's state.
+    """
+
+    def __init__(self, visit: Visit, pool: WorkerPool, limit: SessionLimit) -> None:
+        self.visit = visit
+        self.browser: BrowserSocket | None = None
+        self.heard = time.monotonic()
+        self.state = State()
+        self._pool, self._limit = pool, limit
+        self._task: asyncio.Task[None] | None = None
+        self._worker: WorkerProcess | None = None
+        self._view: View | None = None
+
+    def attach(self, browser: "BrowserSocket", view: View) -> None:
+        """Connect a browser; it replaces the one before."""
+        if self.browser is not None:
+            self.browser.send(protocol.Replaced())
+            self.browser.close(protocol.REPLACED, "the session is open elsewhere")
+            self._pause("taken over")
+        self.browser, self.heard = browser, time.monotonic()
+        self.take(view)
+        if self._task is None:
+            self._task = asyncio.create_task(self._run())
+        elif (position := self._limit.position(self._tell_position)) is not None:
+            browser.send(protocol.Queue(position))
+        else:
+            browser.send(self.state)
+
+    def detach(self, browser: "BrowserSocket") -> None:
+        """A browser is gone; the session is paused until one is back."""
+        if self.browser is not browser:
+            return
+        self.browser = None
+        self.heard = time.monotonic()
+        self._pause("disconnected")
+        if self._limit.position(self._tell_position) is not None:
+            asyncio.get_running_loop().call_later(QUEUE_TIMEOUT, self._leave_queue)
+
+    def take(self, message: Any) -> Error | None:
+        """Take a message from the browser; why it was refused, or None."""
+        if not isinstance(message, protocol.Seen):
+            self.heard = time.monotonic()
+        match message:
+            case View():
+                self._view = message
+            case Inputs() if self.state.phase is LOADING:
+                return None  # the browser keeps them, and sends them again
+            case Inputs(inputs):
+                numbers = [new.number for new in inputs]
+                if (error := self._input_error(numbers)) is not None:
+                    return error
+                self.state = msgspec.structs.replace(self.state, input=max(self.state.input, *numbers, 0))
+            case Run() | Leave() if self.state.phase is LOADING:
+                return Error("too early", "the session is not ready")
+            case Run():
+                self.state = self.state.after(Trigger.RUN)
+            case Pause(reason):
+                self._pause(reason)
+                return None
+        self._send(message)
+        return None
+
+    async def release(self) -> None:
+        """Give worker and place back; the journal holds everything."""
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
+
+    def _input_error(self, numbers: list[int]) -> Error | None:
+        if self.state.phase is READY:
+            return Error("too early", "the clock has not been started")
+        if numbers != sorted(set(numbers)):
+            return Error("out of order", "numbers of inputs must ascend")
+        if numbers and numbers[-1] > self.state.input + MAX_AHEAD:
+            return Error("out of order", f"input {numbers[-1]} follows input {self.state.input}")
+        return None
+
+    def _pause(self, reason: protocol.PauseReason) -> None:
+        self.state = self.state.after(Trigger.PAUSE, reason)
+        self._send(Pause(reason))
+
+    def _leave_queue(self) -> None:
+        waits = self._limit.position(self._tell_position) is not None
+        if self.browser is None and waits and self._task is not None:
+            self._task.cancel()
+            self._task = None
+
+    def _tell_position(self, position: int) -> None:
+        self._tell(protocol.Queue(position))
+
+    def _send(self, message: protocol.WireMessage) -> None:
+        if self._worker is not None:
+            self._worker.send(message)
+
+    def _tell(self, message: protocol.WireMessage) -> None:
+        if self.browser is not None:
+            self.browser.send(message)
+
+    def _set(self, state: State) -> None:
+        self.state = state
+        self._tell(state)
+
+    async def _run(self) -> None:
+        """Play what is left of the visit."""
+        await self._limit.acquire(self._tell_position)
+        try:
+            while self.visit.phase in PLAYED:
+                await self._play(self.visit.phase)
+        except OSError as error:
+            LOG.error("session %s: %s", self.visit.name[:12], error)
+            self._set(State(FAILED, FAILURE))
+        except Exception:
+            LOG.exception("session %s", self.visit.name[:12])
+            self._set(State(FAILED, FAILURE))
+        finally:
+            self._limit.release()
+            self._discard_worker()
+            if self._task is asyncio.current_task():
+                self._task = None
+
+    async def _play(self, trial: str) -> None:
+        """Play a trial to its end, with another worker whenever one dies."""
+        visit, crashes = self.visit, 0
+        opening = Open(
+            str(visit.journal(trial)), str(visit.run(trial)), visit.settings(trial), visit.before(trial)
+        )
+        while crashes < MAX_CRASHES:
+            self._set(State())
+            worker = self._worker = self._worker or await self._pool.start()
+            worker.send(opening)
+            if self._view is not None:
+                worker.send(self._view)
+            while (message := await worker.receive()) is not None:
+                match message:
+                    case State(phase, reason) if phase is FAILED:
+                        raise OSError(reason)
+                    case State(input=number):
+                        message = msgspec.structs.replace(message, input=max(number, self.state.input))
+                        self.state = message
+                    case Taken():
+                        crashes = 0
+                    case Saved():
+                        self._finish(trial)
+                        return
+                self._tell(message)
+            LOG.warning("session %s: its worker died", visit.name[:12])
+            self._discard_worker()
+            crashes += 1
+        raise OSError(f"the worker crashed {MAX_CRASHES} times in a row")
+
+    def _finish(self, trial: str) -> None:
+        visit = self.visit
+        metrics = visit.metrics(trial)
+        visit.finish(trial, metrics.get("completion_time_s", 0.0), metrics["ended"])
+        LOG.info(
+            "session %s: %s is over (%s): %s", visit.name[:12], trial, metrics["ended"], visit.run(trial)
+        )
+        self._tell(Saved())
+
+    def _discard_worker(self) -> None:
+        if self._worker is not None:
+            self._pool.discard(self._worker)
+            self._worker = None

@@ -1,0 +1,48 @@
+"""All sessions under way, and which of them give their place to others."""
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from experiments.web import protocol
+from experiments.web.server.limit import SessionLimit
+from experiments.web.server.played_session import PlayedSession
+from experiments.web.server.pool import WorkerPool
+from experiments.web.server.visits import Visit
+
+WATCH_PERIOD = 5.0  # s between two looks for sessions whose person is gone
+MAX_AWAY = 20.0  # s that a place is kept without a page while others wait
+
+
+class Sessions:
+    """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back."""
+
+    def __init__(self, pool: WorkerPool, limit: SessionLimit, idle: float) -> None:
+        self._pool, self._limit, self._idle = pool, limit, idle
+        self._sessions: dict[str, PlayedSession] = {}
+
+    def of(self, visit: Visit) -> PlayedSession:
+        """The session of a visit."""
+        if visit.name not in self._sessions:
+            self._sessions[visit.name] = PlayedSession(visit, self._pool, self._limit)
+        return self._sessions[visit.name]
+
+    async def watch(self) -> None:
+        """Release sessions whose person is gone, for ever."""
+        while True:
+            await asyncio.sleep(WATCH_PERIOD)
+            await self.release(self._is_idle)
+
+    async def release(self, which: Callable[[PlayedSession], bool] = lambda _: True) -> None:
+        """Release the sessions that `which` chooses."""
+        for session in [session for session in self._sessions.values() if which(session)]:
+            if session.browser is not None:
+                session.browser.send(protocol.Error("idle", "nothing was received for a long time"))
+                session.browser.close(protocol.IDLE, "idle")
+            await session.release()
+            self._sessions.pop(session.visit.name, None)
+
+    def _is_idle(self, session: PlayedSession) -> bool:
+        """Whether the person has been gone for long; for less long where others wait and the page is closed."""
+        closed = session.browser is None and self._limit.waiting > 0
+        return time.monotonic() - session.heard > (min(MAX_AWAY, self._idle) if closed else self._idle)

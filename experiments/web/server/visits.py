@@ -1,0 +1,153 @@
+"""Visits of people, kept on the disk: which link belongs to which folder, and the phase that is under way.
+
+A link holds a token that cannot be guessed. Only its SHA-256 is kept, as the name of the visit's folder.
+"""
+
+import hashlib
+import re
+import secrets
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from experiments.errors import RecordError
+from experiments.record import records
+from experiments.record.journal import sync_folder
+from experiments.record.phases import TASK, TRAINING
+from mjsim.files import write_text_atomically
+
+VISIT = "visit.json"
+JOURNALS = "journals"
+TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")
+RESULT = "result"  # follows the last phase
+PLAYED = (TRAINING, TASK)
+
+
+class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A phase that is over, as the event `phase_ended` has it; `reason` tells why a training ended."""
+
+    phase: str
+    duration_s: float
+    reason: str | None = None
+
+
+class _Stored(msgspec.Struct, frozen=True):
+    """`visit.json`."""
+
+    phase: str  # phase that is next or under way
+    phases: list[str]  # all phases, in order
+    trials: dict[str, dict[str, Any]]  # settings of the trials, by phase
+    ended: list[Ended] = []  # phases that are over
+    # when the phase was shown first, s since 1970; None if it was not, or has a clock of its own
+    shown: float | None = None
+    version: int = 1  # of this format
+
+
+class Visit:
+    """The visit of one person; its folder is named after the hash of its token."""
+
+    def __init__(self, folder: Path, stored: _Stored) -> None:
+        self._folder, self._stored = folder, stored
+
+    @property
+    def name(self) -> str:
+        """SHA-256 of the token, hexadecimal."""
+        return self._folder.name
+
+    @property
+    def phase(self) -> str:
+        """Phase that is next or under way; `result` after the last one."""
+        return self._stored.phase
+
+    def settings(self, phase: str) -> dict[str, Any]:
+        """Settings of the trial of a phase."""
+        return self._stored.trials[phase]
+
+    def run(self, phase: str) -> Path:
+        """Run directory of a phase."""
+        return self._folder / phase
+
+    def journal(self, phase: str) -> Path:
+        """Folder of a phase's journal."""
+        return self._folder / JOURNALS / phase
+
+    def before(self, phase: str) -> list[dict[str, Any]]:
+        """The phases before the task as `phase_ended` events; none for other phases."""
+        return [msgspec.to_builtins(ended) for ended in self._stored.ended] if phase == TASK else []
+
+    def show(self) -> None:
+        """Note when the phase was shown for the first time."""
+        if self._stored.shown is None:
+            self._save(shown=time.time())
+
+    def finish(self, phase: str, duration: float | None = None, reason: str | None = None) -> None:
+        """Move to the next phase; nothing happens if the visit is further already.
+
+        The duration, s, is by default the time since the phase was shown; `reason` says why a training ended.
+        """
+        if phase != self.phase:
+            return
+        stored, now = self._stored, time.time()
+        if duration is None:
+            duration = max(0.0, now - (stored.shown or now))
+        after = stored.phases[stored.phases.index(phase) + 1 :]
+        ended = [*stored.ended, Ended(phase, round(duration, 3), reason)]
+        self._save(phase=after[0] if after else RESULT, ended=ended, shown=None)
+
+    @property
+    def floor_plan(self) -> Path:
+        """Picture of the paths in the task."""
+        return self.run(TASK) / records.TOPDOWN
+
+    def metrics(self, phase: str) -> dict[str, Any]:
+        """Content of `metrics.json` of a phase's run directory."""
+        found: dict[str, Any] = msgspec.json.decode((self.run(phase) / records.METRICS).read_bytes())
+        return found
+
+    def _save(self, **changes: Any) -> None:
+        self._stored = msgspec.structs.replace(self._stored, **changes)
+        write_text_atomically(self._folder / VISIT, msgspec.json.encode(self._stored).decode())
+        sync_folder(self._folder)
+
+
+class Visits:
+    """All visits in a folder, which is made if it is missing."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder = folder
+        self._known: dict[str, Visit] = {}
+
+    def create(
+        self, phases: Sequence[str], trials: Mapping[str, dict[str, Any]], ended: Sequence[Ended] = ()
+    ) -> str:
+        """Start a visit with the phases to come, settings of their trials, and phases that are over; its token."""
+        token = secrets.token_urlsafe(32)
+        folder = self._folder / token_hash(token)
+        folder.mkdir()
+        visit = Visit(folder, _Stored(phases[0], list(phases), dict(trials), list(ended)))
+        visit._save()
+        sync_folder(self._folder)
+        self._known[visit.name] = visit
+        return token
+
+    def find(self, token: str) -> Visit | None:
+        """The visit that a token belongs to; a RecordError where its file is damaged."""
+        if not TOKEN.fullmatch(token):
+            return None
+        name = token_hash(token)
+        path = self._folder / name / VISIT
+        if name not in self._known and path.is_file():
+            try:
+                self._known[name] = Visit(path.parent, msgspec.json.decode(path.read_bytes(), type=_Stored))
+            except msgspec.DecodeError as error:
+                raise RecordError(f"{path} is damaged: {error}") from error
+        return self._known.get(name)
+
+
+def token_hash(token: str) -> str:
+    """SHA-256 of a token, hexadecimal."""
+    return hashlib.sha256(token.encode()).hexdigest()

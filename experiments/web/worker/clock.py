@@ -1,0 +1,101 @@
+"""The clock of a session: a control step every 40 ms, none skipped, each acknowledged once it is on the disk."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from experiments.web.protocol import Taken, WireMessage
+from experiments.web.state import OVER, READY, RUNNING, Trigger
+from experiments.web.worker.control import SessionControl
+from experiments.web.worker.live_session import LiveSession
+
+LATE = 0.02  # s after its time at which a control step counts as late
+MAX_LAG = 1.0  # s behind schedule from which the process must have been stopped: the clock restarts from now
+SHOW_PERIOD = 0.1  # s between two looks at a session that is not running
+
+Send = Callable[[WireMessage], None]
+
+
+class Clock:
+    """Steps a session in real time; `sync` writes its journal through to the disk."""
+
+    def __init__(
+        self, live: LiveSession, control: SessionControl, sync: Callable[[], None], send: Send
+    ) -> None:
+        self._live, self._control = live, control
+        self._acknowledger = _Acknowledger(sync, send)
+
+    def run(self) -> str:
+        """Run until the session is over; the reason. After a failure, run until the server ends this process."""
+        live, control = self._live, self._control
+        due = time.monotonic()
+        try:
+            while live.end_reason is None and (phase := control.state.phase) is not OVER:
+                if phase is not READY:
+                    self._log_notes()
+                if phase is RUNNING:
+                    due = self._step_at(due)
+                else:
+                    live.session.show()
+                    control.wait_for_change(phase, SHOW_PERIOD)
+                    due = time.monotonic()
+            self._log_notes()
+        finally:
+            self._acknowledger.close()
+        self._acknowledger.check()
+        control.apply(Trigger.END, live.end_reason or "")
+        return control.state.reason
+
+    def _step_at(self, due: float) -> float:
+        """Take a control step at its time; when the next one is due."""
+        session = self._live.session
+        late = time.monotonic() - due
+        if late < 0.0:
+            time.sleep(-late)
+        elif late > LATE:
+            session.note("overrun", seconds=round(late, 3), skipped=late > MAX_LAG)
+            due += late if late > MAX_LAG else 0.0
+        self._acknowledger.check()
+        self._live.step(self._control.take_inputs())
+        if self._live.end_reason is None:
+            session.show()  # now rather than in the next step: the browser sees it 40 ms earlier
+        self._acknowledger.request(self._live.input, session.record.step)
+        return due + self._live.world.control_timestep
+
+    def _log_notes(self) -> None:
+        for event, fields in self._control.take_notes():
+            self._live.session.note(event, **fields)
+
+
+class _Acknowledger:
+    """Writes the journal through to the disk in a thread of its own, then acknowledges what it holds."""
+
+    def __init__(self, sync: Callable[[], None], send: Send) -> None:
+        self._sync, self._send = sync, send
+        self._thread = ThreadPoolExecutor(1, "journal")
+        self._newest = 0
+        self._error: OSError | None = None
+
+    def request(self, number: int, step: int) -> None:
+        """Everything up to this input and control step is in the journal."""
+        self._newest = step
+        self._thread.submit(self._acknowledge, number, step)
+
+    def check(self) -> None:
+        """Raise the error of a disk that did not take what was written."""
+        if self._error is not None:
+            raise self._error
+
+    def close(self) -> None:
+        """Wait until all is written."""
+        self._thread.shutdown()
+
+    def _acknowledge(self, number: int, step: int) -> None:
+        if step < self._newest or self._error is not None:
+            return  # a later call writes this as well
+        try:
+            self._sync()
+        except OSError as error:
+            self._error = error
+        else:
+            self._send(Taken(number, step))

@@ -1,0 +1,187 @@
+"""Draws the person's view: the newest state, as large and as often as possible."""
+
+import dataclasses
+import math
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from experiments.house import House
+from experiments.session.film_config import FilmConfig
+from experiments.session.first_person import FirstPersonRenderer
+from experiments.session.user_code import describe
+from experiments.web.protocol import Frame, View
+from experiments.web.state import Trigger
+from experiments.web.worker.clock import Send
+from experiments.web.worker.control import SessionControl
+from experiments.web.worker.encoders import Encoder, H264Encoder, Image, JpegEncoder
+from experiments.web.worker.frame_size import FIRST_SIZE, SIZES, FrameSize, pause_after
+from hud.projection import CameraView
+from hud.state import HudState
+from mjsim.model.avatar import EYE
+from mjsim.model.scene import Scene
+from mjsim.render import FAST
+from mjsim.render.cameras import camera_pose
+from mjsim.world import World
+
+ASPECT = 4 / 3  # of all sizes
+COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # of the smallest size
+MAX_IN_FLIGHT = 3  # frames sent that the browser has not yet shown
+
+
+class _Moment(NamedTuple):
+    """A state to draw: a copy of the simulator's data, the HUD, the control step, the last input."""
+
+    data: Any
+    hud: HudState
+    step: int
+    input: int
+
+    def content(self) -> tuple[bytes, HudState]:
+        """What a frame depends on; the clock shows whole seconds."""
+        clock = None if self.hud.clock is None else float(math.floor(self.hud.clock))
+        return self.data.qpos.tobytes(), dataclasses.replace(self.hud, clock=clock)
+
+
+class _Job(NamedTuple):
+    """A frame to draw, for which view, whether it has to be a key frame, how long it waited for the link, s."""
+
+    moment: _Moment
+    view: View
+    key: bool
+    waited: float
+
+
+class Drawer:
+    """Draws and sends frames in a separate thread until it is closed; the session fails if nothing can be drawn."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        house: House,
+        pictures: Callable[[], dict[str, Image]],
+        send: Send,
+        control: SessionControl,
+    ) -> None:
+        self._scene, self._house, self._pictures = scene, house, pictures
+        self._send, self._control = send, control
+        self._changed = threading.Condition()
+        self._view: View | None = None
+        self._moment: _Moment | None = None
+        self._drawn: object = None
+        self._sent = self._seen = 0
+        self._key = self._closed = False
+        self._spare: list[Any] = []  # copies of states that are not needed any more
+        self._renderers: dict[int, FirstPersonRenderer] = {}
+        self._thread = threading.Thread(target=self._run, name="drawing", daemon=True)
+        self._thread.start()
+
+    def set_view(self, view: View) -> None:
+        """Draw for a browser that has just connected; its first frame is a key frame."""
+        with self._changed:
+            self._view, self._key, self._drawn = view, True, None
+            if view.codec == "none":
+                self._drop(self._moment)
+                self._moment = None
+            self._sent = self._seen = 0
+            self._changed.notify()
+
+    def camera_view(self, data: Any) -> CameraView:
+        """The eye camera, in the shape of the frames."""
+        pose = camera_pose(self._scene.model, data, EYE, ASPECT)
+        return CameraView(pose.position, pose.rotation, pose.fovy, *SIZES[FIRST_SIZE])
+
+    def note_seen(self, frame: int) -> None:
+        """The browser has shown a frame."""
+        with self._changed:
+            self._seen = max(self._seen, min(frame, self._sent))
+            self._changed.notify()
+
+    def draw(self, world: World, state: HudState, step: int, number: int) -> None:
+        """Take what is to be drawn next; what was not drawn yet is dropped."""
+        if self._view is None or self._view.codec == "none":
+            return
+        with self._changed:
+            self._drop(self._moment)
+            data = world.copy_data(self._spare.pop() if self._spare else None)
+            self._moment = _Moment(data, state, step, number)
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Stop drawing."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            self._draw_all()
+        except Exception as error:  # there will be no frames
+            self._control.apply(Trigger.FAIL, describe(error))
+        for renderer in self._renderers.values():
+            renderer.close()
+
+    def _draw_all(self) -> None:
+        size = FrameSize()
+        encoder: Encoder = JpegEncoder()
+        encoded_for: tuple[View, int] | None = None
+        while (job := self._next()) is not None:
+            began = time.perf_counter()
+            size.limit(job.view.width, job.view.height)
+            if encoded_for != (job.view, size.index):
+                encoder, encoded_for = _encoder(job.view, size.index), (job.view, size.index)
+                job = job._replace(key=True)
+            image = self._renderer(size.index).frame(job.moment.data, job.moment.hud)
+            data, is_key = encoder.encode(image, key=job.key)
+            took = time.perf_counter() - began
+            self._send_frame(job, SIZES[size.index], data, is_key, took)
+            size.note(took, job.waited)
+            time.sleep(pause_after(took))
+
+    def _send_frame(self, job: _Job, size: tuple[int, int], data: bytes, key: bool, took: float) -> None:
+        with self._changed:
+            self._drop(job.moment)
+            if self._view is not job.view:
+                return
+            self._sent += 1
+            number = self._sent
+        step, count = job.moment.step, job.moment.input
+        self._send(Frame(number, step, count, job.view.codec, key, *size, round(1000.0 * took, 2), data))
+
+    def _drop(self, moment: _Moment | None) -> None:
+        """Keep the memory of a moment for the next one."""
+        if moment is not None:
+            self._spare.append(moment.data)
+
+    def _next(self) -> _Job | None:
+        """Wait for something new to draw, and for the browser to keep up; None once closed."""
+        ready: float | None = None  # since when there is something to draw that the link has no room for
+        with self._changed:
+            while not self._closed:
+                moment, view = self._moment, self._view
+                if moment is None or view is None:
+                    self._changed.wait()
+                elif (content := moment.content()) == self._drawn:
+                    self._moment = None
+                    self._drop(moment)
+                elif self._sent - self._seen >= MAX_IN_FLIGHT:
+                    ready = ready or time.perf_counter()
+                    self._changed.wait()
+                else:
+                    self._moment, self._drawn, key, self._key = None, content, self._key, False
+                    waited = 0.0 if ready is None else time.perf_counter() - ready
+                    return _Job(moment, view, key, waited)
+        return None
+
+    def _renderer(self, size: int) -> FirstPersonRenderer:
+        if size not in self._renderers:
+            width, height = SIZES[size]
+            film = FilmConfig(width, height, FAST if size else COARSE)
+            self._renderers[size] = FirstPersonRenderer(self._scene, self._house, film, self._pictures())
+        return self._renderers[size]
+
+
+def _encoder(view: View, size: int) -> Encoder:
+    return H264Encoder(*SIZES[size]) if view.codec == "h264" else JpegEncoder()

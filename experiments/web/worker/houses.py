@@ -1,0 +1,42 @@
+"""Houses and the pictures of their objects, loaded once a process and shared with the processes forked from it."""
+
+import functools
+import gc
+from contextlib import suppress
+from multiprocessing import get_context
+
+from experiments.house import House
+from experiments.trials import warmup
+from experiments.web.worker.encoders import Image
+from mjsim.render import render_pictures
+
+DRAWING_TIMEOUT = 60.0  # s
+_pictures: dict[str, dict[str, Image]] = {}
+
+
+@functools.cache
+def house(name: str) -> House:
+    """A house by its name or path."""
+    return House.load(name)
+
+
+def pictures(name: str) -> dict[str, Image]:
+    """Pictures of a house's objects and receptacles."""
+    if name not in _pictures:
+        _pictures[name] = render_pictures(house(name).catalogue)
+    return _pictures[name]
+
+
+def preload(name: str) -> None:
+    """Load a house, its pictures and the kernels before workers are forked; they retry and report what fails here.
+
+    It uses one thread and no OpenGL, neither of which survives a fork: a process of its own draws the pictures.
+    """
+    with suppress(Exception):
+        loaded = house(name)
+        with get_context("fork").Pool(1) as drawing:
+            drawn = drawing.apply_async(render_pictures, (loaded.catalogue,))
+            warmup.plan()
+            warmup.act(loaded)
+            _pictures[name] = drawn.get(DRAWING_TIMEOUT)
+    gc.freeze()  # collecting garbage would copy what is shared

@@ -1,0 +1,244 @@
+"""A session with a person: stepped from outside, journalled step by step, and resumed after a crash."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from experiments.errors import RecordError
+from experiments.house import House
+from experiments.participants.base import Percept
+from experiments.procedure.familiarise import Familiarisation
+from experiments.record.export import save_record
+from experiments.record.journal import JOURNAL, Entry, Header, Journal, read_entries
+from experiments.record.reader import read_journal
+from experiments.record.records import EventLog
+from experiments.record.run_directory import is_run, run_directory
+from experiments.replay.log_source import LogSource
+from experiments.session.viewer import Viewer
+from experiments.trials.setup import (
+    draw_person,
+    prepare_session,
+    prepared_planner,
+    regret_evaluator,
+    solver_source,
+    trial_episode,
+)
+from experiments.trials.trial import draw_floor_plan
+from experiments.trials.trial_config import TrialConfig
+from experiments.web.controls import Controls, Input, control_step
+from experiments.web.server.visits import JOURNALS
+from mjsim.actions import Action
+from mjsim.model.scene import compose
+from mjsim.options import WorldOptions
+from mjsim.world import World
+from planner.service import Mode, Planner
+
+
+class PersonState(msgspec.Struct):
+    """State of the participant in a session with a person.
+
+    Attributes:
+        controls: What is held down and where the mouse points.
+        input: Number of the last input that counted.
+    """
+
+    controls: Controls = Controls()
+    input: int = 0
+
+
+class Human:
+    """The participant of a session with a person.
+
+    Args:
+        world: The world in which it acts.
+
+    Attributes:
+        state: Its state.
+        inputs: Inputs since the last control step; the next one takes them.
+    """
+
+    needs: frozenset[str] = frozenset()
+
+    def __init__(self, world: World) -> None:
+        self.state = PersonState()
+        self.inputs: Sequence[Input] = ()
+        self._world = world
+
+    def act(self, percept: Percept) -> Action:  # noqa: ARG002 - a person sees the frame
+        """What was pressed."""
+        world, state = self._world, self.state
+        action, state.controls = control_step(
+            state.controls,
+            self.inputs,
+            world.observation(),
+            world.answer,
+            world.scene.person,
+            world.control_timestep,
+        )
+        if self.inputs:
+            state.input = self.inputs[-1].number
+        self.inputs = ()
+        return action
+
+
+class LiveSession:
+    """A session of the trial that a journal is about, from its last control step on.
+
+    Args:
+        journal: Takes every control step. An empty one begins with `config`.
+        house: The house of the trial.
+        config: The trial; None for the one in the journal.
+        viewer: Sees every control step.
+        before: The phases before this one, as in the events `phase_ended`.
+
+    Attributes:
+        config: The trial.
+        world: The world.
+        session: The session.
+        resumed: Whether an earlier process started it.
+
+    Raises:
+        RecordError: The journal is empty, the session is over, or its record does not lead to the states that it holds.
+    """
+
+    def __init__(
+        self,
+        journal: Journal,
+        house: House,
+        config: TrialConfig | None = None,
+        viewer: Viewer | None = None,
+        *,
+        before: Sequence[dict[str, Any]] = (),
+    ) -> None:
+        self._journal = journal
+        self.config = config = _config_in(journal) or config
+        if config is None or is_over(journal):
+            raise RecordError("the journal is empty" if config is None else "this session is over")
+        person = draw_person(config)
+        self.house = house.for_person(person)
+        self.scene = compose(trial_episode(config, self.house), self.house.catalogue, person=person)
+        if not journal.entries:
+            journal.append(Header(config.settings(), self.scene.episode.to_json()))
+            journal.sync()
+        record = read_journal(journal.entries) if len(journal.entries) > 1 else None
+        journal.entries = ()  # those of an hour take some 80 MB
+        self.resumed = record is not None
+        options = WorldOptions(fidelity=config.fidelity, capacity=config.capacity)
+        self.world = World(self.scene, options, walls=self.house.navmesh.outline)
+        self._human = Human(self.world)
+        if record is None:
+            self._planner = prepared_planner(config, self.house, self.scene.episode)
+        else:
+            logged, evaluator = (
+                LogSource(record.plans, lambda: self.session.time),
+                regret_evaluator(config, self.house),
+            )
+            self._planner = Planner(logged, evaluator, Mode.LIVE)
+        log = EventLog()
+        self.session, _ = prepare_session(
+            config,
+            self.house,
+            self.scene,
+            log,
+            viewer,
+            self._planner,
+            world=self.world,
+            user=self._human,
+            journal=journal,
+        )
+        Familiarisation(tuple(before), None).log(log)
+        if record is None:
+            self.session.begin()
+            return
+        self.session.resume(record)
+        self._human.state = msgspec.convert(record.participant, PersonState)
+        source = solver_source(config, self.house)
+        source.adopt(self.session.assistant.task_state(self.world.observation()))
+        self._planner.use(source)
+
+    @property
+    def input(self) -> int:
+        """Number of the last input that counted."""
+        return self._human.state.input
+
+    @property
+    def end_reason(self) -> str | None:
+        """Why the task is over; None while it is not."""
+        return self.session.end_reason
+
+    def step(self, inputs: Sequence[Input]) -> None:
+        """One control step; it is safe once the journal was synced.
+
+        Raises:
+            PhysicsError: The physics failed.
+            OSError: The journal cannot be written.
+        """
+        for new in inputs:
+            if new.scroll:
+                self.session.scroll(new.scroll)
+        self._human.inputs = inputs
+        self.session.advance()
+        self.session.record.commit(self._human.state)
+
+    def end(self, reason: str) -> None:
+        """End the session; the run directory can then be made from the journal.
+
+        Raises:
+            OSError: The journal cannot be written.
+        """
+        self.session.end(reason)
+        self.session.record.commit(self._human.state)
+        self._journal.sync()
+        self.close()
+
+    def close(self) -> None:
+        """Stop planning in the background."""
+        self._planner.close()
+
+
+def _config_in(journal: Journal) -> TrialConfig | None:
+    header = journal.entries[0] if journal.entries else None
+    return TrialConfig.of(header.settings) if isinstance(header, Header) else None
+
+
+def is_over(journal: Journal) -> bool:
+    """Whether the session of a journal that was opened is over."""
+    last = journal.entries[-1] if journal.entries else None
+    return isinstance(last, Entry) and bool(last.events) and json.loads(last.events[-1])["event"] == "end"
+
+
+def open_journal(folder: Path) -> Journal:
+    """The journal of the session in a folder, which is made if it is not there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return Journal(folder / JOURNAL)
+
+
+def journal_of(run: Path) -> Path | None:
+    """Folder of the journal from which a run directory that is not there yet will be made, or None."""
+    folders = (run, run.parent / JOURNALS / run.name)
+    return next((folder for folder in folders if (folder / JOURNAL).is_file()), None)
+
+
+def save_run(folder: Path, run: Path, house: House | None = None) -> None:
+    """Make the run directory of a session, also of an unfinished one, and then its floor plan.
+
+    Args:
+        folder: Of the journal.
+        run: The run directory; where it exists, only the floor plan is made.
+        house: The house of the trial; None to load it.
+
+    Raises:
+        RecordError: There is no journal, it holds no control step, or the run directory cannot be made.
+        OSError: The journal cannot be read.
+    """
+    record = read_journal(read_entries(folder / JOURNAL))
+    if not record.steps:
+        raise RecordError("nothing was played")
+    if not is_run(run):
+        with run_directory(run) as work:
+            save_record(work, run, record, wall=float(record.trajectory["time"][-1]))
+    house = (house or House.load(record.start["house"])).for_person(record.person)
+    draw_floor_plan(run, house, record)

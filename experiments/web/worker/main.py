@@ -1,0 +1,99 @@
+"""A worker process: one world, one session at a time. It ends with its server; the journal keeps the session."""
+
+import os
+import threading
+from contextlib import closing, suppress
+from functools import partial
+from multiprocessing.connection import Connection
+from pathlib import Path
+from queue import SimpleQueue
+
+from experiments.record import records
+from experiments.record.run_directory import is_run
+from experiments.session.endings import INTERRUPTED
+from experiments.session.user_code import describe
+from experiments.trials.trial_config import TrialConfig
+from experiments.web import protocol
+from experiments.web.protocol import Blur, Inputs, Leave, Open, Pause, Run, Saved, Seen, View, WireMessage
+from experiments.web.state import Trigger
+from experiments.web.worker import houses
+from experiments.web.worker.clock import Clock
+from experiments.web.worker.control import SessionControl
+from experiments.web.worker.drawing import Drawer
+from experiments.web.worker.live_session import LiveSession, is_over, open_journal, save_run
+from experiments.web.worker.viewer import BrowserViewer
+
+
+class Worker:
+    """Runs one session after the other."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._sending = threading.Lock()
+        self._opened: SimpleQueue[tuple[Open, SessionControl]] = SimpleQueue()
+        self._viewer = BrowserViewer(self._send)
+        self._control = SessionControl(self._send)
+
+    def run(self) -> None:
+        """Serve until the server is gone."""
+        threading.Thread(target=self._receive, name="receiving", daemon=True).start()
+        while True:
+            opened, control = self._opened.get()
+            try:
+                self._serve(opened, control)
+            except Exception as error:  # the server reports it, and the journal is kept
+                control.apply(Trigger.FAIL, describe(error))
+
+    def _send(self, message: WireMessage) -> None:
+        with self._sending, suppress(OSError):  # the receiving thread notices that the server is gone
+            self._connection.send_bytes(protocol.encode(message))
+
+    def _receive(self) -> None:
+        """Take messages until the server is gone; a worker has nothing to tidy up then."""
+        try:
+            while True:
+                self._take(protocol.decode_to_worker(self._connection.recv_bytes()))
+        except (EOFError, OSError):
+            os._exit(0)
+
+    def _take(self, message: WireMessage) -> None:
+        match message:
+            case Open():
+                self._control = SessionControl(self._send)
+                self._opened.put((message, self._control))
+            case Inputs(inputs):
+                self._control.add(inputs)
+            case Run():
+                self._control.apply(Trigger.RUN)
+            case Pause(reason):
+                self._control.apply(Trigger.PAUSE, reason)
+            case Leave():
+                self._control.apply(Trigger.END, INTERRUPTED)
+            case Blur(away):
+                self._control.note_blur(away)
+            case View():
+                self._viewer.set_view(message)
+            case Seen(frame) if self._viewer.drawer is not None:
+                self._viewer.drawer.note_seen(frame)
+
+    def _serve(self, opened: Open, control: SessionControl) -> None:
+        config, viewer = TrialConfig.of(opened.config), self._viewer
+        folder, run, house = Path(opened.folder), Path(opened.run), houses.house(config.house)
+        with open_journal(folder) as journal:
+            if not is_over(journal):
+                live = LiveSession(journal, house, config, viewer, before=opened.before)
+                pictures = partial(houses.pictures, config.house)
+                with closing(Drawer(live.scene, live.house, pictures, self._send, control)) as drawer:
+                    viewer.live, viewer.drawer = live, drawer
+                    viewer.set_view(None)
+                    if live.resumed:
+                        control.apply(Trigger.RESTORED, "disconnected", last=live.input)
+                    else:
+                        control.apply(Trigger.OPENED)
+                    reason = Clock(live, control, journal.sync, self._send).run()
+                    viewer.live = viewer.drawer = None
+                live.end(reason)
+        if not (is_run(run) and (run / records.TOPDOWN).is_file()):
+            save_run(folder, run, house)
+        control.apply(Trigger.END)
+        self._send(Saved())

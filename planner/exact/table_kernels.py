@@ -1,0 +1,153 @@
+"""Compiled kernels that fill a table of `planner.exact.table`, and follow a best tour in it."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.kernels import inlined, kernel
+from planner.exact import table as tables
+from planner.exact.instance import FAR, Instance
+from planner.exact.simd import LANES, min_plus, min_plus_each
+from planner.exact.table import Table
+
+Entries = NDArray[np.integer[Any]]
+
+walk = kernel(tables.walk)
+
+
+def fill(inst: Instance, table: Table) -> None:
+    """Compute all rows."""
+    table.multipliers[:] = np.clip(table.multipliers, -table.dearest, table.dearest)
+    fill_rows(inst, table, 0, table.bin.shape[0])
+
+
+class Legs(NamedTuple):
+    """Distances of an instance for `fill_rows`, flat; `lanes` are bins, rounded up to whole eights."""
+
+    to_bin: Entries  # from each object to bins, (n lanes,)
+    from_bin: Entries  # from bins to each object with its price, (n lanes,)
+    bins: Entries  # between bins, (m lanes,)
+    between: Entries  # from each object to its bin; then to each object, with its price; in `place`, (1 + n) places
+    # of each object in `between`; the objects of each bin start at a new eight, (n,) int64
+    place: NDArray[np.int64]
+    bin_of: NDArray[np.int64]  # bin of the objects of each eight of places, (places / 8,) int64
+    far: int  # longer than any tour
+
+
+@inlined
+def lanes_for(m: int) -> int:
+    """The number of bins rounded up to whole eights."""
+    return (m + LANES - 1) // LANES * LANES
+
+
+@kernel
+def legs_of(inst: Instance, table: Table) -> Legs:
+    """The distances, of the type of the table's entries."""
+    n, m = inst.to_bin.shape
+    wide, dtype = lanes_for(m), table.entries.dtype
+    far = (1 << 30) if table.entries.itemsize == 4 else FAR
+    to_bin, from_bin = np.zeros(n * wide, dtype), np.zeros(n * wide, dtype)
+    bins = np.zeros(m * wide, dtype)
+    place, bin_of = np.empty(n, np.int64), np.empty(n, np.int64)
+    eights = 0
+    for b in range(m):
+        for d in range(m):
+            bins[b * wide + d] = inst.bins[b, d]
+        free = 0
+        for j in range(n):
+            to_bin[j * wide + b] = inst.to_bin[j, b]
+            from_bin[j * wide + b] = inst.from_bin[b, j] + table.multipliers[j]
+            if inst.home[j] == b:
+                if free == 0:
+                    bin_of[eights] = b
+                    eights, free = eights + 1, LANES
+                place[j] = eights * LANES - free
+                free -= 1
+    places = eights * LANES
+    between = np.zeros((1 + n) * places, dtype)
+    for i in range(n):
+        between[place[i]] = inst.to_bin[i, inst.home[i]]
+        for j in range(n):
+            between[(1 + j) * places + place[i]] = min(inst.between[i, j], far) + table.multipliers[j]
+    return Legs(to_bin, from_bin, bins, between, place, bin_of[:eights], far)
+
+
+@kernel
+def left_of(table: Table, row: int) -> NDArray[np.int64]:
+    """How many of each group are left in a row, shape (groups,)."""
+    left = np.empty(table.size.size, np.int64)
+    for g in range(left.size):
+        left[g] = row % (table.size[g] + 1)
+        row //= table.size[g] + 1
+    return left
+
+
+@kernel
+def fill_rows(inst: Instance, table: Table, first: int, last: int) -> None:
+    """Compute some rows; all before must have been.
+
+    Bins and the objects of a bin are taken eight at a time; lanes without a bin or an object are not used.
+    """
+    n, m = inst.to_bin.shape
+    wide, dtype, entries, width = lanes_for(m), table.entries.dtype, table.entries, 2 * m * m + n
+    legs, left = legs_of(inst, table), left_of(table, first)
+    picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # objects, and their W less its price
+    empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # E and V
+    holding = np.empty(legs.bin_of.size * LANES, dtype)  # Y
+    for row in range(first, last):
+        second[:], empty[:], carrying[:] = legs.far, legs.far, legs.far
+        count = 0
+        for j in range(n):
+            if left[table.group[j]] == 0:
+                continue
+            below = (row - table.stride[j]) * width
+            at, own = below + 2 * m * inst.home[j], j * wide + inst.home[j]
+            for d in range(0, wide, LANES):
+                w = count * wide + d
+                min_plus(second, w, entries, at + d, legs.to_bin, own)
+                min_plus_each(second, w, entries, at + m + d, legs.to_bin, j * wide + d)
+                min_plus(empty, d, legs.from_bin, j * wide + d, entries, below + 2 * m * m + j)
+                for b in range(m):
+                    min_plus(carrying, b * wide + d, second, w, legs.from_bin, j * wide + b)
+            picked[count] = j
+            count += 1
+        if row == 0:
+            empty[:] = 0
+        for b in range(m):
+            for d in range(0, wide, LANES):
+                min_plus_each(carrying, b * wide + d, legs.bins, b * wide + d, empty, d)
+            carrying[b * wide + b] = empty[b]
+        _hold(legs, picked, count, second, empty, holding)
+        start = row * width
+        for b in range(m):
+            for d in range(m):
+                entries[start + 2 * m * b + d] = carrying[b * wide + d]
+                entries[start + 2 * m * b + m + d] = carrying[d * wide + b]
+        for i in range(n):
+            entries[start + 2 * m * m + i] = holding[legs.place[i]]
+        count_on(table, left)
+
+
+@inlined
+def _hold(
+    legs: Legs, picked: NDArray[np.int64], count: int, second: Entries, empty: Entries, holding: Entries
+) -> None:
+    """Y of a row from its W and E, in the places of the legs."""
+    places, wide = holding.size, empty.size
+    holding[:] = legs.far
+    for eight in range(legs.bin_of.size):
+        b, o = legs.bin_of[eight], eight * LANES
+        min_plus(holding, o, legs.between, o, empty, b)
+        for k in range(count):
+            min_plus(holding, o, legs.between, (1 + picked[k]) * places + o, second, k * wide + b)
+
+
+@inlined
+def count_on(table: Table, left: NDArray[np.int64]) -> None:
+    """Update the numbers left of each group, shape (groups,), from a row to the next."""
+    for g in range(left.size):
+        left[g] += 1
+        if left[g] <= table.size[g]:
+            break
+        left[g] = 0

@@ -1,0 +1,98 @@
+"""`mjsim study calibrate`: fits the guest to the published rows at 6 objects, and says what they do not tell."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.options import add_command, add_force
+from experiments.cli.requirements import require_extra
+
+DESCRIPTION = """\
+Fit free parameters of the guest (studies/calibration.toml) to the published rows at 6 objects. No row
+over several numbers of objects is looked at. DIR is a pool of people whose parameters are drawn widely:
+
+  mjsim study simulate pool --people 900 --out runs/pool     # resumes after an interruption
+  mjsim study calibrate runs/pool
+
+A surrogate of trials is learnt from the pool; populations are drawn from the priors, and those are kept whose studies
+are nearest to the published one (approximate Bayesian computation). Writes
+
+  calibration.html    which parameters are identifiable, which trade off, how good the surrogate is
+  calibration.json    the same
+  kept.csv            the parameters that are kept
+  study.toml          the study with the best population, for `mjsim study simulate` to confirm
+
+Where a study with that population does not come out as the surrogate has it, calibrate again with the folder of that
+study named as well: its people at 6 objects are learnt from, too, and nothing else of it is looked at.
+
+What fits is not therefore true; docs/study.md says what may be concluded."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands,
+        "calibrate",
+        run,
+        summary="fit the guest to the published rows at 6 objects",
+        description=DESCRIPTION,
+    )
+    parser.add_argument(
+        "folders", type=Path, nargs="+", metavar="DIR", help="folder of a pool; results go to the first"
+    )
+    parser.add_argument(
+        "--study", default="paper", metavar="STUDY.toml", help="study to write for (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--draws", type=int, default=10_000, metavar="N", help="populations (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of all chance")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: DIR/calibration)")
+    add_force(parser, "replace an earlier calibration")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Learn, fit, write, say where.
+
+    Raises:
+        ConfigError: An option or a file of the package is unusable.
+        RecordError: The pool is none, or files are in the way.
+        StatisticsError: The pool is too small.
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+    from experiments.cli.terminal import error_console, progress_bars
+
+    require_extra("study")
+    from experiments.errors import ConfigError
+    from experiments.record.run_directory import check_file
+    from experiments.study.measures import read_measures
+    from experiments.study.simulate import study_path
+    from experiments.study.table import read_study
+    from studies.calibration.calibrate import calibrate
+    from studies.calibration.files import FILES, PAGE, write_calibration
+    from studies.calibration.population import read_free_parameters
+    from studies.published import read_published
+
+    if arguments.draws < 100 or arguments.seed < 0:
+        raise ConfigError(
+            f"--draws {arguments.draws} must be 100 or more, and --seed {arguments.seed} 0 or more"
+        )
+    out = arguments.folders[0] / "calibration" if arguments.out is None else arguments.out
+    for name in FILES:
+        check_file(out / name, replace=arguments.force)
+    pools = [read_study(folder, read_measures()) for folder in arguments.folders]
+    columns = TextColumn("populations"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with progress_bars(error_console(), *columns) as bars:
+        bar = bars.add_task("populations", total=arguments.draws)
+        found = calibrate(
+            pools,
+            read_free_parameters(),
+            read_published(),
+            draws=arguments.draws,
+            seed=arguments.seed,
+            on_progress=lambda done: bars.update(bar, completed=done),
+        )
+    write_calibration(out, found, study_path(arguments.study))
+    print(f"{found.origin}: {out / PAGE}")
+    return 0

@@ -1,0 +1,49 @@
+"""`mjsim study controls`: studies that lack something, and so must not come out as the published one."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.batch_progress import run_with_progress
+from experiments.cli.options import add_command
+from experiments.cli.study.simulate import add_study
+
+DESCRIPTION = """\
+Simulate the negative controls of a study (studies/controls.toml): the same people with another
+participant, or without one of the parts of their model. Each is a study in a folder of its own under OUT. A control
+that agrees with the published rows that should depend on what it lacks shows that these rows say nothing about it."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands, "controls", run, summary="simulate a study's negative controls", description=DESCRIPTION
+    )
+    add_study(parser, nargs="?", default="paper")
+    parser.add_argument("--only", metavar="NAME", help="only this control (default: all)")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the controls")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate one control after the other; 1 if a trial failed.
+
+    Raises:
+        ConfigError: There is no control of that name.
+    """
+    from experiments.cli.terminal import error_console
+    from experiments.study.simulate import read_study, study_path
+    from studies.controls import read_controls
+
+    controls = read_controls(read_study(study_path(arguments.study), arguments.people), only=arguments.only)
+    failures = 0
+    for control in controls:
+        out = arguments.out / control.name
+        rows, failed = run_with_progress(
+            control.design, out, arguments.workers, arguments.executor, control.name
+        )
+        failures += failed
+        error_console().print(
+            f"{control.name}: {control.about}; {len(rows)} simulated, {failed} failed: {out}"
+        )
+    error_console().print("`mjsim study score` compares each with the published study")
+    return 1 if failures else 0

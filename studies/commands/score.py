@@ -1,0 +1,78 @@
+"""`mjsim study score`: a study against the published statistics, row by row."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.options import add_command, add_force
+from experiments.cli.requirements import require_extra
+
+WIDTH = 160  # characters, where there is no terminal
+
+DESCRIPTION = """\
+Score a study against the published one (studies/published.toml): effect sizes within the 90 %
+confidence intervals of the published ones, decisions of tests, directions, orders of variances. Rows at 6 objects may
+be fitted; rows over all numbers of objects are held out. Answers to survey questions are never simulated.
+
+With 200 people or more in every cell, the people are a pool: effect sizes are those of the population, and 200 studies
+of the published size are drawn from it, to see how many come out as published."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands, "score", run, summary="compare a study with the published one", description=DESCRIPTION
+    )
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study or a batch")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the studies that are drawn")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: DIR/analysis)")
+    add_force(parser, "replace an earlier score")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Score, show, write.
+
+    Raises:
+        ConfigError: statsmodels is missing, or the seed is negative.
+        RecordError: The folder is no study, or files are in the way.
+    """
+    require_extra("study")
+    from experiments.errors import ConfigError
+    from experiments.record.run_directory import check_file
+    from experiments.study.files import FOLDER
+    from experiments.study.measures import read_measures
+    from experiments.study.table import read_study
+    from studies.published import read_published
+    from studies.score import score
+    from studies.score_files import FILES, write_score
+
+    if arguments.seed < 0:
+        raise ConfigError(f"--seed {arguments.seed} must not be negative")
+    out = arguments.folder / FOLDER if arguments.out is None else arguments.out
+    for name in FILES:
+        check_file(out / name, replace=arguments.force)
+    published = read_published()
+    found = score(read_study(arguments.folder, read_measures()), published, seed=arguments.seed)
+    _show(found)
+    write_score(out, found, published)
+    return 0
+
+
+def _show(score: Any) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from experiments.analysis.page import shown
+    from studies.score_files import COLUMNS, cells, how
+
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDTH)
+    console.print(f"{score.origin}. {how(score)}")
+    rows = Table(box=None, header_style="bold")
+    for name in COLUMNS:
+        rows.add_column(name, overflow="fold")
+    for row in score.rows:
+        rows.add_row(*("" if cell is None else shown(cell) for cell in cells(row)))
+    console.print(rows)
+    for what, which, agree, of in score.summary():
+        console.print(f"{what}, {which}: {agree} of {of} agree")

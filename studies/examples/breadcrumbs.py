@@ -1,0 +1,45 @@
+"""A custom sensor: the breadcrumbs of the HUD, for agents that should have the same assistance as people."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.house import House
+from experiments.participants.base import Point
+from mjsim.environments.sensors import Sensor, SensorInput, unit_spec
+from mjsim.observation import ObjectStatus
+from mjsim.walking.polyline import path_length, point_along
+
+LOOK_AHEAD = 1.0  # m along the path
+
+
+def breadcrumb_sensor(house: House) -> Sensor:
+    """The shortest path to the next visit: the point 1 m along it (forward, left, m), and the length of the path.
+
+    The next visit is at the nearest receptacle of a carried object, else at the nearest loose object. All values are 0
+    when nothing is left to do.
+
+    Args:
+        house: House of the episodes.
+    """
+
+    def read(inputs: SensorInput) -> NDArray[np.float32]:
+        paths = [
+            house.geodesics.shortest_path(inputs.state.position, goal).points
+            for goal in _goals(house, inputs)
+        ]
+        if not paths:
+            return np.zeros(3, np.float32)
+        path = min(paths, key=path_length)
+        forward, left = inputs.to_body(np.array([point_along(path, LOOK_AHEAD)]))[0] / LOOK_AHEAD
+        length = path_length(path) / inputs.layout.scale
+        return np.array([forward, left, length], np.float32).clip(-1.0, 1.0)
+
+    return Sensor("breadcrumbs", lambda _: unit_spec(3), read)
+
+
+def _goals(house: House, inputs: SensorInput) -> list[Point]:
+    state, targets = inputs.state, inputs.world.scene.episode.targets
+    if state.carried:
+        return [house.approaches[targets[name]] for name in state.carried]
+    positions = dict(zip(state.object_names, state.object_positions, strict=True))
+    return [house.navmesh.snap(positions[n][:2]) for n in state.names_with(ObjectStatus.LOOSE)]

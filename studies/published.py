@@ -1,0 +1,146 @@
+"""The published statistics: studies/published.toml."""
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+from scipy.stats import f
+
+from experiments.analysis.statistics.effects import ALPHA, FTest, partial_eta_squared
+from experiments.analysis.statistics.noncentral import Interval
+
+FILE = Path(__file__).with_name("published.toml")
+NOT_SIGNIFICANT = "n.s."
+
+
+class PublishedTest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An F test as printed.
+
+    Attributes:
+        measure: Short name of the measure.
+        effect: What it tests.
+        df: Degrees of freedom, of the effect and of the error.
+        p: As printed: `<.001`, `=.523` or `n.s.`.
+        objects: At which number of objects; None over all.
+        statistic: F, or None where it is not printed.
+        p_fits: False where the p printed with F is known not to go with it.
+    """
+
+    measure: str
+    effect: Literal["assistance", "objects", "interaction"]
+    df: tuple[int, int]
+    p: str
+    objects: int | None = None
+    statistic: float | None = msgspec.field(default=None, name="F")
+    p_fits: bool = True
+
+    @property
+    def held_out(self) -> bool:
+        """Whether nothing may be fitted to it."""
+        return self.objects is None
+
+    @property
+    def significant(self) -> bool:
+        """The printed decision at .05."""
+        return self.p.startswith("<") or (self.p.startswith("=") and float(self.p[1:]) < ALPHA)
+
+    def test(self, people: int) -> FTest | None:
+        """The test with its effect size; None where F is not printed."""
+        return None if self.statistic is None else FTest(self.statistic, *self.df, people)
+
+    def interval(self, people: int) -> Interval | None:
+        """What partial eta squared may be: its 90 % confidence interval, or all that stays without significance."""
+        test = self.test(people)
+        if test is not None:
+            return test.interval
+        return 0.0, partial_eta_squared(float(f.ppf(1.0 - ALPHA, *self.df)), *self.df)
+
+    def inconsistency(self) -> str | None:
+        """What is wrong between the printed F and p; None where they go together."""
+        if self.statistic is None or self.p == NOT_SIGNIFICANT:
+            return None
+        implied = float(f.sf(self.statistic, *self.df))
+        printed = float(self.p[1:])
+        places = len(self.p.partition(".")[2])
+        half = 0.5 * 10.0**-places * (1 + 1e-9)
+        test = f"F({self.df[0]},{self.df[1]}) = {self.statistic:g}"
+        if not self.p_fits:
+            return f"the printed p does not go with {test}, which gives p = {_short(implied)}"
+        if implied < printed if self.p[0] == "<" else abs(implied - printed) <= half:
+            return None
+        return f"printed p {self.p}, but {test} gives p = {_short(implied)}"
+
+
+def _short(p: float) -> str:
+    return f"{p:.4f}".lstrip("0") if p >= 1e-4 else f"{p:.1e}"
+
+
+class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An order of means as printed; one of the last five says which.
+
+    Attributes:
+        measure: Short name of the measure.
+        objects: At which number of objects; None over all.
+        pair: The first is smaller than the second by Tukey's test.
+        same: Tukey's test finds no difference.
+        rising: The condition whose means rise with the number of objects.
+        lowest: The condition with the lowest mean at every number of objects.
+        falling: Conditions by their means over all numbers of objects, the largest first.
+    """
+
+    measure: str
+    objects: int | None = None
+    pair: tuple[str, str] | None = None
+    same: tuple[str, str] | None = None
+    rising: str | None = None
+    lowest: str | None = None
+    falling: tuple[str, ...] | None = None
+
+    def label(self) -> str:
+        """What it says, in words."""
+        if self.pair is not None:
+            return " < ".join(self.pair)
+        if self.same is not None:
+            return " ~ ".join(self.same)
+        if self.rising is not None:
+            return f"rises with objects under {self.rising}"
+        return f"{self.lowest} lowest" if self.lowest is not None else " > ".join(self.falling or ())
+
+
+class Variances(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The condition in which a measure varies most, at every number of objects."""
+
+    measure: str
+    largest: str
+
+
+class People(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """People by condition, for each number of objects."""
+
+    objects: tuple[int, ...]
+    none: tuple[int, ...]
+    highlight: tuple[int, ...]
+    optimal: tuple[int, ...]
+
+    def sizes(self) -> dict[tuple[str, int], int]:
+        """People by cell."""
+        rows = {"none": self.none, "highlight": self.highlight, "optimal": self.optimal}
+        return {(c, n): k for c, counts in rows.items() for n, k in zip(self.objects, counts, strict=True)}
+
+
+class Published(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """All that is scored."""
+
+    people: People
+    tests: tuple[PublishedTest, ...]
+    directions: tuple[Direction, ...]
+    variances: Variances
+
+    def people_of(self, objects: int | None) -> int:
+        """How many people took part at a number of objects, or in all."""
+        return sum(k for (_, n), k in self.people.sizes().items() if objects in (None, n))
+
+
+def read_published(path: Path = FILE) -> Published:
+    """The committed numbers."""
+    return msgspec.toml.decode(path.read_bytes(), type=Published)

@@ -1,0 +1,180 @@
+"""The documents are true: their code and commands run, their tables list what there is, their links lead somewhere."""
+
+import dataclasses
+import json
+import math
+import re
+import shlex
+import sys
+import tomllib
+from pathlib import Path
+
+import hud_sample as sample
+import msgspec
+import pytest
+from example_house import write_example_house
+
+from experiments.cli.main import main
+from experiments.participants.distribution import Distributions
+from experiments.participants.guest import PARAMETERS
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+from hud.conditions import condition, condition_names
+from hud.options import option_names
+from mjsim.model.catalogue import Catalogue
+from tools.data_dictionary import data_dictionary
+
+TESTS = Path(__file__).parents[1]
+DOCS = TESTS.parent / "docs"
+PAPER_LINKS = re.findall(
+    r"`((?:\w+/)*test_\w+\.py)::(test_\w+)`", (DOCS / "paper.md").read_text(encoding="utf-8")
+)
+
+
+def page(name):
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def blocks(name, language):
+    """The code of a page."""
+    return re.findall(rf"```{language}\n(.*?)```", page(name), re.DOTALL)
+
+
+@pytest.fixture
+def module_of(tmp_path, monkeypatch):
+    """Makes code of a page importable under a name."""
+    names = []
+
+    def write(name, code):
+        (tmp_path / f"{name}.py").write_text(code, encoding="utf-8")
+        monkeypatch.syspath_prepend(str(tmp_path))
+        names.append(name)
+        return name
+
+    yield write
+    for name in names:
+        sys.modules.pop(name, None)
+
+
+@pytest.mark.parametrize(
+    "path", sorted([*DOCS.glob("*.md"), *TESTS.parent.glob("*.md")]), ids=lambda p: p.name
+)
+def test_links_within_the_documents_lead_to_files(path):
+    for link in re.findall(r"\]\((?!https?:|mailto:|#)([^)#]+)", path.read_text(encoding="utf-8")):
+        assert (path.parent / link).exists(), link
+
+
+def test_the_data_dictionary_is_up_to_date():
+    assert page("data.md") == data_dictionary(), "run `make data-dictionary`"
+
+
+def test_the_hud_page_names_every_condition_and_option():
+    assert all(f"`{name}`" in page("hud.md") for name in (*condition_names(), *option_names()))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.5, 3.1, -1.5])
+def test_the_arrow_of_the_hud_page_points_to_the_next_object_only(module_of, yaw):
+    (code,) = [c for c in blocks("hud.md", "python") if "def hud_state" in c]
+    arrow = condition(f"{module_of('arrow_of_the_docs', code)}:hud_state")
+    view = dataclasses.replace(sample.task(6), camera=sample.camera(640, 480, yaw=yaw))
+    state = arrow(view)
+    assert dataclasses.replace(state, pointer=None) == condition("none")(view) and state.markers == ()
+    right, up, forward = (float(v) for v in view.camera.to_eye(view.goal))
+    half = math.tan(view.camera.fovy / 2)
+    inside = forward > 0 and abs(up) < half * forward and abs(right) < half * 640 / 480 * forward
+    assert (state.pointer is None) is inside
+    assert state.pointer is None or math.cos(state.pointer.angle) * right > 0
+    bins = dataclasses.replace(sample.task(6, steps=2), camera=sample.camera(640, 480, yaw=3.0))
+    assert bins.plan[0].kind == "place" and condition("guided")(bins).pointer is not None
+    assert arrow(bins).pointer is None
+
+
+@pytest.mark.slow
+def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    for code in blocks("import.md", "python"):
+        exec(compile(code, "docs/import.md", "exec"), {})
+    for line in blocks("import.md", "sh")[0].splitlines():
+        words = [*shlex.split(line)[1:], *(["--fidelity", "event"] if " run " in line else [])]
+        assert main(words) == 0
+    assert "toy_robot" in Catalogue.load("my-house/catalogue.toml").categories["toys"].objects
+    assert "toy_robot" in Path("runs/robot/episode.json").read_text(encoding="utf-8")
+    for row in json.loads(Path("my-house/toy_robot/report.json").read_text(encoding="utf-8")):
+        cells = " | ".join((row["what"], row["choice"], row["reason"])).strip()
+        assert f"| {cells} |" in page("import.md")
+
+
+@pytest.mark.slow
+def test_the_participant_of_its_page_tidies_a_house_and_prefers_distant_objects(module_of, tmp_path):
+    own = f"{module_of('own', blocks('participants.md', 'python')[0])}:build"
+    config = TrialConfig(objects=3, assistance="highlight", seed=0, user=own, fidelity="event", regret=False)
+    far = run_trial(config, tmp_path / "far", topdown=False)
+    near = run_trial(msgspec.structs.replace(config, user="nearest"), tmp_path / "near", topdown=False)
+    assert far["delivered"] == near["delivered"] == 3
+    assert far["task_distance_m"] > near["task_distance_m"]
+
+
+def test_the_table_of_participants_lists_every_parameter_with_its_range():
+    for name, parameter in PARAMETERS.items():
+        (row,) = [line for line in page("participants.md").splitlines() if line.startswith(f"| `{name}` |")]
+        assert f"| {parameter.lowest:g} to {parameter.highest:g} | {parameter.unit} |" in row
+
+
+def test_the_example_of_a_cell_describes_behaviour():
+    behaviour = tomllib.loads(blocks("participants.md", "toml")[0])["cells"][0]["behaviour"]
+    flat = {f"{part}.{name}" for part, table in behaviour.items() for name in table}
+    assert Distributions.of(behaviour).as_dict().keys() == flat <= PARAMETERS.keys()
+
+
+@pytest.mark.slow
+def test_every_command_of_the_page_on_houses_works(tmp_path, monkeypatch, capsys):
+    write_example_house(tmp_path / "my_house")
+    monkeypatch.chdir(tmp_path)
+    for line in "".join(blocks("bring-your-house.md", "sh")).splitlines():
+        command = shlex.split(line)[1:]
+        assert main(command) == 0, line
+        said = capsys.readouterr().out
+        if command[0] == "check":
+            assert "0 errors, 1 warning\n" in said and "--points" in said
+        if command[0] == "run":
+            metrics = json.loads(Path(command[-1], "metrics.json").read_text(encoding="utf-8"))
+            assert metrics["delivered"] == metrics["objects"] == 4
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"4 2 2.3"', '"4 2 2.3" ', None),
+        ('mount:crate" pos="0.4 3.6 0"', 'mount:crate" pos="0.4 3.6 3"', "above the floor"),
+        (
+            '<geom name="lintel"',
+            '<body name="door" pos="4 2 1"><joint name="hinge"/><geom size=".4 .02 1"/></body><geom name="lintel"',
+            "'hinge'",
+        ),
+    ],
+)
+def test_the_faults_of_the_page_on_houses_are_reported(old, new, told, tmp_path, capsys):
+    write_example_house(tmp_path)
+    house = tmp_path / "house.xml"
+    text = house.read_text(encoding="utf-8")
+    assert old in text
+    house.write_text(text.replace(old, new), encoding="utf-8")
+    assert main(["check", str(tmp_path), "--json"]) == (2 if told else 0)
+    assert told is None or told in capsys.readouterr().out
+
+
+def test_every_sentence_of_the_paper_page_leads_to_a_test_that_exists():
+    assert len(PAPER_LINKS) > 50
+    for file, name in PAPER_LINKS:
+        assert f"\ndef {name}(" in (TESTS / file).read_text(encoding="utf-8"), f"{file}::{name}"
+
+
+def test_every_test_of_a_section_of_the_paper_is_named_by_its_page():
+    written = {
+        (f"paper/{path.name}", name)
+        for path in (TESTS / "paper").glob("test_section_*.py")
+        for name in re.findall(r"^def (test_\w+)\(", path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    assert written <= set(PAPER_LINKS)
+    assert all(line.count("|") == 3 for line in page("paper.md").splitlines() if "::test_" in line)

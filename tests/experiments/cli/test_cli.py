@@ -1,0 +1,201 @@
+"""The command line teaches, and names what is wrong with what it was given."""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from experiments.cli.main import COMMANDS, main, parser
+from experiments.cli.options import frame_size, int_list, seconds, text_list
+from mjsim.episode import Episode
+
+
+@pytest.mark.parametrize(
+    ("text", "values"), [("6", [6]), ("6,12", [6, 12]), ("0:3", [0, 1, 2]), ("7,0:2", [7, 0, 1])]
+)
+def test_lists_of_numbers(text, values):
+    assert int_list(text) == values
+
+
+@pytest.mark.parametrize("text", ["", "a", "1:b", "3:3", "-1", "1;2"])
+def test_lists_that_are_none(text):
+    with pytest.raises(argparse.ArgumentTypeError):
+        int_list(text)
+
+
+def test_lists_of_words():
+    assert text_list("none, optimal,") == ["none", "optimal"]
+
+
+@pytest.mark.parametrize(("text", "size"), [("640x480", (640, 480)), ("1920x1080", (1920, 1080))])
+def test_frame_sizes(text, size):
+    assert frame_size(text) == size
+
+
+@pytest.mark.parametrize("text", ["640", "641x480", "8x8", "axb", "640x480x3"])
+def test_unusable_frame_sizes(text):
+    with pytest.raises(argparse.ArgumentTypeError, match=text):
+        frame_size(text)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([command, "--help"])
+    assert stop.value.code == 0
+    text = capsys.readouterr().out
+    assert len(text.splitlines()) > 5
+
+
+def test_the_overview_names_every_command():
+    text = parser().format_help()
+    assert all(re.search(rf"\n    {command}\s", text) for command in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (["run", "--objects", "0", "--no-video"], "objects is 0"),
+        (["run", "--seed", "-1", "--no-video"], "seed must not be negative"),
+        (["run", "--assistance", "telepathy", "--no-video"], "no assistance condition 'telepathy'"),
+        (["run", "--user", "ghost", "--no-video"], "no participant 'ghost'"),
+        (["run", "--planner", "oracle", "--no-video"], "unknown solver 'oracle'"),
+        (["run", "--house", "castle", "--no-video"], "no house 'castle'"),
+        (["batch", "--seeds", "1,1"], "--seeds names a value twice"),
+    ],
+)
+def test_bad_input_is_named_in_one_line_and_leaves_nothing(arguments, fault, tmp_path, capsys):
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message.startswith("mjsim: ")
+    assert fault in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_named_in_one_line(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    out = tmp_path / "file" / "out"
+    assert main(["run", "--objects", "2", "--no-video", "--out", str(out)]) == 1
+    message = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message.startswith("mjsim: ") and str(tmp_path / "file") in message
+
+
+@pytest.mark.parametrize(
+    ("command", "defaults"),
+    [
+        ("run", ["objects, 1 to --points (default: 6)", "(default: optimal)", "size, px (default: 640x480)"]),
+        ("batch", ["(default: 0:10)", "(default: none,highlight,optimal)", "(default: apartment)"]),
+        ("replay", ["(default: 0.0)", "(default: first-person)", "a free camera, m (default: it circles"]),
+    ],
+)
+def test_the_help_names_the_default_of_every_option(command, defaults, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert all(default in text for default in defaults)
+    assert "None" not in text and "False" not in text
+
+
+def test_a_house_for_stock_mujoco(tmp_path, capsys):
+    assert main(["house", "--objects", "12", "--seed", "3", "--out", str(tmp_path / "house.xml")]) == 0
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "house.xml"))
+    episode = Episode.load(tmp_path / "house.episode.json")
+    assert len(episode.objects) == 12
+    for placed in episode.objects:
+        address = model.joint(f"{placed.name}/free").qposadr[0]
+        assert model.qpos0[address : address + 3] == pytest.approx(placed.position)
+    assert "12 misplaced objects" in capsys.readouterr().out
+
+
+def test_the_doctor_names_the_renderer(capsys):
+    assert main(["doctor"]) == 0
+    text = capsys.readouterr().out
+    assert "OpenGL" in text
+    assert "mujoco" in text
+
+
+def test_the_version_is_told(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out.startswith("mjsim ")
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-1", "soon"])
+def test_a_time_is_a_finite_number(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="is not a number of seconds"):
+        seconds(text)
+
+
+def test_a_design_takes_no_options_of_trials_beside_it(tmp_path, capsys):
+    design = tmp_path / "design.toml"
+    design.write_text("[[cells]]\npeople = 1\nobjects = 1\nassistance = 'none'")
+    assert (
+        main(["batch", str(design), "--user", "searcher", "--seeds", "1", "--out", str(tmp_path / "b")]) == 2
+    )
+    assert "leave out --seeds, --user" in capsys.readouterr().err
+    assert not (tmp_path / "b").exists()
+
+
+def test_modules_in_the_current_folder_are_found(tmp_path):
+    """By the installed command, whose own folder is elsewhere: participant and planner of one's own."""
+    (tmp_path / "mine.py").write_text(
+        "from experiments.participants.searcher import build\nfrom planner.greedy_solver import GreedySolver\n"
+    )
+    options = [
+        "--objects",
+        "1",
+        "--assistance",
+        "none",
+        "--fidelity",
+        "event",
+        "--time-limit",
+        "1",
+        "--no-video",
+    ]
+    own = ["--user", "mine:build", "--planner", "mine:GreedySolver", "--out", "run"]
+    root = str(Path(__file__).parents[3])
+    subprocess.run(
+        [sys.executable, "-P", "-m", "mjsim", "run", *options, *own],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": root},
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
+    start = json.loads((tmp_path / "run/events.jsonl").read_text().splitlines()[0])
+    assert (start["user"], start["planner"]) == ("mine:build", "mine:GreedySolver")
+    assert len(start["inputs"]["module mine"]) == 16
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["run"], ["batch"], ["play"], ["study"], ["study", "score"]], ids=" ".join
+)
+def test_help_loads_nothing_of_the_simulator(words):
+    """Start-up is most of the time of `--help`."""
+    code = (
+        "import sys\nfrom experiments.cli.main import main\n"
+        f"try:\n    main({[*words, '--help']})\nexcept SystemExit:\n    pass\n"
+        "print({'numpy', 'mujoco', 'numba', 'scipy', 'rich'} & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == "set()\n"
+
+
+def test_a_command_without_its_extra_names_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    assert main(["study", "analyze", str(tmp_path)]) == 2
+    assert "pip install 'mjsim[study]'" in capsys.readouterr().err
+
+
+def test_a_command_outside_its_checkout_says_what_it_needs(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "tools", None)
+    monkeypatch.delitem(sys.modules, "tools.gallery_command", raising=False)
+    assert main(["gallery", "--out", "pictures"]) == 2
+    assert "needs the source checkout" in capsys.readouterr().err

@@ -1,0 +1,89 @@
+"""`mjsim metrics`: the numbers of metrics.json from log and trajectory alone, for a run and for a batch."""
+
+import csv
+import json
+import shutil
+
+import pytest
+
+from experiments.cli.main import main
+from experiments.record import records
+from experiments.record.files import read_json, write_json
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    out = tmp_path_factory.mktemp("metrics") / "run"
+    config = TrialConfig(objects=6, assistance="none", seed=3, time_limit=8.0, fidelity="event")
+    run_trial(config, out, topdown=False)
+    return out
+
+
+@pytest.fixture
+def batch(run, tmp_path):
+    for name in ("one", "two"):
+        shutil.copytree(run, tmp_path / "batch" / "trials" / name)
+    return tmp_path / "batch"
+
+
+def test_a_run_without_its_metrics_is_measured_anew(run, tmp_path, capsys):
+    folder = shutil.copytree(run, tmp_path / "run")
+    (folder / records.METRICS).unlink()
+    assert main(["metrics", str(folder), "--out", str(tmp_path / "m.json")]) == 0
+    (row,) = read_json(tmp_path / "m.json")
+    expected = read_json(run / records.METRICS)
+    assert expected["simulated"] is True  # the default participant is no person
+    for name in ("frames_sha256", "renderer", "wall_s"):
+        del expected[name], row[name]
+    assert row == expected
+    assert main(["metrics", str(folder)]) == 0
+    shown = dict(
+        line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines() if " " in line.strip()
+    )
+    assert float(shown["task_distance_m"]) == expected["task_distance_m"]
+
+
+def test_metrics_that_say_something_else_are_named(run, tmp_path, capsys):
+    folder = shutil.copytree(run, tmp_path / "run")
+    write_json(folder / records.METRICS, {**read_json(run / records.METRICS), "nd_feasible": 0.99})
+    assert main(["metrics", str(folder)]) == 0
+    printed = capsys.readouterr()
+    assert "metrics.json does not say this" in printed.err
+    assert "0.99" not in printed.out
+
+
+def test_a_batch_gives_a_row_per_trial_and_names_those_that_cannot_be_measured(batch, capsys):
+    assert main(["metrics", str(batch)]) == 0
+    rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    assert len(rows) == 2 and rows[0] == rows[1]
+    assert rows[0]["assistance"] == "none" and float(rows[0]["completion_time_s"]) == 8.0
+    log = batch / "trials" / "one" / records.EVENTS
+    log.write_bytes(log.read_bytes().replace(b'"deviated": true', b'"deviated": false'))
+    with log.open("a") as file:
+        file.write("{}\n")
+    assert main(["metrics", str(batch)]) == 1
+    printed = capsys.readouterr()
+    assert "one" in printed.err and len(printed.out.splitlines()) == 2
+
+
+def test_what_exists_is_kept(run, tmp_path):
+    table = tmp_path / "table.csv"
+    table.write_text("mine")
+    assert main(["metrics", str(run), "--out", str(table)]) == 2
+    assert table.read_text() == "mine"
+    assert main(["metrics", str(run), "--out", str(table), "--force"]) == 0
+    assert "ipl_locations" in table.read_text()
+
+
+def test_other_formats_and_folders_are_refused_in_one_line(run, tmp_path, capsys):
+    folder = shutil.copytree(run, tmp_path / "run")
+    log = folder / records.EVENTS
+    old = json.loads(log.read_text().splitlines()[0]) | {"format": 3}
+    log.write_text(json.dumps(old) + "\n")
+    assert main(["metrics", str(folder)]) == 1
+    assert main(["metrics", str(tmp_path)]) == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert "has log format 3" in first
+    assert "neither a run directory nor the folder of a batch" in second

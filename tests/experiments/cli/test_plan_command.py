@@ -1,0 +1,246 @@
+"""`mjsim plan`: problems in JSON, plans in JSON, faults in one line."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from experiments.cli.main import main
+
+PROBLEM = {
+    "capacity": 2,
+    "start": 0,
+    "distances": [[0, 3, 5], [3, 0, 4], [5, 4, 0]],
+    "shipments": [{"pickup": 1, "delivery": 2}],
+    "onboard": [2],
+}
+
+
+def plan(tmp_path, capsys, problem, *options):
+    path = tmp_path / "problem.json"
+    path.write_text(problem if isinstance(problem, str) else json.dumps(problem))
+    code = main(["plan", str(path), *options])
+    return code, capsys.readouterr()
+
+
+@pytest.mark.parametrize("planner", ["exact", "ortools"])
+def test_the_problem_of_the_help_text(tmp_path, capsys, planner):
+    code, printed = plan(tmp_path, capsys, PROBLEM, "--planner", planner)
+    answer = json.loads(printed.out)
+    assert code == 0
+    # Fetch on the way, drop both at once: 3 + 4 + 0.
+    assert answer["visits"] == [1, 2, 2]
+    assert (answer["cost"], answer["lower_bound"], answer["status"]) == (7.0, 7.0, "optimal")
+    assert answer["seconds"] >= 0
+
+
+def test_nothing_to_do_is_a_plan(tmp_path, capsys):
+    code, printed = plan(tmp_path, capsys, {"distances": [[0]], "shipments": []})
+    assert code == 0
+    assert json.loads(printed.out)["visits"] == []
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"distances": [[0, 1], [1, 0], [2, 2]]}, "must be square"),
+        ({"distances": [[0, 1, 2], [1, 0], [2, 1, 0]]}, "row 1 has 2 of 3"),
+        ({"distances": [[0, 3, 5], [2, 0, 4], [5, 4, 0]]}, "make it symmetric"),
+        (
+            {"distances": [[0, None, 5], [3, 0, 4], [5, 4, 0]]},
+            "Expected `float`, got `null` - at `$.distances[0][1]`; a problem is",
+        ),
+        ({"distances": 7}, "Expected `array`, got `int` - at `$.distances`; a problem is"),
+        ({"distances": []}, "square matrix"),
+        ({"start": 3}, "start 3 is out of range for 3 locations"),
+        ({"start": 0.5}, "Expected `int`, got `float` - at `$.start`; a problem is"),
+        (
+            {"shipments": [{"pickup": 1}]},
+            "missing required field `delivery` - at `$.shipments[0]`; a problem is",
+        ),
+        ({"shipments": None}, "Expected `array`, got `null` - at `$.shipments`; a problem is"),
+        ({"onboard": [1.9]}, "Expected `int`, got `float` - at `$.onboard[0]`; a problem is"),
+        ({"capacity": True}, "Expected `int`, got `bool` - at `$.capacity`; a problem is"),
+        ({"onbaord": []}, "unknown field `onbaord`; a problem is"),
+    ],
+)
+def test_a_malformed_problem_exits_with_two_and_one_line(tmp_path, capsys, change, fault):
+    code, printed = plan(tmp_path, capsys, {**PROBLEM, **change})
+    assert code == 2
+    assert printed.out == ""
+    assert len(printed.err.strip().splitlines()) == 1
+    assert fault in printed.err
+    assert "problem.json" in printed.err
+
+
+def test_a_missing_file_is_named(capsys):
+    assert main(["plan", "no/such/file.json"]) == 2
+    assert "no/such/file.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("limit", ["0", "-1", "nan", "inf"])
+def test_a_time_limit_must_be_positive_and_finite(tmp_path, capsys, limit):
+    code, printed = plan(tmp_path, capsys, PROBLEM, f"--time-limit={limit}")
+    assert code == 2
+    assert "must be positive and finite" in printed.err
+
+
+def test_a_limit_too_short_for_any_planner_still_gives_a_tour(tmp_path, capsys):
+    code, printed = plan(tmp_path, capsys, scattered(30), "--time-limit", "0.02")
+    answer = json.loads(printed.out)
+    assert (code, answer["status"]) == (0, "feasible")
+    assert len(answer["visits"]) == 61
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_planning_with_the_best_tour_so_far(number):
+    command = [sys.executable, "-m", "experiments.cli.main", "plan", "-", "--time-limit", "100"]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    process.stdin.write(json.dumps(scattered(80)))  # more than a pipe holds: from here on it is reading
+    process.stdin.flush()
+    process.stdin.close()
+    process.stdin = None
+    time.sleep(2.0)  # a first tour takes milliseconds, but the machine may be busy
+    process.send_signal(number)
+    asked = time.monotonic()
+    out, err = process.communicate(timeout=60)
+    assert time.monotonic() - asked < 5
+    assert process.returncode == 128 + number
+    assert json.loads(out)["status"] == "feasible"
+    assert "best tour so far" in err
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"), [({"capacity": 3}, "capacity of 3"), ({}, "more than 40"), (None, "triangle")]
+)
+def test_a_plan_of_or_tools_says_that_it_is_not_proven(tmp_path, capsys, change, reason):
+    problem = scattered(41 if change == {} else 5) | (change or {})
+    if change is None:
+        problem["distances"][1][9] = problem["distances"][9][1] = 100.0
+    code, printed = plan(tmp_path, capsys, problem, "--time-limit", "1")
+    assert (code, json.loads(printed.out)["status"]) == (0, "feasible")
+    assert "planned by OR-Tools, not proven" in printed.err and reason in printed.err
+
+
+def claimed(tmp_path, capsys, problem, *options):
+    """Problem and certificate as files, and what the certificate says."""
+    claim = tmp_path / "claim.json"
+    code, printed = plan(tmp_path, capsys, problem, "--certificate", str(claim), *options)
+    assert code == 0
+    assert set(json.loads(printed.out)) == {"visits", "cost", "lower_bound", "status", "seconds"}
+    return claim, json.loads(claim.read_text())
+
+
+def checked(tmp_path, capsys, claim):
+    code = main(["plan", str(tmp_path / "problem.json"), "--check", str(claim)])
+    return code, capsys.readouterr()
+
+
+def scattered(count, capacity=2):
+    places = np.random.default_rng(count).uniform(0, 10, (5 + count, 2))
+    distances = np.linalg.norm(places[:, None] - places[None], axis=2)
+    shipments = [{"pickup": 5 + k, "delivery": 1 + k % 4} for k in range(count)]
+    return {"distances": distances.tolist(), "shipments": shipments, "onboard": [2], "capacity": capacity}
+
+
+@pytest.mark.parametrize(
+    ("problem", "planner"),
+    [
+        (PROBLEM, "exact"),
+        (scattered(9), "exact"),
+        (scattered(5, 3), "exact"),
+        (scattered(20), "exact"),
+        (scattered(9), "ortools"),
+        (scattered(9), "greedy"),
+        (scattered(0), "exact"),
+    ],
+)
+def test_a_certificate_is_verified_from_its_files_alone(tmp_path, capsys, problem, planner):
+    limit = ("--time-limit", "0.3") if planner == "ortools" else ()
+    claim, written = claimed(tmp_path, capsys, problem, "--planner", planner, *limit)
+    code, printed = checked(tmp_path, capsys, claim)
+    answer = json.loads(printed.out)
+    assert (code, answer["holds"]) == (0, True)
+    assert (answer["cost"], answer["lower_bound"]) == (written["cost"], written["lower_bound"])
+    assert 0 <= answer["verified_bound"] <= answer["cost"]
+    if planner == "exact":
+        assert answer["verified_bound"] == pytest.approx(answer["cost"], rel=1e-8)
+        assert (answer["verified_optimal"], answer["unverified"]) == (True, "")
+
+
+PROOF = {"proof": "full-table", "unit": 1.0, "groups": [], "multipliers": []}
+
+
+@pytest.mark.parametrize(
+    ("forge", "fault"),
+    [
+        (lambda c: c["visits"].reverse(), "places an object that is not carried"),
+        (lambda c: c["visits"].pop(), "never done"),
+        (lambda c: c.update(cost=c["cost"] - 1, lower_bound=c["lower_bound"] - 1), "long, not"),
+        (lambda c: c.update(lower_bound=c["lower_bound"] - 1), "called optimal with a gap"),
+        (lambda c: c["certificate"].update(root=c["certificate"]["root"] * 2), "its proof yields only"),
+    ],
+)
+def test_a_forged_claim_exits_with_one_and_says_why(tmp_path, capsys, forge, fault):
+    claim, written = claimed(tmp_path, capsys, scattered(9))
+    forge(written)
+    claim.write_text(json.dumps(written))
+    code, printed = checked(tmp_path, capsys, claim)
+    answer = json.loads(printed.out)
+    assert (code, answer["holds"], printed.err) == (1, False, "")
+    assert fault in answer["fault"]
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"visits": [["pick", 9]]}, "visits[0] is of number 9, but the problem has 9 to pick"),
+        ({"visits": [["place onboard", -1]]}, "number -1"),
+        ({"visits": [["throw", 1]]}, "Invalid enum value 'throw' - at `$.visits[0][0]`; a claim is"),
+        ({"visits": 3}, "Expected `array`, got `int` - at `$.visits`; a claim is"),
+        ({"status": "perfect"}, "Invalid enum value 'perfect' - at `$.status`; a claim is"),
+        ({"cost": "3"}, "Expected `float`, got `str` - at `$.cost`; a claim is"),
+        ({"format": 1}, "Invalid enum value 1 - at `$.format`; a claim is"),
+        ({"certificate": PROOF | {"root": 10**400}}, "$.certificate.root"),
+        ({"certificate": {"proof": "full-table"}}, "required field `unit` - at `$.certificate`; a claim is"),
+        ({"more": 1}, "unknown field `more`; a claim is"),
+    ],
+)
+def test_a_malformed_claim_exits_with_two_and_one_line(tmp_path, capsys, change, fault):
+    claim, written = claimed(tmp_path, capsys, scattered(9))
+    claim.write_text(json.dumps({**written, **change}))
+    code, printed = checked(tmp_path, capsys, claim)
+    assert (code, printed.out, len(printed.err.strip().splitlines())) == (2, "", 1)
+    assert fault in printed.err
+    assert "claim.json" in printed.err
+
+
+def test_only_one_of_problem_and_claim_comes_from_standard_input(capsys):
+    assert main(["plan", "-", "--check", "-"]) == 2
+    assert "standard input" in capsys.readouterr().err
+
+
+LOADS = """
+import json, sys
+from experiments.cli.main import main
+assert main(["plan", sys.argv[1]]) == 0
+heavy = {"gymnasium", "llvmlite", "matplotlib", "mujoco", "networkx", "numba", "ortools", "scipy", "shapely"}
+print(json.dumps(sorted(heavy & set(sys.modules))))
+"""
+
+
+@pytest.mark.parametrize(("objects", "allowed"), [(12, set()), (16, {"llvmlite", "numba", "scipy"})])
+def test_a_fresh_process_loads_no_more_than_it_takes_to_plan(tmp_path, objects, allowed):
+    """To load a library takes longer than to plan; numba, which brings scipy, pays from about 15 objects on."""
+    path = tmp_path / "problem.json"
+    path.write_text(json.dumps(scattered(objects)))
+    ran = subprocess.run([sys.executable, "-c", LOADS, str(path)], capture_output=True, text=True, check=True)
+    answer, loaded = map(json.loads, ran.stdout.splitlines())
+    assert answer["status"] == "optimal"
+    assert set(loaded) <= allowed

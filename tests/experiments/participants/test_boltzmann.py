@@ -1,0 +1,122 @@
+"""The participant that weighs regrets: exact odds from bounds, optimal when cold, wandering when hot."""
+
+import math
+
+import numpy as np
+import pytest
+from planning_cases import Task, two_rooms
+
+from experiments.errors import ConfigError
+from experiments.house import House
+from experiments.participants import participant
+from experiments.participants.base import Choice
+from experiments.participants.boltzmann import draw
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+from planner.plan import Visit, VisitKind
+from planner.regret import RegretEvaluator
+
+TRUE = (0.0, 0.3, 0.8, 2.0, 3.0)
+BOUND = (0.0, 0.3, 0.5, 0.5, 0.5)  # the last three are only known to be at least 0.5 m
+
+
+def choices(asked, unknown=()):
+    def exact(k):
+        asked.append(k)
+        return None if k in unknown else TRUE[k]
+
+    return [
+        Choice(Visit(VisitKind.PICK, f"object_{k}"), np.zeros(2), BOUND[k], k > 1, lambda k=k: exact(k))
+        for k in range(5)
+    ]
+
+
+@pytest.mark.parametrize("temperature", [0.3, 1.0, 20.0])
+def test_the_odds_are_those_of_the_exact_regrets_though_only_bounds_are_known(temperature):
+    rng, count = np.random.default_rng(0), 6000
+    drawn = [draw(choices([]), temperature, rng).visit.object for _ in range(count)]
+    weights = np.exp(-np.array(TRUE) / temperature)
+    expected = weights / weights.sum()
+    found = np.array([drawn.count(f"object_{k}") for k in range(5)]) / count
+    assert np.abs(found - expected).max() < 4 * math.sqrt(0.25 / count)
+
+
+def test_what_is_not_likely_is_hardly_ever_worked_out():
+    asked, rng = [], np.random.default_rng(1)
+    for _ in range(200):
+        draw(choices(asked), 0.05, rng)
+    assert len(asked) < 10
+
+
+def test_an_unprovable_regret_counts_as_its_bound():
+    rng = np.random.default_rng(2)
+    drawn = [draw(choices([], unknown=(2, 3, 4)), 1.0, rng).visit.object for _ in range(3000)]
+    assert drawn.count("object_4") / 3000 == pytest.approx(
+        math.exp(-0.5) / (1 + math.exp(-0.3) + 3 * math.exp(-0.5)), abs=0.03
+    )
+
+
+def test_without_any_temperature_the_best_is_taken():
+    assert draw(choices([]), 0.0, np.random.default_rng(0)).visit.object == "object_0"
+
+
+def walked_by_drawing(geodesics, temperature, seed):
+    """Length of a task of eight objects, done in an order drawn from its regrets."""
+    task, rng, evaluator, length = (
+        Task(geodesics, 8, seed),
+        np.random.default_rng(seed),
+        RegretEvaluator(geodesics),
+        0.0,
+    )
+    while found := evaluator.all(task.state):
+        options = [Choice(visit, np.zeros(2), r.regret, False, lambda: None) for visit, r in found.items()]
+        drawn, here = draw(options, temperature, rng), task.position
+        task.do(*drawn.visit)
+        length += geodesics.shortest_path(here, task.position).geodesic_distance
+    return length
+
+
+def test_the_colder_the_shorter_and_at_zero_the_optimum():
+    geodesics = two_rooms()
+    best = [
+        next(iter(RegretEvaluator(geodesics).all(Task(geodesics, 8, seed).state).values())).cost
+        for seed in range(6)
+    ]
+    means = []
+    for temperature in (0.0, 0.001, 0.5, 5.0, 1e6):
+        lengths = [walked_by_drawing(geodesics, temperature, seed) for seed in range(6)]
+        means.append(sum(lengths))
+        if temperature <= 0.001:
+            assert lengths == pytest.approx(best, abs=0.02)
+    assert means[1] < means[2] < means[3] < means[4]
+
+
+def test_a_cold_participant_regrets_nothing_and_a_hot_one_walks_more(tmp_path):
+    house = House.load()
+    cold, hot = (
+        run_trial(
+            TrialConfig(objects=6, assistance="optimal", seed=2, user=f"boltzmann:{temperature}"),
+            tmp_path / temperature,
+            topdown=False,
+            house=house,
+        )
+        for temperature in ("0", "30")
+    )
+    assert (cold["delivered"], hot["delivered"]) == (6, 6)
+    assert cold["regretful_visits"] == 0
+    assert cold["total_regret_m"] < 0.05  # where one stands when reaching makes a difference of centimetres
+    assert hot["regretful_visits"] > 2
+    assert hot["total_regret_m"] > 3
+    assert hot["nd_feasible"] > cold["nd_feasible"]
+    assert hot["task_distance_m"] > cold["task_distance_m"] + 3
+
+
+@pytest.mark.parametrize("text", ["", "warm", "-1", "nan", "inf"])
+def test_a_temperature_is_a_number_of_metres(text):
+    with pytest.raises(ConfigError, match="number of metres"):
+        participant(f"boltzmann:{text}")
+
+
+def test_who_takes_no_parameter_says_so():
+    with pytest.raises(ConfigError, match="nearest takes no parameter, got '3'"):
+        participant("nearest:3")

@@ -1,0 +1,305 @@
+"""The simulated guest: laws of each of its parts, and of whole trials."""
+
+import dataclasses
+import inspect
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sessions import prepared
+
+from experiments.errors import ConfigError
+from experiments.participants.behaviour import draw
+from experiments.participants.distribution import Distributions
+from experiments.participants.guest import PARAMETERS, PARTS, as_behaviour
+from experiments.participants.guest.compliance import Adherence, Compliance
+from experiments.participants.guest.decision import Task, choose, first_step_costs
+from experiments.participants.guest.memory import Memory, Recollection
+from experiments.participants.guest.perception import Noticing, Perception
+from experiments.participants.guest.timing import Timing
+from experiments.participants.guest.walking import Detours, Walking
+from experiments.trials.setup import draw_behaviour
+from experiments.trials.trial_config import TrialConfig
+
+FULL_COMPLIANCE = {"compliance.follows": 1.0, "compliance.quits": 0.0}
+metres = st.floats(0.0, 30.0)
+shares = st.floats(0.01, 1.0)
+
+
+# Perception
+
+
+@given(metres, metres, shares, shares)
+def test_what_is_nearer_and_less_hidden_is_noticed_more_probably(a, b, one, other):
+    perception = Perception(7.0, 1.0, 0.8, 4.0)
+    near, far = sorted((a, b))
+    hidden, open_ = sorted((one, other))
+    assert perception.probability(near, one) >= perception.probability(far, one)
+    assert perception.probability(a, open_) >= perception.probability(a, hidden)
+
+
+def test_half_of_what_lies_at_the_half_distance_is_noticed_and_nothing_behind_a_wall():
+    assert Perception(6.5, 1.0, 0.8, 4.0).probability(6.5, 1.0) == pytest.approx(0.5)
+    assert Perception(6.5, 1.0, 0.8, 4.0).probability(0.5, 0.0) == 0.0
+
+
+class Seen:
+    """As much of a percept as noticing takes."""
+
+    def __init__(self, distance):
+        self.position, self.nearby = np.zeros(2), {}
+        self.places = {f"object_{k}": np.array([distance, 0.0]) for k in range(4000)}
+        self.visible_shares = dict.fromkeys(self.places, 1.0)
+
+    def look(self):
+        return self.places
+
+
+@pytest.mark.parametrize("distance", [5.0, 7.0, 8.5])
+def test_as_many_objects_are_noticed_as_the_law_says_however_often_one_looks(distance):
+    perception = Perception(7.0, 1.0, 0.8, 4.0)
+    noticing = Noticing(perception, np.random.default_rng(0))
+    seen = Seen(distance)
+    first, again = noticing.notice(seen), noticing.notice(seen)
+    assert first == again
+    assert len(first) / 4000 == pytest.approx(perception.probability(distance, 1.0), abs=0.03)
+    noticing.look_afresh()
+    assert set(noticing.notice(seen)) != set(first)
+
+
+# Memory
+
+
+@given(st.integers(0, 2**32))
+def test_perfect_memory_knows_all_bins_and_none_knows_none(seed):
+    bins = [f"bin_{k}" for k in range(6)]
+    rng = np.random.default_rng(seed)
+    assert Recollection(Memory(1.0, 300.0), bins, rng).bins == set(bins)
+    assert Recollection(Memory(0.0, 300.0), bins, rng).bins == set()
+
+
+def test_what_is_not_seen_again_is_forgotten_exponentially():
+    known = Recollection(Memory(1.0, 100.0), [], np.random.default_rng(0))
+    known.learn({f"object_{k}": np.zeros(2) for k in range(4000)}, 50.0)
+    known.forget(150.0, but="object_0")
+    assert len(known.objects) / 4000 == pytest.approx(math.exp(-1), abs=0.03)
+    known.forget(1e9, but="object_0")
+    assert list(known.objects) == ["object_0"] or not known.objects
+
+
+# Decision
+
+
+@given(st.lists(metres, min_size=1, max_size=8), st.integers(0, 1000))
+def test_the_cheapest_is_chosen_at_temperature_zero(costs, seed):
+    assert choose(costs, 0.0, np.random.default_rng(seed)) == int(np.argmin(costs))
+
+
+@pytest.mark.parametrize("temperature", [0.5, 2.0])
+def test_odds_of_a_choice_are_those_of_boltzmann(temperature):
+    rng, costs = np.random.default_rng(0), np.array([0.0, 0.5, 2.0, np.inf])
+    drawn = np.bincount([choose(costs, temperature, rng) for _ in range(8000)], minlength=4) / 8000
+    expected = np.exp(-costs / temperature)
+    assert np.abs(drawn - expected / expected.sum()).max() < 0.03
+
+
+def line(places):
+    return np.abs(np.subtract.outer(places, places)).astype(float)
+
+
+def test_looking_ahead_counts_the_visits_that_follow():
+    """On a line: two objects at 2 and 3 m, their bin at 1 m, the person at 0."""
+    task = Task(line([0, 2, 3, 1]), picks=[1, 2], bins=[3, 3], carried=[], capacity=2)
+    assert first_step_costs(task, 1) == [2.0, 3.0]
+    assert first_step_costs(task, 2) == [2.0 + 1.0, 3.0 + 1.0]
+    assert first_step_costs(task, 3) == [2.0 + 1.0 + 2.0, 3.0 + 1.0 + 1.0]
+
+
+def test_full_hands_can_only_place():
+    task = Task(line([0, 2, 1]), picks=[1], bins=[2], carried=[2, 2], capacity=2)
+    assert first_step_costs(task, 2) == [math.inf, 1.0, 1.0]
+
+
+# Compliance
+
+
+def test_who_always_follows_neither_gives_up_nor_picks_up_anything_else():
+    always = Adherence(Compliance(1.0, 1.0, 1.0, 9.0, quits=0.0), np.random.default_rng(0))
+    assert all(always.takes_up() and always.gives_up_after(5.0) is None for _ in range(100))
+    assert not any(always.picks_up(0.1) for _ in range(100))
+
+
+def test_others_do_as_often_as_they_are_said_to():
+    person = Adherence(Compliance(0.3, 0.2, 0.4, 2.0, quits=0.0), np.random.default_rng(0))
+    times = range(8000)
+    assert np.mean([person.takes_up() for _ in times]) == pytest.approx(0.3, abs=0.02)
+    given_up = [person.gives_up_after(5.0) for _ in times]
+    assert np.mean([after is not None for after in given_up]) == pytest.approx(0.2, abs=0.02)
+    assert all(0.0 <= after <= 5.0 for after in given_up if after is not None)
+    assert np.mean([person.picks_up(1.9) for _ in times]) == pytest.approx(0.4, abs=0.02)
+    assert not any(person.picks_up(2.1) for _ in range(100))
+
+
+def test_whoever_quits_follows_nothing_more_and_sooner_or_later_everybody_does():
+    people = [
+        Adherence(Compliance(1.0, 0.0, 0.0, 2.0, quits=0.1), np.random.default_rng(k)) for k in range(2000)
+    ]
+    followed = np.array([[person.takes_up() for _ in range(20)] for person in people])
+    assert np.all(np.diff(followed.astype(int), axis=1) <= 0)
+    assert followed.mean(axis=0) == pytest.approx(0.9 ** np.arange(1, 21), abs=0.04)
+
+
+# Walking
+
+
+def test_without_lapses_and_pull_a_walk_has_no_stops(house):
+    ends = house.navmesh.sample(np.random.default_rng(1), 40).reshape(-1, 2, 2)
+    steady = Detours(Walking(0.0, 3.0, 0.0), house, np.random.default_rng(0))
+    assert not any(steady.stops(a, b, pole=True) for a, b in ends)
+    pulled = Detours(Walking(0.0, 3.0, 1.0), house, np.random.default_rng(0))
+    stops = [stop for a, b in ends for stop in pulled.stops(a, b, pole=True)]
+    assert stops and all(np.linalg.norm(stop - house.navmesh.snap(stop)) < 0.01 for stop in stops)
+    assert not any(pulled.stops(a, b, pole=False) for a, b in ends)
+
+
+@pytest.mark.parametrize("lapse_distance", [2.5, 6.0])
+def test_lapses_lead_to_places_of_the_house_that_are_not_too_far(house, lapse_distance):
+    starts = house.navmesh.sample(np.random.default_rng(2), 60)
+    absent = Detours(Walking(1.0, lapse_distance, 0.0), house, np.random.default_rng(0))
+    walks = [
+        house.geodesics.shortest_path(start, stop).geodesic_distance
+        for start in starts
+        for stop in absent.stops(start, start, pole=False)
+    ]
+    assert len(walks) >= 55 and max(walks) <= lapse_distance and max(walks) > 0.8 * lapse_distance
+    assert (
+        Detours(Walking(1.0, 0.1, 0.0), house, np.random.default_rng(0)).stops(
+            starts[0], starts[1], pole=False
+        )
+        == []
+    )
+
+
+# Time
+
+
+def test_times_are_those_of_the_sources():
+    timing = Timing(1.0, 1.35, 238.0, 4.0, 6.0, 2.0)
+    assert timing.choice_time(poles=False) == 1.35 and timing.choice_time(poles=True) == 3.35
+    assert timing.list_time(119) == pytest.approx(120.0)
+    slow = dataclasses.replace(timing, pace=2.0)
+    assert slow.suggestion_time() == 2 * timing.suggestion_time() == 12.0
+
+
+# People
+
+
+def test_every_parameter_has_a_unit_a_range_and_words():
+    for part, kind in PARTS.items():
+        for field in dataclasses.fields(kind):
+            parameter = PARAMETERS[f"{part}.{field.name}"]
+            assert parameter.lowest < parameter.highest
+            before, _, after = inspect.getsource(kind).partition(f"\n    {field.name}: ")
+            assert "  # " in after.partition("\n")[0] or before.rpartition("\n")[2].startswith("    # ")
+
+
+@given(st.integers(0, 2**32))
+def test_describing_one_parameter_leaves_the_others_as_they_were(seed):
+    usual = draw(PARAMETERS, Distributions(), np.random.default_rng(seed), "guest")
+    obedient = Distributions.of({"compliance": {"follows": 1}})
+    other = draw(PARAMETERS, obedient, np.random.default_rng(seed), "guest")
+    assert other == usual | {"compliance.follows": 1.0}
+    assert as_behaviour(other).compliance.follows == 1.0
+    assert Distributions.of(obedient.as_dict()) == obedient
+
+
+def test_kinds_of_people_are_as_frequent_as_described():
+    drawn = [
+        draw(PARAMETERS, Distributions(), np.random.default_rng(seed), "guest")["compliance.follows"]
+        for seed in range(3000)
+    ]
+    assert np.mean(np.array(drawn) == 1.0) == pytest.approx(0.62, abs=0.03)
+    assert np.mean(drawn) == pytest.approx(0.62 + 0.20 * 0.5 + 0.18 * 0.1, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("user", "behaviour", "message"),
+    [
+        (
+            "guest",
+            {"compliance": {"obeys": 1}},
+            "participant 'guest' has no 'compliance.obeys'; it has perception",
+        ),
+        ("guest", {"compliance.follows": 1.5}, "compliance.follows must be 0 to 1 probability, got 1.5"),
+        ("guest", {"timing.pace": "slow"}, "timing.pace: Expected `float`, got `str`"),
+        ("guest", {"timing.pace": {"mixture": [1, 2]}}, "timing.pace: Expected `array`, got `int` - at `"),
+        ("guest", {"timing.pace": {"beta": [0, 2]}}, "timing.pace: the parameters of beta must be positive"),
+        (
+            "follower",
+            {"compliance.follows": 1},
+            "participant 'follower' has no 'compliance.follows'; it has no par",
+        ),
+    ],
+)
+def test_impossible_parameters_are_named(user, behaviour, message):
+    with pytest.raises(ConfigError, match=message):
+        draw_behaviour(trial(user=user, behaviour=behaviour))
+
+
+# Whole trials
+
+
+def trial(behaviour=None, **options):
+    described = Distributions.of(behaviour or {})
+    settings = {"objects": 6, "assistance": "optimal", "seed": 3, "fidelity": "event", "regret": False}
+    return TrialConfig(**{"user": "guest", **settings, **options, "behaviour": described})
+
+
+def played(house, config):
+    session, _, log = prepared(house, config)
+    session.run()
+    return session.record.record().recording["state_hash"].tolist(), log.events
+
+
+def test_who_complies_never_deviates_and_who_does_not_does(house):
+    def deviations(follows, seed):
+        people = {"compliance.follows": follows, "compliance.quits": 0.0, "perception.half_distance": 50.0}
+        config = trial(people, seed=seed)
+        return sum(e["deviated"] for e in played(house, config)[1] if e["event"] == "visit")
+
+    assert [deviations(1.0, seed) for seed in range(3)] == [0, 0, 0]
+    assert any(deviations(0.0, seed) for seed in range(3))
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_who_gives_up_the_only_object_it_knows_looks_for_others(house, seed):
+    fickle = {"compliance.follows": 0.5, "compliance.abandons": 1.0, "compliance.picks_up": 0.0}
+    slow_eyes = {"perception.half_distance": 3.0, "walking.lapse_rate": 0.0, "timing.pace": 1.0}
+    _, events = played(house, trial(fickle | slow_eyes, seed=seed))
+    assert events[-1]["reason"] == "all delivered"
+
+
+def test_guidance_takes_its_time(house):
+    quick, slow = (
+        played(house, trial(FULL_COMPLIANCE | {"timing.pace": 1.0, "timing.guided_step": seconds}))
+        for seconds in (0.0, 6.0)
+    )
+    assert slow[1][-1]["t"] - quick[1][-1]["t"] == pytest.approx(12 * 6.0, abs=1.0)
+
+
+def test_nobody_loses_a_path_that_is_shown(house):
+    steady, absent = (
+        played(house, trial(FULL_COMPLIANCE | {"walking.lapse_rate": lapses})) for lapses in (0.0, 1.0)
+    )
+    assert steady[0] == absent[0]
+
+
+def test_the_person_is_drawn_by_its_seed_and_logged(house):
+    config = trial(person_seed=7, house_seed=3, order_seed=3)
+    _, events = played(house, config)
+    assert events[1]["event"] == "participant"
+    assert events[1]["behaviour"] == draw_behaviour(config)
+    assert set(events[1]["behaviour"]) == set(PARAMETERS)
+    assert draw_behaviour(config) != draw_behaviour(trial(person_seed=8, house_seed=3, order_seed=3))

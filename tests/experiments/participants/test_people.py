@@ -1,0 +1,233 @@
+"""People who differ: drawn by their seed, logged with every value, replayed to the bit."""
+
+import dataclasses
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.stats
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.cli.main import main
+from experiments.errors import ConfigError, ReplayError
+from experiments.participants.distribution import Distribution, Distributions
+from experiments.participants.follower import Follower
+from experiments.record import records
+from experiments.record.reader import read_run
+from experiments.record.records import EventLog, read_events
+from experiments.replay.replay import replay
+from experiments.trials.design import read_design
+from experiments.trials.person import check_person, drawn_person
+from experiments.trials.setup import draw_person, prepare_session
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+from mjsim.model.scene import compose
+from mjsim.options import FIDELITIES
+from mjsim.person_parameters import RANGES, PersonParameters
+
+PEOPLE = """{
+    walking_speed = {normal = [1.2, 0.2], min = 0.8}, reading_time = {lognormal = [1.35, 0.35]},
+    reach = {uniform = [0.8, 1.1]}, field_of_view = 1.2, body_radius = 0.15,
+    motion = {reach_time = {uniform = [0.3, 0.6]}},
+}""".replace("\n", " ").replace(", }", "}")
+
+
+@given(st.floats(0.001, 0.999), st.floats(0.5, 2.0), st.floats(0.05, 1.0))
+def test_distributions_are_those_of_statistics(share, first, spread):
+    """Against SciPy, which truncates likewise."""
+    low, high = first * 0.7, first * 1.6
+    normal = scipy.stats.truncnorm((low - first) / spread, (high - first) / spread, first, spread)
+    uniform = scipy.stats.uniform(low, high - low)
+    whole = scipy.stats.lognorm(spread, scale=first)
+    below, above = whole.cdf(low), whole.cdf(high)
+    for shape, second, expected in (
+        ("normal", spread, normal.ppf(share)),
+        ("lognormal", spread, whole.ppf(below + share * (above - below))),
+        ("uniform", first + spread, min(high, max(low, uniform.ppf(share)))),
+    ):
+        start = low if shape == "uniform" else first
+        end = high if shape == "uniform" else second
+        assert Distribution(**{shape: (start, end)}).quantile(share, low, high) == pytest.approx(
+            expected, rel=1e-6
+        )
+
+
+@given(st.integers(0, 2**32))
+def test_people_stay_within_their_limits_and_describing_more_changes_nothing_else(seed):
+    def draw(**described):
+        return drawn_person(Distributions.of(described), np.random.default_rng(seed))
+
+    slow = {"normal": [1.2, 0.5], "min": 1.0, "max": 1.3}
+    one, two = draw(walking_speed=slow), draw(walking_speed=slow, reach={"normal": [1.0, 9.0]})
+    assert 1.0 <= one.walking_speed == two.walking_speed <= 1.3
+    assert RANGES["reach"][0] <= two.reach <= RANGES["reach"][1]
+    assert one == dataclasses.replace(PersonParameters(), walking_speed=one.walking_speed)
+
+
+def test_nobody_differs_unless_somebody_says_so():
+    assert drawn_person(Distributions(), np.random.default_rng(0)) == PersonParameters()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{walking_speed = -1}", r"walking_speed must be 0\.1 to 8 m/s, got -1"),
+        ("{height = 1.8}", "a person has no 'height'; it has walking_speed"),
+        ("{reach = {normal = [1.0]}}", r"reach: Expected `array` of length 2, got 1 - at `\$\.normal`"),
+        ("{reach = {normal = [1.0, 0.0]}}", "reach: the standard deviation of normal must be positive"),
+        ("{reach = {gamma = [1.0, 0.1]}}", "reach.gamma: Expected `float`, got `array`"),
+        ("{reach = {normal = [1.0, 0.1], mean = 1.0}}", "reach: Object contains unknown field `mean`"),
+        ("{reach = {uniform = [1.1, 0.9]}}", "reach: uniform takes the lowest value, then the highest"),
+        (
+            "{reach = {normal = [9.0, 0.1]}}",
+            r"reach: normal = \[9\.0, 0\.1\] has no values from 0\.6 to 1\.5",
+        ),
+        ("{reach = {normal = [1.0, 0.1], min = 1.2, max = 1.1}}", "reach: min must not exceed max"),
+        ("{reach = nan}", "reach: nan: every number must be finite"),
+        ("{reach = 'far'}", "reach: Expected `float`, got `str`"),
+        ("{motion = {lift_time = 9.0}}", r"motion\.lift_time must be 0\.1 to 3 .* got 9\.0"),
+        ("{reach = ", "is not a description of people in TOML"),
+        ("nobody.toml", "cannot read nobody.toml"),
+    ],
+)
+def test_impossible_descriptions_are_named(text, message):
+    with pytest.raises(ConfigError, match=message):
+        check_person(Distributions.parse(text))
+
+
+def test_a_description_comes_back_from_what_is_logged():
+    people = Distributions.parse(PEOPLE)
+    assert Distributions.of(json.loads(json.dumps(people.as_dict()))) == people
+
+
+def test_the_page_about_people_says_what_holds():
+    """Its table lists every value, and its example can be read."""
+    page = (Path(__file__).parents[3] / "docs" / "people.md").read_text(encoding="utf-8")
+    for name, (low, high, unit) in RANGES.items():
+        usual = getattr(PersonParameters(), name)
+        assert f"| `{name}` | {usual:.4g} | {low:.4g} to {high:.4g} | {unit} |" in page
+    example = page.split("```toml\n")[1].split("```")[0]
+    assert len(Distributions.of(tomllib.loads(example))) == 5
+
+
+def test_a_design_says_who_takes_part(tmp_path):
+    file = tmp_path / "design.toml"
+    file.write_text(
+        '[all_cells]\nobjects = 6\nassistance = "none"\nseeds = "0:2"\n'
+        "[[cells]]\n[[cells]]\nseeds = [7]\nperson = {walking_speed = {normal = [1.2, 0.2]}}\n"
+    )
+    usual, _, other = read_design(file).trials
+    assert draw_person(usual) == PersonParameters()
+    assert other.person == Distributions.of({"walking_speed": {"normal": [1.2, 0.2]}})
+    file.write_text(file.read_text().replace("walking_speed", "walking_pace"))
+    with pytest.raises(ConfigError, match=r"no 'walking_pace'.*cells\[1\]"):
+        read_design(file)
+
+
+def quick_follower(house, rng):  # noqa: ARG001 - as every factory
+    return Follower(house)
+
+
+quick_follower.person = {"walking_speed": {"uniform": [1.5, 1.6]}, "reading_time": 1.0}
+
+
+def test_a_participant_says_how_it_differs_and_the_configuration_has_the_last_word():
+    user = f"{__name__}:quick_follower"
+    slow = Distributions.of({"reading_time": 2.0})
+    said, told = (
+        draw_person(TrialConfig(objects=2, assistance="optimal", seed=0, user=user, person=p))
+        for p in (Distributions(), slow)
+    )
+    assert 1.5 <= said.walking_speed == told.walking_speed <= 1.6
+    assert (said.reading_time, told.reading_time) == (1.0, 2.0)
+
+
+@pytest.fixture(scope="module", params=FIDELITIES)
+def run(request, house, tmp_path_factory):
+    """A trial of somebody who was drawn."""
+    out: Path = tmp_path_factory.mktemp("people") / request.param
+    people = Distributions.parse(PEOPLE)
+    config = TrialConfig(objects=2, assistance="optimal", seed=5, fidelity=request.param, person=people)
+    assert run_trial(config, out, topdown=False, house=house)["ended"] == "all delivered"
+    return out
+
+
+def test_every_value_that_was_drawn_is_logged_and_measured(run):
+    start, participant = read_events(run / records.EVENTS)[:2]
+    config = TrialConfig(objects=2, assistance="optimal", seed=5, person=Distributions.parse(PEOPLE))
+    person = draw_person(config)
+    assert PersonParameters.from_dict(participant["person"]) == person
+    assert person.walking_speed != 1.2 and person.motion.reach_time != 0.44
+    assert start["person"] == config.person.as_dict()
+    metrics = json.loads((run / records.METRICS).read_text())
+    assert {name: metrics[f"person_{name}"] for name in RANGES} == {
+        name: getattr(person, name) for name in RANGES
+    }
+
+
+def test_a_replay_is_of_the_person_that_was_logged(run, house, capsys):
+    assert replay(run, house=house).person == read_run(run).person
+    assert main(["replay", str(run)]) == 0
+    shown = capsys.readouterr().out
+    assert "field of view 1.2 rad" in shown and "eye height" not in shown
+
+
+def test_a_replay_of_somebody_else_is_refused(run, house, tmp_path):
+    """Whoever changes a value in the log is found out by its hash."""
+    for path in run.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    log = tmp_path / records.EVENTS
+    log.write_text(log.read_text().replace('"field_of_view": 1.2,', '"field_of_view": 1.3,'))
+    assert read_run(tmp_path).person.field_of_view == 1.3
+    with pytest.raises(ReplayError, match=r"first bad step (is )?0"):
+        replay(tmp_path, house=house)
+
+
+def seconds_until_done(house, **values):
+    config = TrialConfig(objects=2, assistance="optimal", seed=5, fidelity="event", regret=False)
+    scene = compose(
+        house.sample_episode(objects=2, seed=5), house.catalogue, person=PersonParameters(**values)
+    )
+    log = EventLog()
+    prepare_session(config, house, scene, log)[0].run()
+    return float(log.events[-1]["t"])
+
+
+def test_who_reads_before_each_visit_takes_that_much_longer(house):
+    """Four visits; standing still beforehand costs or saves a fraction of a second each."""
+    longer = seconds_until_done(house, reading_time=3.0) - seconds_until_done(house)
+    assert longer == pytest.approx(4 * 3.0, abs=2.0)
+
+
+def test_who_walks_slowly_takes_longer(house):
+    assert seconds_until_done(house, walking_speed=0.65) > 1.4 * seconds_until_done(house)
+
+
+def test_who_looks_rarely_sees_later(house):
+    """A searcher asks for what is in view at every look."""
+    scene = compose(
+        house.sample_episode(objects=6, seed=3),
+        house.catalogue,
+        person=PersonParameters(looking_interval=1.0),
+    )
+    config = TrialConfig(
+        objects=6, assistance="none", seed=3, user="searcher", fidelity="event", time_limit=10.0
+    )
+    looks: list[float] = []
+    session, world = prepare_session(config, house, scene, EventLog())
+    participant = session._participant
+    look = participant._look
+
+    def note(percept):
+        before = participant._next_look
+        look(percept)
+        if participant._next_look != before:
+            looks.append(world.observation().time)
+
+    participant._look = note
+    session.run()
+    assert len(looks) > 5
+    assert np.diff(looks).min() >= 1.0 - 1e-6

@@ -1,0 +1,138 @@
+"""The metrics on logs that can be worked out by hand."""
+
+import numpy as np
+import pytest
+
+from experiments.record.metrics import compute_metrics
+
+DEFAULTS = {"deviated": False, "alternatives": 1, "tied_alternatives": 0, "tied": False}
+
+
+def visit(t=1.0, *, geodesic=1.0, location=1.0, **fields):
+    lengths = {"geodesic_m": geodesic, "location_m": location}
+    return {"t": t, "event": "visit", **DEFAULTS, **lengths, **fields}
+
+
+def log(*events, end=20.0, reason="all delivered", objects=6):
+    return [
+        {"t": 0.0, "event": "start", "objects": objects},
+        {"t": 0.0, "event": "plan", "cost_m": 3.0, "reach_bound_m": 1.0},
+        *events,
+        {"t": end, "event": "end", "reason": reason},
+    ]
+
+
+STRAIGHT = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])
+
+
+def measured(*events, **options):
+    return compute_metrics(log(*events, **options), STRAIGHT)
+
+
+def test_walking_the_geodesics_gives_an_inverse_path_length_of_one():
+    metrics = measured(visit(1, geodesic=3.0), visit(2, geodesic=4.0))
+    assert metrics.task_distance_m == 7.0
+    assert metrics.ipl_stand == 1.0
+
+
+def test_who_reaches_walks_less_than_from_place_to_place():
+    metrics = measured(visit(geodesic=5.0, location=8.4), visit(geodesic=1.0, location=1.4))
+    assert metrics.ipl_stand == pytest.approx(6 / 7)
+    assert metrics.ipl_locations == pytest.approx(9.8 / 7)
+
+
+CHOICES = [
+    visit(1, deviated=True, alternatives=3),
+    visit(2, alternatives=2),
+    visit(3, alternatives=1),
+    visit(4, alternatives=0),
+]
+
+
+def test_deviations_over_all_visits_of_the_task_and_over_those_with_a_choice():
+    metrics = measured(*CHOICES, objects=2)
+    assert metrics.nd_strict_2n == pytest.approx(1 / 4)
+    assert metrics.nd_feasible == pytest.approx(1 / 3)
+
+
+def test_an_unfinished_task_still_has_two_visits_per_object():
+    assert measured(CHOICES[0], objects=6).nd_strict_2n == pytest.approx(1 / 12)
+
+
+def test_without_any_choice_there_are_no_deviations():
+    metrics = measured(visit(alternatives=0))
+    assert (metrics.nd_feasible, metrics.nd_bin_tied, metrics.nd_strict_2n) == (0.0, 0.0, 0.0)
+
+
+def test_the_order_within_a_bin_is_forgiven_and_no_choice():
+    tied = {"deviated": True, "tied": True, "tied_alternatives": 1}
+    only_tied = visit(1, **tied, alternatives=1)  # hands full of two things for one bin
+    also_tied = visit(2, **tied, alternatives=2)
+    elsewhere = visit(3, deviated=True, alternatives=2, tied_alternatives=1)
+    metrics = measured(only_tied, also_tied, elsewhere, visit(4))
+    assert metrics.nd_feasible == pytest.approx(3 / 4)
+    assert metrics.nd_bin_tied == pytest.approx(1 / 3)
+
+
+def test_a_cheap_deviation_is_forgiven_where_regret_counts():
+    regrets = [(True, 0.1), (True, 0.11), (False, 0.0), (True, None)]
+    metrics = measured(*(visit(k, deviated=d, regret_m=m) for k, (d, m) in enumerate(regrets)))
+    assert metrics.nd_feasible == pytest.approx(3 / 4)
+    assert metrics.nd_regret_10cm == pytest.approx(1 / 3)
+    assert measured(visit(deviated=True)).nd_regret_10cm is None
+
+
+def test_regrets_add_up_and_a_tie_is_no_mistake():
+    metrics = measured(*(visit(t, regret_m=m) for t, m in ((1, 0.0), (2, 0.004), (3, 2.5), (4, None))))
+    assert metrics.total_regret_m == pytest.approx(2.504)
+    assert metrics.mean_regret_m == pytest.approx(2.504 / 3)
+    assert (metrics.regretful_visits, metrics.unjudged_visits) == (1, 1)
+
+
+def test_regrets_that_came_later_count_for_their_visits():
+    later = {"t": 9.0, "event": "regret", "visit": 1, "regret_m": 0.7, "suggested_regret_m": 0.2}
+    metrics = measured(visit(1, regret_m=0.0, suggested_regret_m=0.0), visit(2), later)
+    assert (metrics.total_regret_m, metrics.unjudged_visits) == (0.7, 0)
+    assert (metrics.mean_suggestion_gap_m, metrics.max_suggestion_gap_m) == (0.1, 0.2)
+
+
+def test_where_nobody_judged_there_is_no_regret_to_speak_of():
+    metrics = measured(visit(1), visit(2))
+    assert (metrics.mean_regret_m, metrics.total_regret_m) == (None, None)
+    assert (metrics.mean_suggestion_gap_m, metrics.max_suggestion_gap_m) == (None, None)
+    assert (metrics.regretful_visits, metrics.unjudged_visits) == (0, 2)
+
+
+def test_completion_time_is_that_of_the_last_delivery():
+    placed = [{"t": t, "event": "placed"} for t in (5.0, 11.5)]
+    metrics = measured(*placed, end=11.5)
+    assert (metrics.completion_time_s, metrics.delivered) == (11.5, 2)
+    assert metrics.completion_over_familiarisation is None
+
+
+def test_completion_time_over_the_own_familiarisation():
+    metrics = measured(
+        {"t": 0.0, "event": "phase_ended", "phase": "flythrough", "duration_s": 80.0}, end=20.0
+    )
+    assert metrics.completion_over_familiarisation == 0.25
+
+
+def test_an_unfinished_trial_takes_until_its_end():
+    metrics = measured({"t": 5.0, "event": "placed"}, end=60.0, reason="time limit")
+    assert (metrics.completion_time_s, metrics.ended) == (60.0, "time limit")
+
+
+def test_an_object_that_falls_out_again_is_not_delivered():
+    assert measured({"t": 1.0, "event": "placed"}, {"t": 2.0, "event": "dislodged"}).delivered == 0
+
+
+def test_refusals_replans_and_failures_are_counted():
+    metrics = measured(
+        {"t": 1.0, "event": "attempt", "applied": False},
+        {"t": 2.0, "event": "attempt", "applied": True},
+        {"t": 3.0, "event": "pick_failed"},
+        {"t": 4.0, "event": "grip_lost"},
+        {"t": 5.0, "event": "plan", "cost_m": 9.0},
+    )
+    assert (metrics.refusals, metrics.replans, metrics.failures) == (1, 1, 2)
+    assert (metrics.planned_distance_m, metrics.reach_bound_m) == (3.0, 1.0)

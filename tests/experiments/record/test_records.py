@@ -1,0 +1,249 @@
+"""Records: complete or absent, and never at the cost of something else."""
+
+import dataclasses
+import hashlib
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.errors import RecordError
+from experiments.record.columns import decode_action
+from experiments.record.files import read_json, save_arrays
+from experiments.record.journal import Header, Journal, read_entries
+from experiments.record.reader import read_journal
+from experiments.record.records import EPISODE, EVENTS, METRICS, EventLog, read_events
+from experiments.record.run_directory import run_directory
+from experiments.record.writer import RecordWriter
+from mjsim.actions import Move, Pick, Place
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.health.values import HealthSample
+from mjsim.observation import ObjectStatus, Observation
+from mjsim.steps import States, Steps
+
+
+def observation(time=0.0, hands=(None, "b")):
+    return Observation(
+        time=time,
+        position=np.array([1.0, 2.0]),
+        heading=0.5,
+        pitch=-0.1,
+        eye=np.array([1.0, 2.0, 1.6]),
+        velocity=np.zeros(2),
+        object_names=("a", "b"),
+        object_positions=np.arange(6.0).reshape(2, 3),
+        object_quaternions=np.tile([1.0, 0, 0, 0], (2, 1)),
+        object_status=(ObjectStatus.LOOSE, ObjectStatus.CARRIED),
+        hands=hands,
+        busy=False,
+    )
+
+
+EPISODE_OF_TWO = Episode(
+    "house",
+    0,
+    StartPose(0.0, 0.0, 0.0),
+    tuple(
+        PlacedObject(name, "dishes", "mug", (0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        for name in "ab"
+    ),
+    ("rack",),
+    dict.fromkeys("ab", "rack"),
+)
+
+
+def new_writer():
+    return RecordWriter(EPISODE_OF_TWO, EventLog())
+
+
+def fill(folder):
+    (folder / EPISODE).write_text("{}")
+    (folder / EVENTS).write_text("")
+    (folder / METRICS).write_text("{}")
+
+
+def test_a_run_directory_appears_whole(tmp_path):
+    with run_directory(tmp_path / "run") as folder:
+        fill(folder)
+        assert not (tmp_path / "run").exists()
+    assert (tmp_path / "run" / EPISODE).is_file()
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_complete_record_is_kept_even_where_something_fails_afterwards(tmp_path):
+    with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run") as folder:
+        fill(folder)
+        raise ZeroDivisionError
+    assert (tmp_path / "run" / METRICS).is_file()
+
+
+def test_a_failed_run_leaves_the_earlier_one_untouched(tmp_path):
+    with run_directory(tmp_path / "run") as folder:
+        fill(folder)
+        (folder / "metrics.json").write_text("first")
+    with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run", replace=True) as folder:
+        (folder / EVENTS).write_text("second")
+        raise ZeroDivisionError
+    assert (tmp_path / "run" / "metrics.json").read_text() == "first"
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_run_replaces_an_earlier_run(tmp_path):
+    for text in ("first", "second"):
+        with run_directory(tmp_path / "run", replace=True) as folder:
+            fill(folder)
+            (folder / "metrics.json").write_text(text)
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+    assert (tmp_path / "run" / "metrics.json").read_text() == "second"
+
+
+def test_a_run_never_replaces_anything_else(tmp_path):
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter.tex").write_text("precious")
+    with (
+        pytest.raises(RecordError, match=r"thesis holds chapter\.tex, which no run wrote"),
+        run_directory(tmp_path / "thesis", replace=True),
+    ):
+        pass
+    assert (tmp_path / "thesis" / "chapter.tex").read_text() == "precious"
+
+
+def test_a_truncated_log_is_named_with_its_line(tmp_path):
+    path = tmp_path / "events.jsonl"
+    path.write_text(json.dumps({"t": 0, "event": "start"}) + '\n{"t": 1, "ev')
+    with pytest.raises(RecordError, match=r"events\.jsonl, line 2 is not JSON"):
+        read_events(path)
+
+
+@pytest.mark.parametrize(("text", "fault"), [(None, "cannot read"), ("{", "is not JSON")])
+def test_unreadable_json_is_named(tmp_path, text, fault):
+    path = tmp_path / "metrics.json"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(RecordError, match=f"metrics.json.*{fault}|{fault}.*metrics.json"):
+        read_json(path)
+
+
+def test_a_trajectory_round_trips_and_repeats_byte_for_byte(tmp_path):
+    actions = [Move(1.0, 0.1, -0.5, 0.2), Pick("b"), Place(None)]
+    for name in ("one.npz", "two.npz"):
+        writer = new_writer()
+        for step, action in enumerate(actions):
+            writer.append(observation(step * 0.04), HealthSample(), step, Steps(action))
+        save_arrays(tmp_path / name, writer.record().trajectory)
+    assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+    arrays = np.load(tmp_path / "one.npz")
+    assert arrays["time"].tolist() == [0.0, 0.04, 0.08]
+    assert arrays["hands"].tolist() == [[-1, 1]] * 3
+    assert arrays["object_status"].tolist() == [[0, 1]] * 3
+    assert arrays["object_position"].shape == (3, 2, 3)
+    assert arrays["action"].tolist() == [
+        [0, -1, 1.0, 0.1, -0.5, 0.2],
+        [1, 1, 0, 0, 0, 0],
+        [2, -1, 0, 0, 0, 0],
+    ]
+
+
+def contents(record):
+    arrays = {**record.trajectory, **record.recording}
+    return record.log, {name: (a.dtype, a.shape, a.tobytes()) for name, a in arrays.items()}
+
+
+def test_steps_taken_at_once_are_recorded_as_single_ones():
+    moves = np.random.default_rng(0).normal(size=(5, 4))
+    seen = [
+        dataclasses.replace(observation(step * 0.04), position=np.array([step, 1.0]), heading=0.1 * step)
+        for step in range(7)
+    ]
+    healths = [HealthSample(penetration_m=0.001 * step, weld_error_m=(math.nan, 0.1)) for step in range(7)]
+    passed = States.of(seen[2:6], range(2, 6), [h.row for h in healths[2:6]])
+    single, at_once = new_writer(), new_writer()
+    for writer in (single, at_once):
+        writer.append(seen[0], healths[0], 0, Steps(Pick("b")))
+        writer.log.append(0.04, "picked", object="b")
+    for step, move in enumerate(moves, start=1):
+        single.append(seen[step], healths[step], step, Steps(Move(*move)))
+    at_once.append(seen[1], healths[1], 1, Steps(moves, passed))
+    for writer in (single, at_once):
+        writer.append(seen[-1], healths[-1], 6, Steps(Move()))
+    assert single.step == at_once.step == 7
+    assert contents(single.record()) == contents(at_once.record())
+
+
+@pytest.mark.parametrize("commits", [(), (0,), (1, 2), range(6)])
+def test_the_record_of_a_journal_is_that_in_memory(tmp_path, commits):
+    """However often it was committed, and the journal opened again."""
+    path, memory = tmp_path / "journal.bin", new_writer()
+    with Journal(path) as journal:
+        journal.append(Header({}, EPISODE_OF_TWO.to_json()))
+        written = RecordWriter(EPISODE_OF_TWO, EventLog(), journal)
+        for step, action in enumerate([Pick("ghost"), Move(0.5), Pick("b"), Move(), Place("ghoul"), Move()]):
+            for writer in (memory, written):
+                writer.log.append(step * 0.04, "picked", object="Ä")
+                writer.log.reserve()  # left empty, as where a plan is still the same
+                writer.append(observation(step * 0.04), HealthSample(), step, Steps(action))
+            if step in commits:
+                written.commit({"input": step})
+        written.log.append(0.24, "end", reason="all delivered")
+        memory.log.append(0.24, "end", reason="all delivered")
+        written.commit({"input": 6})
+    record = read_journal(read_entries(path))
+    assert contents(record) == contents(memory.record())
+    assert (record.reason, record.participant) == ("all delivered", {"input": 6})
+
+
+def test_a_journal_without_control_steps_is_an_empty_record():
+    with pytest.raises(RecordError, match="the journal is empty"):
+        read_journal(())
+    assert read_journal((Header({}, EPISODE_OF_TWO.to_json()),)).steps == 0
+
+
+def test_an_empty_trajectory_still_saves(tmp_path):
+    save_arrays(tmp_path / "t.npz", new_writer().record().trajectory)
+    assert np.load(tmp_path / "t.npz")["time"].shape == (0,)
+
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+NAMES = st.none() | st.sampled_from(["a", "b", "ghost", "", "Ä"])
+ACTIONS = st.builds(Move, FINITE, FINITE, FINITE, FINITE) | st.builds(Pick, NAMES) | st.builds(Place, NAMES)
+
+
+@given(st.lists(ACTIONS, max_size=6))
+def test_actions_are_recorded_at_full_precision(actions):
+    """Names that no object has are recorded, too: a replay refuses them in the same words."""
+    writer = new_writer()
+    for action in actions:
+        writer.append(observation(), HealthSample(), 0, Steps(action))
+    arrays = writer.record().trajectory
+    names = ["a", "b", *map(str, arrays["unknown_objects"])]
+    again = [decode_action(row, names) for row in arrays["action"].reshape(-1, 6)]
+    assert list(map(repr, again)) == list(map(repr, actions))
+
+
+@pytest.mark.parametrize("row", [[3, 0], [1, 2], [1, 0.5], [2, -2], [np.nan, 0], [0, 0, np.inf]])
+def test_rows_that_are_no_action_are_refused(row):
+    with pytest.raises(RecordError):
+        decode_action(np.array([*row, *[0.0] * (6 - len(row))]), ["a", "b"])
+
+
+def test_the_log_knows_its_size_and_hash_after_every_entry():
+    log, at_once = EventLog(), EventLog()
+    for kept in (log, at_once):
+        kept.append(0.0, "start", name="Ä")
+    plan, nothing = log.reserve(), log.reserve()
+    log.append(0.12, "picked", object="a")
+    plan.update(t=0.04, event="plan", cost_m=1.0)
+    assert nothing == {}
+    at_once.append(0.04, "plan", cost_m=1.0)
+    at_once.append(0.12, "picked", object="a")
+    assert log.events == at_once.events
+    assert log.content == at_once.content
+    assert log.content.endswith(b'{"t": 0.12, "event": "picked", "object": "a"}\n')
+    assert (log.entries, at_once.entries) == (4, 3)
+    sizes, hashes = log.at([0, 1, 2, 3, 4])
+    for size, found in zip(sizes, hashes, strict=True):
+        assert found == int.from_bytes(hashlib.sha1(log.content[:size]).digest()[:8], "little")
+    assert list(sizes) == list(at_once.at([0, 1, 2, 2, 3])[0])

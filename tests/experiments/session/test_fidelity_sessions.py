@@ -1,0 +1,199 @@
+"""Trials in both tiers: in many control steps at once or in single ones, run or replayed, they are the same."""
+
+import itertools
+
+import numpy as np
+import pytest
+from sessions import prepared
+
+from benchmarks.support.agreement import run_in_tiers
+from experiments.errors import ReplayError
+from experiments.participants.visit_executor import VisitExecutor
+from experiments.record import records
+from experiments.record.files import read_arrays, read_json
+from experiments.record.records import read_events
+from experiments.replay.replay import replay
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+from mjsim.actions import WAIT, Move, Wait
+from mjsim.errors import PhysicsError
+from mjsim.health.monitor import HealthMonitor
+
+
+@pytest.fixture(scope="module", autouse=True)
+def frequent_checkpoints():
+    """Every 2 s, so that walks are cut short by some."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.record.writer.CHECKPOINT_PERIOD", 2.0)
+        yield
+
+
+@pytest.fixture(scope="module")
+def event_run(house, tmp_path_factory):
+    out = tmp_path_factory.mktemp("event") / "run"
+    run_trial(
+        TrialConfig(objects=3, assistance="optimal", seed=3, fidelity="event"),
+        out,
+        topdown=False,
+        house=house,
+    )
+    return out
+
+
+def played(house, config, prepare=lambda _: None, ends="all delivered"):
+    """Arrays, log and state hashes of a trial, how many actions its session took, and in how many control steps."""
+    session, world, _ = prepared(house, config)
+    prepare(world)
+    actions, step = 0, world.step
+
+    def counted(action, limit):
+        nonlocal actions
+        actions += 1
+        return step(action, limit)
+
+    world.step = counted
+    assert session.run() == ends
+    record = session.record.record()
+    arrays = {name: array.tobytes() for name, array in {**record.trajectory, **record.recording}.items()}
+    return {**arrays, "log": record.log}, actions, record.steps - 1
+
+
+@pytest.mark.parametrize(
+    ("assistance", "user"),
+    [
+        ("none", "follower"),
+        ("none", "boltzmann:3"),
+        *itertools.product(["highlight", "optimal"], ["follower"]),
+        *itertools.product(["none", "highlight", "optimal"], ["guest"]),
+    ],
+)
+def test_many_steps_at_once_are_what_single_ones_give(house, assistance, user, step_singly):
+    config = TrialConfig(objects=3, assistance=assistance, seed=1, fidelity="event", user=user)
+    at_once, actions, steps = played(house, config)
+    stepped, all_actions, _ = played(house, config, step_singly)
+    assert {name for name in stepped if stepped[name] != at_once[name]} == set()
+    assert all_actions == steps
+    if user != "guest":
+        searches = assistance == "none" and user == "follower"
+        assert actions < (0.6 if searches else 0.2) * steps
+
+
+def test_waiting_and_following_a_shown_path_in_full_physics_are_what_single_steps_give(house, step_singly):
+    config = TrialConfig(objects=8, assistance="optimal", seed=1)
+    at_once, actions, steps = played(house, config)
+    stepped, *_ = played(house, config, step_singly)
+    assert {name for name in stepped if stepped[name] != at_once[name]} == set()
+    assert actions < 0.2 * steps
+
+
+@pytest.mark.parametrize("start", [0.0, 15.0])
+def test_a_run_without_physics_replays_from_anywhere(event_run, house, start):
+    report = replay(event_run, start=start, house=house)
+    assert report.ended == "all delivered"
+    assert (report.first > 0) == (start > 0)
+    assert report.first + report.steps == len(np.load(event_run / records.TRAJECTORY)["time"])
+
+
+def test_a_replay_names_the_step_within_a_walk_that_differs(event_run, house, tmp_path):
+    """The record says that another way was walked: its hashes fit, the physics does not."""
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    for path in event_run.iterdir():
+        (copy / path.name).write_bytes(path.read_bytes())
+    for name, array in ((records.RECORDING, "state_hash"), (records.TRAJECTORY, "position")):
+        arrays = read_arrays(copy / name)
+        arrays[array][40] += np.ones((), arrays[array].dtype)
+        np.savez_compressed(copy / name, **arrays)
+        with pytest.raises(ReplayError, match="first bad step 40 "):
+            replay(copy, house=house)
+        (copy / name).write_bytes((event_run / name).read_bytes())
+    assert replay(copy, house=house).first == 0
+
+
+def test_the_fidelity_is_part_of_the_record(event_run):
+    start = read_events(event_run / records.EVENTS)[0]
+    assert start["fidelity"] == start["world"]["fidelity"] == "event"
+    assert read_json(event_run / records.METRICS)["fidelity"] == "event"
+
+
+def test_a_failure_of_the_physics_within_a_walk_leaves_every_step(house, tmp_path, monkeypatch):
+    check = HealthMonitor.check
+
+    def fails_late(self, held):
+        if self._rig.data.time > 8.0:
+            raise PhysicsError("the physics failed on purpose")
+        return check(self, held)
+
+    monkeypatch.setattr(HealthMonitor, "check", fails_late)
+    config = TrialConfig(objects=3, assistance="optimal", seed=3, fidelity="full")
+    with pytest.raises(PhysicsError, match="on purpose"):
+        run_trial(config, tmp_path / "run", topdown=False, house=house)
+    kept = tmp_path / "run"
+    last = read_events(kept / records.EVENTS)[-1]
+    assert last["reason"] == "physics error"
+    assert len(np.load(kept / records.TRAJECTORY)["time"]) == round(last["t"] / 0.04) + 1 > 200
+    assert replay(kept, house=house).failure == last["error"]
+
+
+class SimpleFollower:
+    """All that an author of a participant has to write."""
+
+    needs = frozenset({"breadcrumb"})
+
+    def __init__(self, house):
+        self._executor = VisitExecutor(house)
+
+    def act(self, percept):
+        return self._executor.follow(percept, percept.guidance) if percept.guidance else WAIT
+
+
+def build(house, rng):  # noqa: ARG001 - the interface of participants
+    return SimpleFollower(house)
+
+
+def test_a_participant_of_one_method_is_as_quick_as_a_built_in_one(house):
+    theirs, ours = (
+        TrialConfig(objects=3, assistance="optimal", seed=1, fidelity="event", user=user)
+        for user in (f"{__name__}:build", "follower")
+    )
+    mine, actions, steps = played(house, theirs)
+    other, *counts = played(house, ours)
+    assert (mine["state_hash"], actions, steps) == (other["state_hash"], *counts)
+
+
+class Pauser:
+    """Turns for a while, stands for a while, over and over."""
+
+    needs = frozenset()
+
+    def act(self, percept):
+        number = round(percept.time / 0.04)
+        pause = 0.04 * (number - number % 20 + 10)
+        return Wait(pause) if number % 20 < 10 else Move(turn=-1.0)
+
+
+def pause(house, rng):  # noqa: ARG001 - the interface of participants
+    return Pauser()
+
+
+def test_standing_still_takes_one_action_or_many(house, step_singly):
+    config = TrialConfig(
+        objects=2, assistance="none", seed=1, fidelity="event", user=f"{__name__}:pause", time_limit=10.0
+    )
+    at_once, actions, steps = played(house, config, ends="time limit")
+    one_by_one, *_ = played(house, config, step_singly, ends="time limit")
+    assert at_once == one_by_one
+    assert actions < 0.6 * steps
+
+
+def test_the_tiers_deliver_the_same_in_about_the_same_time(house):
+    config = TrialConfig(objects=3, assistance="optimal", seed=1)
+    ran = run_in_tiers(config, house)
+    full = ran["full"]
+    assert len(full.delivered) == config.objects
+    for other in ran.values():
+        assert other.delivered == full.delivered
+        assert other.metrics["completion_time_s"] == pytest.approx(
+            full.metrics["completion_time_s"], rel=0.03
+        )
+        assert other.metrics["task_distance_m"] == pytest.approx(full.metrics["task_distance_m"], rel=0.03)

@@ -1,0 +1,130 @@
+"""What a participant may perceive, and what the message bar tells it of the plan."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from sessions import Recorder, opened, play
+
+from experiments.session.session import INTERRUPTED
+from hud.messages import TEXTS
+from mjsim.actions import WAIT
+from mjsim.model.sight import visible_objects
+from mjsim.observation import ObjectStatus
+from mjsim.render import Renderer
+
+UPDATED = TEXTS["replanned"][1]
+
+
+class Spy:
+    """Stands where it is and turns, and hands every percept to a check."""
+
+    needs = frozenset()
+    check = None
+
+    def act(self, percept):
+        Spy.check(percept)
+        return WAIT
+
+
+def spy(house, rng):  # noqa: ARG001 - the interface of participants
+    return Spy()
+
+
+def percepts(house, assistance, monkeypatch):
+    """The first percept of a session, what there is in the world then, and what the HUD shows."""
+    found, recorder = [], Recorder()
+    session, world, _ = opened(house, assistance, recorder, user=f"{__name__}:spy", objects=12)
+
+    def check(percept):
+        found.append(percept)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Spy, "check", check)
+    assert session.run() == INTERRUPTED
+    return found[0], world, *recorder.shown[0]
+
+
+def numbers_in(value):
+    """All arrays of numbers within a value."""
+    if isinstance(value, np.ndarray):
+        yield value.ravel()
+    elif isinstance(value, dict):
+        for part in value.values():
+            yield from numbers_in(part)
+    elif isinstance(value, (list, tuple)):
+        for part in value:
+            yield from numbers_in(part)
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield from numbers_in(getattr(value, field.name))
+
+
+def told(percept):
+    """All that a participant can read off a percept, but for regrets (models of compliance) and which bins it sees."""
+    public = [n for n in dir(percept) if not n.startswith("_") and n not in ("choices", "look_for")]
+    return [value() if callable(value) else value for value in (getattr(percept, n) for n in public)]
+
+
+def test_nothing_in_a_percept_holds_the_position_of_an_unseen_object(house, monkeypatch):
+    percept, world, observation, hud_state = percepts(house, "none", monkeypatch)
+    eye = observation.eye, observation.heading, observation.pitch
+    seen = set(visible_objects(world.scene, world.data, *eye))
+    assert set(percept.look()) == seen
+    assert percept.hud() is hud_state
+    unseen = [n for n in observation.names_with(ObjectStatus.LOOSE) if n not in {*seen, *percept.nearby}]
+    assert len(unseen) >= 6
+    places = dict(zip(observation.object_names, observation.object_positions[:, :2], strict=True))
+    numbers = np.concatenate([np.zeros(0), *numbers_in(told(percept))])
+    for name in unseen:
+        assert not np.isin(places[name], numbers).any(), name
+        assert np.linalg.norm(places[name] - observation.position) >= 1.3
+
+
+@pytest.mark.parametrize("assistance", ["highlight", "optimal"])
+def test_flagpoles_are_those_of_the_picture(house, monkeypatch, assistance):
+    """Every pole that has pixels in a frame drawn without the HUD's panels is perceived, and no other."""
+    percept, world, observation, hud_state = percepts(house, assistance, monkeypatch)
+    poles = {
+        m.object: m.position[:2] for m in hud_state.markers if m.role == "flagpole" and m.shape == "sphere"
+    }
+    assert set(poles) == set(observation.names_with(ObjectStatus.LOOSE))
+    with Renderer(world.scene.model) as renderer:
+        plain = renderer.rgb(world.data)
+        drawn = {
+            name
+            for name in poles
+            if (
+                renderer.rgb(world.data, markers=[m for m in hud_state.markers if m.object == name]) != plain
+            ).any()
+        }
+    assert 0 < len(drawn) < len(poles), "some are behind the person"
+    assert set(percept.flagpoles) == drawn
+    assert {name: tuple(place) for name, place in percept.flagpoles.items()} == {n: poles[n] for n in drawn}
+
+
+def test_no_flagpoles_and_no_path_where_none_are_shown(house, monkeypatch):
+    percept, *_ = percepts(house, "none", monkeypatch)
+    assert (dict(percept.flagpoles), percept.guidance, percept.hud().markers) == ({}, None, ())
+
+
+def messages(house, assistance):
+    """What the message bar shows at every control step of a trial with many deviations, and its replans, s."""
+    played = play(house, assistance, user="boltzmann:30")
+    replans = [event["t"] for event in played.of("plan")][1:]
+    return [(o.time, state.message) for o, state in played.shown], replans
+
+
+def test_who_sees_the_plan_is_told_that_it_has_changed(house):
+    shown, replans = messages(house, "optimal")
+    assert len(replans) >= 3
+    for t in replans:
+        texts = [m.text for time, m in shown if t <= time < t + 6.0 and m is not None and m.opacity == 1.0]
+        assert texts[0].startswith("You p")  # picked up, put: what was done is told first
+        assert texts.count(UPDATED) >= 2.0 / 0.04 - 1 or t > shown[-1][0] - 4.0
+
+
+def test_who_sees_no_plan_is_not_told_of_any(house):
+    shown, replans = messages(house, "highlight")
+    assert len(replans) >= 3
+    assert all(message is None or message.text != UPDATED for _, message in shown)

@@ -1,0 +1,247 @@
+"""`mjsim study analyze` and `power`: reports of one file, and one-line answers to unusual tables."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pyarrow.csv
+import pyarrow.parquet as pq
+import pytest
+from study_people import SIZES, made_up_people, table_of
+
+from experiments.analysis.statistics.power import people_per_cell
+from experiments.cli.main import main
+from experiments.errors import ConfigError, RecordError, StatisticsError
+from experiments.record.origin import RECORDED, SIMULATED
+from experiments.study.analysis import analyse
+from experiments.study.cost import StudyCost
+from experiments.study.measures import read_measures
+from experiments.study.power import Wanted, plan_power
+from experiments.trials.table import write_tables
+
+SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
+
+
+class Elements(HTMLParser):
+    """Tags and attributes of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.found = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.found.append((tag, dict(attrs)))
+
+
+def study(folder, rows):
+    write_tables(folder, rows)
+    return folder
+
+
+def with_answers(rows, seed=1):
+    rng = np.random.default_rng(seed)
+    return [{**r, "user": "human", "likert_useful": int(rng.integers(1, 6))} for r in rows]
+
+
+@pytest.fixture(scope="module")
+def analysed(tmp_path_factory):
+    folder = study(tmp_path_factory.mktemp("study"), made_up_people())
+    assert main(["study", "analyze", str(folder)]) == 0
+    return folder / "analysis"
+
+
+def test_the_report_is_one_file(analysed):
+    text = (analysed / "report.html").read_text()
+    page = Elements(text).found
+    tags = {tag for tag, _ in page}
+    assert "svg" in tags
+    assert not tags & {"script", "link", "iframe", "object", "img"}
+    assert not re.search(r"https?:|//\w+\.\w|@import|url\((?!#)", text)
+    links = [v for _, a in page for n, v in a.items() if n in ("src", "href", "xlink:href")]
+    assert all(link.startswith("#") for link in links)
+
+
+def test_simulated_stands_on_every_output(analysed):
+    text = (analysed / "report.html").read_text()
+    assert text.count('<p class="origin">Simulated</p>') == text.count("<h2>") + 1
+    assert "<title>Simulated:" in text
+    for tag, attributes in Elements(text).found:
+        if tag == "svg":
+            assert attributes["aria-label"].endswith(f"{SIMULATED}.")
+    assert json.loads((analysed / "stats.json").read_text())["origin"] == SIMULATED
+    for table in (pq.read_table(analysed / "people.parquet"), pyarrow.csv.read_csv(analysed / "tests.csv")):
+        assert set(table["origin"].to_pylist()) == {SIMULATED}
+
+
+def test_tables_hold_everybody_and_every_test(analysed):
+    people = pq.read_table(analysed / "people.parquet")
+    assert people.num_rows == sum(SIZES.values())
+    assert people["deviations"].to_pylist() == [r["nd_feasible"] for r in made_up_people()]
+    tests = pyarrow.csv.read_csv(analysed / "tests.csv").to_pylist()
+    two_way = [t for t in tests if t["measure"] == "deviations" and t["test"] == "two-way, Type II"]
+    assert [(t["effect"], t["df1"], t["df2"]) for t in two_way] == [
+        ("assistance", 2, 435.0),
+        ("objects", 3, 435.0),
+        ("interaction", 6, 435.0),
+    ]
+
+
+@pytest.mark.slow
+def test_equal_people_give_equal_bytes(analysed, tmp_path):
+    again = study(tmp_path, made_up_people())
+    assert main(["study", "analyze", str(again)]) == 0
+    for name in ("stats.json", "people.csv", "tests.csv"):
+        assert (again / "analysis" / name).read_bytes() == (analysed / name).read_bytes()
+    pages = [
+        (f / "report.html").read_text().replace(str(f.parent), "") for f in (again / "analysis", analysed)
+    ]
+    assert pages[0] == pages[1]
+
+
+def test_an_earlier_analysis_is_kept(tmp_path, capsys):
+    folder = study(tmp_path, made_up_people(SMALL))
+    (folder / "analysis").mkdir()
+    (folder / "analysis" / "report.html").write_text("mine")
+    assert main(["study", "analyze", str(folder)]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert (folder / "analysis" / "report.html").read_text() == "mine"
+
+
+@pytest.mark.slow
+def test_answers_of_people_are_analysed():
+    table = table_of(with_answers(made_up_people(dict.fromkeys(SMALL, 30))))
+    assert table.origin == RECORDED
+    analysis = analyse(table, read_measures())
+    assert analysis.find("likert_useful", "ordinal", 6).value.people == 90
+    assert analysis.find("likert_useful", "one-way", 12).value.df2 == 87
+
+
+def test_answers_of_simulated_people_are_refused():
+    with pytest.raises(RecordError, match="nothing simulates answers"):
+        table_of(made_up_people(SMALL, likert_useful=4))
+
+
+def test_time_over_familiarisation_comes_first():
+    rows = [
+        {**r, "completion_over_familiarisation": r["completion_time_s"] / 60} for r in made_up_people(SMALL)
+    ]
+    assert table_of(rows).sources["time"] == "completion_over_familiarisation"
+    assert table_of(made_up_people(SMALL)).sources["time"] == "completion_time_s"
+
+
+def reasons(rows):
+    return {(r.measure, r.kind): r.reason for r in analyse(table_of(rows), read_measures()).results}
+
+
+def test_a_missing_cell_leaves_the_other_tests():
+    found = reasons(made_up_people({c: n for c, n in SMALL.items() if c != ("optimal", 12)}))
+    assert found["deviations", "two-way, Type II"].startswith("no people in the cell optimal, 12")
+    assert found["deviations", "one-way"] is None
+
+
+@pytest.mark.slow
+def test_one_person_a_cell_and_constant_values_are_named():
+    alone = reasons(made_up_people(dict.fromkeys(SMALL, 1)))
+    assert "one person only" in alone["deviations", "one-way"]
+    assert "one person only" in alone["deviations", "two-way, Type II"]
+    constant = reasons(made_up_people(SMALL, nd_feasible=0.5))
+    assert "do not vary" in constant["deviations", "one-way"]
+
+
+@pytest.mark.slow
+def test_gaps_are_counted_and_left_out():
+    rows = made_up_people(SMALL)
+    rows[0]["ipl_locations"], rows[1]["ipl_locations"] = float("nan"), None
+    table = table_of(rows)
+    assert "ipl is not known for 2 of 36; tests of it leave these out." in table.notes
+    assert analyse(table, read_measures()).find("ipl", "one-way", 6).value.people == 16
+
+
+def test_notes_name_what_confounds():
+    rows = made_up_people(SMALL)
+    for row in rows:
+        row["user"] = "searcher" if row["assistance"] == "none" else "follower"
+        row["person_seed"] = row["order_seed"] = 1
+    rows[0]["ended"] = "time limit"
+    text = " ".join(table_of(rows).notes)
+    assert "1 trial ended before" in text
+    assert "several cells" in text
+    assert "confounded with user" in text
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"assistance": None}, "the assistance None, not a name"),
+        ({"objects": 0}, "0 objects, not a whole number"),
+        ({"nd_feasible": "much"}, "'much', which is no number"),
+        ({"nd_feasible": float("inf")}, "infinite nd_feasible"),
+        ({"user": "human", "likert_useful": 6}, "the answer 6; answers are whole numbers"),
+    ],
+)
+def test_values_that_cannot_be_are_named(change, message):
+    with pytest.raises(RecordError, match=message):
+        table_of(made_up_people(SMALL, **change))
+
+
+def test_unusual_folders_get_one_line(tmp_path, capsys):
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "trials.parquet").write_bytes(b"PAR1")
+    study(tmp_path, [{"a": 1}])
+    for folder in (tmp_path / "nowhere", tmp_path / "torn", tmp_path):
+        for command in ("analyze", "score"):
+            assert main(["study", command, str(folder)]) == 2
+            assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_power_of_a_difference_follows_from_the_variance():
+    cells = [(name, 6) for name in ("none", "highlight", "optimal")]
+    table = table_of(made_up_people(dict.fromkeys(cells, 100)))
+    plan = plan_power(cells, table, Wanted("ipl", difference=0.1), StudyCost(fee=0.2, dropout=0.5))
+    variance = np.mean([v.var(ddof=1) for v in table.groups("ipl", 6).values()])
+    ratio = 0.1**2 / (2 * 3 * variance)  # Cohen's f squared: one mean low, one high, one between
+    assert plan.eta_squared == pytest.approx(ratio / (1 + ratio), rel=1e-12)
+    assert plan.per_cell == people_per_cell(plan.eta_squared, 2, 3)
+    assert plan.interval[0] < plan.per_cell < plan.interval[1]
+    assert plan.power == pytest.approx(0.8, abs=0.08)
+    assert plan.people == 3 * plan.per_cell
+    assert plan.to_recruit == 2 * plan.people
+    assert plan.cost == pytest.approx(plan.people * 7.5 * 1.2)
+    assert plan.hours == pytest.approx(plan.to_recruit * 25 / 60)
+
+
+@pytest.mark.slow
+def test_power_of_the_pools_own_effect():
+    cells = list(SMALL)
+    table = table_of(made_up_people(dict.fromkeys(cells, 60)))
+    plan = plan_power(cells, table, Wanted("distance", "assistance"), StudyCost())
+    assert plan.power > 0.7
+    assert plan == plan_power(cells, table, Wanted("distance", "assistance"), StudyCost())
+
+
+def test_power_says_what_it_cannot_know():
+    cells = [(name, 6) for name in ("none", "highlight", "optimal")]
+    table = table_of(made_up_people(dict.fromkeys(cells, 20)))
+    with pytest.raises(StatisticsError, match="0 people with highlight and 12 objects"):
+        plan_power([*cells, *((n, 12) for n, _ in cells)], table, Wanted("ipl"), StudyCost())
+    with pytest.raises(ConfigError, match="one level only"):
+        plan_power(cells, table, Wanted("ipl", "objects"), StudyCost())
+    with pytest.raises(ConfigError, match="no measure 'speed'"):
+        plan_power(cells, table, Wanted("speed"), StudyCost())
+    for wrong in ({"difference": -1.0}, {"eta_squared": 1.5}, {"power": 0.0}, {"effect": "gravity"}):
+        with pytest.raises(ConfigError):
+            Wanted("ipl", **wrong)
+
+
+def test_the_power_command(tmp_path, capsys):
+    study(tmp_path, made_up_people(dict.fromkeys(SMALL, 30)))
+    cells = "".join(f'[[cells]]\nassistance = "{a}"\nobjects = {n}\npeople = 5\n' for a, n in SMALL)
+    (tmp_path / "study.toml").write_text(cells)
+    out = tmp_path / "power.json"
+    words = ["study", "power", str(tmp_path / "study.toml"), "--pool", str(tmp_path), "--difference", "0.1"]
+    assert main([*words, "--out", str(out)]) == 0
+    found = json.loads(out.read_text())
+    assert found["origin"] == SIMULATED
+    assert f"{found['per_cell']} [90 % interval" in capsys.readouterr().out

@@ -1,0 +1,170 @@
+"""Whole trials: delivered, measured, recorded and repeatable."""
+
+import json
+import subprocess
+import sys
+
+import av
+import numpy as np
+import pytest
+
+from experiments.record import records
+from experiments.record.files import read_json
+from experiments.record.records import read_events
+from experiments.replay.replay import replay
+from experiments.session.film_config import FilmConfig
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+from mjsim.episode import Episode
+from mjsim.options import FIDELITIES
+
+
+@pytest.fixture(scope="module")
+def runs(house, tmp_path_factory):
+    """One trial per assistance condition, on the same disorganized house."""
+    root = tmp_path_factory.mktemp("runs")
+    for assistance in ("none", "highlight", "optimal"):
+        run_trial(
+            TrialConfig(objects=6, assistance=assistance, seed=3),
+            root / assistance,
+            topdown=False,
+            house=house,
+        )
+    return root
+
+
+@pytest.mark.parametrize("assistance", ["none", "highlight", "optimal"])
+def test_everything_is_delivered_without_mishap(runs, assistance):
+    metrics = read_json(runs / assistance / records.METRICS)
+    assert (metrics["ended"], metrics["delivered"]) == ("all delivered", 6)
+    assert metrics["max_penetration_m"] < 0.010
+    assert 0 < metrics["ipl_stand"] <= 1.0
+    assert metrics["simulated_s"] == pytest.approx(metrics["completion_time_s"])
+    assert metrics["renderer"] == "none: nothing was filmed"
+
+
+def test_help_shortens_the_walk(runs):
+    walked = [
+        read_json(runs / a / records.METRICS)["task_distance_m"] for a in ("optimal", "highlight", "none")
+    ]
+    assert walked == sorted(walked)
+
+
+def test_a_full_follower_never_deviates(runs):
+    assert read_json(runs / "optimal" / records.METRICS)["nd_feasible"] == 0.0
+
+
+def test_every_visit_is_judged_and_following_costs_nothing(runs):
+    for assistance in ("none", "highlight", "optimal"):
+        metrics = read_json(runs / assistance / records.METRICS)
+        visits = [e for e in read_events(runs / assistance / records.EVENTS) if e["event"] == "visit"]
+        assert metrics["unjudged_visits"] == 0
+        assert metrics["total_regret_m"] == pytest.approx(sum(v["regret_m"] for v in visits))
+        assert all(v["regret_m"] == 0 for v in visits if not v["deviated"])
+        assert all(v["regret_m"] >= 0 for v in visits)
+        assert (metrics["total_regret_m"] > 0) == (assistance != "optimal")
+
+
+def test_the_record_agrees_with_itself(runs):
+    folder = runs / "optimal"
+    metrics, events = read_json(folder / records.METRICS), read_events(folder / records.EVENTS)
+    arrays = np.load(folder / records.TRAJECTORY)
+    episode = Episode.load(folder / records.EPISODE)
+    assert [e["event"] for e in (events[0], events[-1])] == ["start", "end"]
+    assert sorted(e["object"] for e in events if e["event"] == "placed") == sorted(
+        o.name for o in episode.objects
+    )
+    walked = np.linalg.norm(np.diff(arrays["position"], axis=0), axis=1).sum()
+    assert metrics["task_distance_m"] == pytest.approx(walked)
+    assert np.diff(arrays["time"]) == pytest.approx(0.04)
+    assert (arrays["object_status"][-1] == 2).all()
+    assert (arrays["hands"][-1] == -1).all()
+    assert read_json(folder / records.PLAN)[0]["cost_m"] == metrics["planned_distance_m"]
+    # Nobody is beamed: at most 1.5 m/s.
+    assert np.linalg.norm(np.diff(arrays["position"], axis=0), axis=1).max() < 1.5 * 0.04
+
+
+def test_carried_objects_move_with_the_person(runs):
+    arrays = np.load(runs / "optimal" / records.TRAJECTORY)
+    carried = np.argwhere(arrays["object_status"] == 1)
+    gap = np.linalg.norm(
+        arrays["object_position"][carried[:, 0], carried[:, 1], :2] - arrays["position"][carried[:, 0]],
+        axis=1,
+    )
+    assert len(carried) > 100
+    assert gap.max() < 1.3
+
+
+def film_in_a_fresh_process(out):
+    words = ["run", "--objects", "6", "--seed", "1", "--time-limit", "5", "--size", "320x240", "--out"]
+    command = [sys.executable, "-m", "experiments.cli.main", *words, str(out)]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+
+
+@pytest.mark.slow
+def test_the_same_command_twice_gives_the_same_bytes(tmp_path):
+    for name in ("one", "two"):
+        film_in_a_fresh_process(tmp_path / name)
+    for name in {*records.FILES} - {records.VIDEO, records.METRICS}:
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+    metrics = [read_json(tmp_path / name / records.METRICS) for name in ("one", "two")]
+    for values in metrics:
+        del values["wall_s"]
+    assert metrics[0] == metrics[1]
+    assert len(metrics[0]["frames_sha256"]) == 64
+    with av.open(str(tmp_path / "one" / records.VIDEO)) as container:
+        assert sum(1 for _ in container.decode(video=0)) == 125
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_an_interrupted_trial_keeps_what_was_done(fidelity, house, tmp_path):
+    reached = []
+
+    def interrupt(progress):
+        reached.append(progress.time)
+        if progress.time > 2.0:
+            raise KeyboardInterrupt
+
+    config = TrialConfig(objects=6, assistance="optimal", seed=0, fidelity=fidelity)
+    metrics = run_trial(config, tmp_path / "run", topdown=False, house=house, on_progress=interrupt)
+    assert metrics["ended"] == "interrupted"
+    assert 2.0 < reached[-1] < 4.0  # after an action, which may take many control steps
+    assert metrics["simulated_s"] == pytest.approx(reached[-1], abs=0.05)
+    assert metrics["completion_time_s"] >= metrics["simulated_s"]
+    assert read_events(tmp_path / "run" / records.EVENTS)[-1]["reason"] == "interrupted"
+    assert replay(tmp_path / "run", house=house).ended == "interrupted"
+
+
+def test_a_failing_renderer_leaves_nothing_behind(house, tmp_path):
+    config = TrialConfig(objects=6, assistance="optimal", seed=0)
+    with pytest.raises(Exception, match="no render profile 'sepia'"):
+        run_trial(config, tmp_path / "run", film=FilmConfig(profile="sepia"), house=house)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_participants_see_only_what_their_condition_shows(house, tmp_path):
+    """A spy in place of the participant, loaded by its dotted name as a user's own would be."""
+    config = TrialConfig(objects=6, assistance="none", seed=0, user="tests_spy:build", time_limit=0.2)
+    (tmp_path / "tests_spy.py").write_text(
+        "class Spy:\n"
+        "    needs = frozenset()\n"
+        "    def act(self, percept):\n"
+        "        from mjsim.actions import IDLE\n"
+        "        assert percept.guidance is None and not percept.flagpoles\n"
+        "        assert percept.hud().markers == ()\n"
+        "        return IDLE\n"
+        "def build(house, rng):\n"
+        "    return Spy()\n"
+    )
+    sys.path.insert(0, str(tmp_path))
+    try:
+        assert run_trial(config, tmp_path / "run", topdown=False, house=house)["ended"] == "time limit"
+    finally:
+        sys.path.remove(str(tmp_path))
+        sys.modules.pop("tests_spy", None)
+
+
+def test_metrics_are_plain_json(runs):
+    text = (runs / "none" / records.METRICS).read_text()
+    assert json.loads(text)["assistance"] == "none"
+    assert "NaN" not in text

@@ -1,0 +1,108 @@
+"""No page of a visit breaks a rule that axe-core checks, and the keyboard alone leads through all of them."""
+
+import numpy as np
+import pytest
+
+from benchmarks.play import FAST
+from benchmarks.support.play_server import PATIENCE, PlayProcess
+from experiments.session.video import VideoWriter
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+DESK = {"viewport": {"width": 1280, "height": 720}}
+
+
+def violations(page):
+    """What axe-core finds on a page, in words."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    found = Axe().run(page).response["violations"]
+    return [f"{page.title()}: {v['id']} ({v['help']}): {[n['html'] for n in v['nodes']]}" for v in found]
+
+
+def visit(browser, server, look):
+    """Go through a visit by keys; what axe-core finds on its pages and dialogs."""
+    page = browser.new_context(**look).new_page()
+    page.set_default_timeout(1000.0 * PATIENCE)
+    found = []
+
+    def check():
+        found.extend(violations(page))
+
+    page.goto(server.url)
+    check()
+    page.keyboard.press("Enter")  # on the button, which has the focus
+    page.get_by_role("heading", name="The apartment").wait_for()
+    check()
+    page.get_by_role("button", name="Continue").press("Enter")
+    page.get_by_role("heading", name="Training").wait_for()
+    check()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")  # skip the training
+    page.get_by_role("heading", name="Your task").wait_for()
+    page.wait_for_function("document.activeElement.textContent === 'Start'")
+    check()
+    page.keyboard.press("Enter")
+    page.locator("#list li").first.wait_for(state="attached")
+    check()
+    found.extend(elsewhere(browser, server, page, look))
+    page.keyboard.press("h")
+    page.get_by_role("heading", name="Keys").wait_for()
+    check()
+    page.keyboard.press("Escape")
+    page.keyboard.press("p")
+    page.get_by_role("heading", name="Paused").wait_for()
+    check()
+    page.keyboard.press("p")
+    page.locator("#panel").wait_for(state="hidden")
+    page.locator("#end-button").press("Enter")
+    page.get_by_role("heading", name="End the task now?").wait_for()
+    check()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    page.get_by_role("heading", name="Your result").wait_for()
+    check()
+    page.goto(f"{server.url}nothing-here")
+    check()
+    page.context.close()
+    return found
+
+
+def elsewhere(browser, server, page, look):
+    """What axe-core finds where all places are taken, and where a second page takes a session over, by keys."""
+    found = []
+    with browser.new_context(**look) as other:
+        waiting = other.new_page()
+        waiting.goto(server.url)
+        waiting.keyboard.press("Enter")
+        waiting.get_by_role("heading", name="The apartment").wait_for()
+        waiting.get_by_role("button", name="Continue").press("Enter")
+        waiting.get_by_role("heading", name="All places are taken").wait_for()
+        found += violations(waiting)
+        assert "You are next." in waiting.locator("#panel-text").inner_text()
+    second = page.context.new_page()
+    second.goto(page.url)
+    second.get_by_role("heading", name="This session is open in another page").wait_for()
+    found += violations(second)
+    second.keyboard.press("Enter")
+    page.get_by_role("heading", name="This session continues in another page").wait_for()
+    found += violations(page)
+    second.get_by_role("heading", name="Paused").wait_for()
+    page.keyboard.press("Enter")  # this one is loaded again, and asks in its turn
+    page.get_by_role("heading", name="This session is open in another page").wait_for()
+    second.close()
+    page.keyboard.press("Enter")
+    page.get_by_role("heading", name="Paused").wait_for()
+    page.keyboard.press("Enter")
+    page.locator("#panel").wait_for(state="hidden")
+    return found
+
+
+@pytest.mark.parametrize("look", [DESK, {**PHONE, "color_scheme": "dark", "reduced_motion": "reduce"}])
+def test_every_page_passes_axe_and_is_left_by_keys(tmp_path, chromium, look):
+    film = tmp_path / "flythrough.mp4"
+    with VideoWriter(film, width=64, height=48) as writer:
+        for _ in range(10):
+            writer.write(np.zeros((48, 64, 3), np.uint8))
+    words = ("--objects", "6", "--assistance", "guided", "--film", str(film), *FAST)
+    with PlayProcess(tmp_path / "visits", *words) as server:
+        assert visit(chromium, server, look) == []

@@ -1,0 +1,141 @@
+"""A task done in Chromium by key events alone leaves a run that replays to the same metrics."""
+
+import json
+import math
+import time
+
+import msgspec
+import numpy as np
+import pytest
+
+from benchmarks.play import FAST
+from benchmarks.support.play_server import PATIENCE, PlayProcess
+from experiments.house import House
+from experiments.record import records
+from experiments.record.records import read_events
+from experiments.replay.replay import replay
+from experiments.trials.setup import trial_episode
+from experiments.trials.trial_config import TrialConfig
+
+NEAR = 0.7  # share of the reach from which a pick is tried
+ALIGNED = 0.12  # rad off a way on which one walks
+MAX_STRETCH = 1.2  # m walked before looking again
+TIME_LIMIT = 300.0  # s
+
+
+class Watcher:
+    """Reads what the server sends to a page, and asks for snapshots in its place."""
+
+    def __init__(self, page):
+        self.snapshot = None
+        page.route_web_socket("**/play/*", self._route)
+
+    def _route(self, socket):
+        server = socket.connect_to_server()
+        socket.on_message(lambda text: server.send(text.replace('"snapshots":false', '"snapshots":true')))
+
+        def forward(message):
+            if isinstance(message, str) and message.startswith('{"type":"snapshot"'):
+                self.snapshot = json.loads(message)
+            else:
+                socket.send(message)
+
+        server.on_message(forward)
+
+
+class KeyPresser:
+    """Puts the only object of a task away by keys."""
+
+    def __init__(self, page, watcher, house, episode):
+        self._page, self._watcher, self._house = page, watcher, house
+        ((self._name, receptacle),) = episode.targets.items()
+        self._bin = house.receptacles[receptacle].center[:2]
+        self._stand = house.approaches[receptacle]
+
+    def tidy(self):
+        until = time.monotonic() + TIME_LIMIT
+        while not self._page.get_by_role("heading", name="Your result").is_visible():
+            assert time.monotonic() < until, "the task was not done in time"
+            if not self._playing():
+                self._page.wait_for_timeout(100)
+            elif any(slot and slot["label"] for slot in self._watcher.snapshot["hud"]["inventory"]):
+                self._step(self._bin, self._stand, 0.1)
+            else:
+                loose = np.array(self._watcher.snapshot["objects"][self._name][:2])
+                self._step(loose, loose, NEAR * self._house.person.reach)
+
+    def _playing(self):
+        return self._watcher.snapshot is not None and not self._page.locator("#panel").is_visible()
+
+    @property
+    def _position(self):
+        return np.array(self._watcher.snapshot["eye"][:2])
+
+    def _step(self, goal, stand, near):
+        if math.dist(self._position, stand) < near:
+            self._turn_to(goal)
+            self._page.keyboard.press("e")
+            self._settle(2.5)
+            return
+        path = np.vstack([self._house.geodesics.shortest_path(self._position, stand).points, stand])
+        target = next((point for point in path if math.dist(point, self._position) > 0.08), stand)
+        self._turn_to(target)
+        length = min(MAX_STRETCH, math.dist(target, self._position))
+        self._hold("w", length / self._house.person.walking_speed)
+
+    def _turn_to(self, target):
+        for _ in range(6):
+            ahead = target - self._position
+            angle = math.atan2(ahead[1], ahead[0]) - self._watcher.snapshot["eye"][3]
+            angle = (angle + math.pi) % (2.0 * math.pi) - math.pi
+            if abs(angle) < ALIGNED:
+                return
+            key = "ArrowLeft" if angle > 0 else "ArrowRight"
+            self._hold(key, abs(angle) / self._house.person.turning_speed)
+
+    def _hold(self, key, seconds):
+        self._page.keyboard.down(key)
+        self._page.wait_for_timeout(1000.0 * seconds)
+        self._page.keyboard.up(key)
+        self._settle(0.25)
+
+    def _settle(self, seconds):
+        """Wait until `seconds` have been simulated."""
+        wanted = self._watcher.snapshot["time"] + seconds
+        until = time.monotonic() + PATIENCE
+        while self._watcher.snapshot["time"] < wanted and self._playing() and time.monotonic() < until:
+            self._page.wait_for_timeout(20)
+
+
+@pytest.mark.parametrize("assistance", ["none", "optimal"])
+def test_an_object_is_put_away_by_keys(tmp_path, chromium, assistance):
+    words = ("--objects", "1", "--assistance", assistance, *FAST)
+    house = House.load()
+    episode = trial_episode(TrialConfig(objects=1, assistance=assistance, seed=0), house)
+    page = chromium.new_page(viewport={"width": 640, "height": 480})
+    page.set_default_timeout(1000.0 * PATIENCE)
+    faults, asked, watcher = [], [], Watcher(page)
+    page.on("console", lambda line: faults.append(line.text) if line.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    with PlayProcess(tmp_path / "visits", *words) as server:
+        page.goto(server.url)
+        page.keyboard.press("Enter")  # the button has the focus
+        page.wait_for_url("**/play/*")
+        page.get_by_role("button", name="Skip the training").press("Enter")
+        page.get_by_role("button", name="Start", exact=True).press("Enter")
+        page.locator("#list li").first.wait_for(state="attached")
+        page.keyboard.press("p")
+        page.get_by_role("heading", name="Paused").wait_for()
+        page.reload()
+        page.get_by_role("button", name="Continue").press("Enter")
+        KeyPresser(page, watcher, house, episode).tidy()
+        run = server.visit(page.url) / "task"
+    assert not faults
+    assert all(address.startswith((server.url, "blob:")) for address in asked)
+    metrics = msgspec.json.decode((run / records.METRICS).read_bytes())
+    assert (metrics["ended"], metrics["delivered"]) == ("all delivered", 1)
+    assert all(verdict.verified for verdict in replay(run).verdicts)
+    ended = [event for event in read_events(run / "events.jsonl") if event["event"] == "phase_ended"]
+    assert [event["phase"] for event in ended] == ["story", "training"]
+    assert all(event["duration_s"] > 0.0 for event in ended[:1])

@@ -1,0 +1,494 @@
+"""The server of `mjsim play` in front of a worker that is scripted: links, checks, messages, the visit."""
+
+import asyncio
+import json
+import re
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from experiments.record import records
+from experiments.record.phases import PHASES
+from experiments.trials.trial_config import TrialConfig
+from experiments.web import protocol
+from experiments.web.protocol import Frame, Inputs, Leave, Open, Pause, Run, Saved, State, Taken
+from experiments.web.server.app import PlayConfig, PlayServer
+from experiments.web.server.guards import allowed_hosts
+from experiments.web.server.played_session import MAX_CRASHES
+from experiments.web.server.visits import VISIT, Visits, token_hash
+from experiments.web.state import Trigger
+
+ORIGIN = "http://127.0.0.1:8000"
+TASK = TrialConfig(objects=6, assistance="optimal", seed=0, user="human", live=True).settings()
+TRIALS = {"training": {**TASK, "objects": 1}, "task": TASK}
+METRICS = {
+    "ended": "all delivered",
+    "objects": 6,
+    "delivered": 6,
+    "completion_time_s": 125.0,
+    "task_distance_m": 70.2,
+    "ipl_stand": 0.93,
+    "total_regret_m": 3.25,
+    "regretful_visits": 2,
+}
+
+
+class ScriptedWorker:
+    """Answers as a worker does, at once; keeps what it was told."""
+
+    def __init__(self):
+        self.told = []
+        self._state = State()
+        self._answers = asyncio.Queue()
+        self._loop = asyncio.get_running_loop()
+
+    def send(self, message):
+        self.told.append(message)
+        match message:
+            case Open(run=run):
+                self._run, self._state = Path(run), State()
+                self._move(Trigger.OPENED)
+            case Run():
+                self._move(Trigger.RUN)
+            case Pause(reason):
+                self._move(Trigger.PAUSE, reason)
+            case Inputs(inputs):
+                self._answers.put_nowait(Taken(inputs[-1].number, 1))
+            case Leave():
+                self._run.mkdir()
+                (self._run / records.METRICS).write_text(json.dumps(METRICS))
+                self._move(Trigger.END, "all delivered")
+                self._answers.put_nowait(Saved())
+
+    def _move(self, trigger, reason=""):
+        self._state = self._state.after(trigger, reason)
+        self._answers.put_nowait(self._state)
+
+    def die(self):
+        self._loop.call_soon_threadsafe(self._answers.put_nowait, None)
+
+    async def receive(self):
+        return await self._answers.get()
+
+
+class ScriptedPool:
+    """Gives scripted workers; `workers` holds those given."""
+
+    def __init__(self):
+        self.workers = []
+        self.discarded = []
+        self.given = threading.Condition()
+
+    async def start(self):
+        with self.given:
+            self.workers.append(ScriptedWorker())
+            self.given.notify_all()
+        return self.workers[-1]
+
+    def discard(self, worker):
+        self.discarded.append(worker)
+
+    async def close(self):
+        pass
+
+
+@pytest.fixture
+def pool():
+    return ScriptedPool()
+
+
+@contextmanager
+def serving(folder, pool, **options):
+    server = PlayServer(PlayConfig(PHASES, TRIALS, folder, story="A story.", **options), pool)
+    with TestClient(server.app("127.0.0.1"), base_url=ORIGIN, follow_redirects=False) as client:
+        yield client
+
+
+@pytest.fixture
+def client(tmp_path, pool):
+    with serving(tmp_path, pool) as client:
+        yield client
+
+
+def new_visit(client, **form):
+    """Begin a visit; its link."""
+    answer = client.post("/visits", headers={"Origin": ORIGIN}, data=form)
+    assert answer.status_code == 303
+    return answer.headers["location"]
+
+
+def hello(trial="training", tab="tab-00000001"):
+    view = {"type": "view", "width": 640, "height": 480, "codec": "none"}
+    return {"type": "hello", "tab": tab, "trial": trial, "view": view}
+
+
+@contextmanager
+def connected(client, link, origin=ORIGIN):
+    with client.websocket_connect(link, headers={"Origin": origin, "Host": "127.0.0.1:8000"}) as socket:
+        yield socket
+
+
+def until(socket, kind):
+    """Messages up to the first one of a type."""
+    said = []
+    while not said or said[-1]["type"] != kind:
+        said.append(socket.receive_json())
+    return said
+
+
+def until_phase(socket, phase):
+    """The first state with a phase."""
+    while (state := until(socket, "state")[-1])["phase"] != phase:
+        pass
+    return state
+
+
+def started(socket, trial="training", **kw):
+    socket.send_json(hello(trial, **kw))
+    until_phase(socket, "ready")
+    socket.send_json({"type": "run"})
+    return until_phase(socket, "running")
+
+
+def left(socket):
+    socket.send_json({"type": "leave"})
+    until(socket, "saved")
+
+
+def go_through(client, link):
+    """Training and task, each left at once."""
+    for phase in ("training", "task"):
+        with connected(client, link) as socket:
+            started(socket, phase)
+            left(socket)
+
+
+def inputs(*numbers, **values):
+    return {"type": "inputs", "inputs": [{"number": number, **values} for number in numbers]}
+
+
+def before_the_task(pool):
+    """What the worker was told of the phases before the task."""
+    opened = [told for told in pool.workers[0].told if isinstance(told, Open)]
+    assert [told.before for told in opened[:-1]] == [[]] * (len(opened) - 1)
+    return opened[-1].before
+
+
+def test_a_visit_from_the_story_to_the_result(client, pool):
+    assert "<p>A story.</p>" in client.get("/").text
+    link = new_visit(client)
+    for phase in ("training", "task"):
+        assert f'data-trial="{phase}"' in client.get(link).text
+        with connected(client, link) as socket:
+            started(socket, phase)
+            socket.send_json(inputs(1, forward=1.0))
+            assert until(socket, "taken")[-1]["input"] == 1
+            socket.send_json({"type": "leave"})
+            assert until_phase(socket, "over")["reason"] == "all delivered"
+            until(socket, "saved")
+    text = client.get(link).text
+    for shown in ("6 of 6", "2 min 5 s", "70 m", "3.2 m", "0.93", "2 of your choices"):
+        assert shown in text
+    assert len(pool.workers) == 1  # the same worker for training and task
+    asked = [told for told in pool.workers[0].told if isinstance(told, Open)]
+    assert [opened.config["objects"] for opened in asked] == [1, 6]
+
+
+def test_a_film_comes_first_where_there_is_one(tmp_path, pool):
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"0123456789")
+    with serving(tmp_path / "visits", pool, film=film) as client:
+        opened = re.search(r'name="opened" value="(\d+)"', client.get("/").text)[1]
+        link = new_visit(client, opened=str(int(opened) - 90_000))
+        assert "<video" in client.get(link).text
+        assert client.get(f"{link}/film", headers={"Range": "bytes=2-4"}).content == b"234"
+        assert client.post(f"{link}/film", headers={"Origin": ORIGIN}).status_code == 303
+        assert 'data-trial="training"' in client.get(link).text
+        go_through(client, link)
+    story, watched, trained = before_the_task(pool)
+    assert story["phase"] == "story" and 90.0 <= story["duration_s"] < 100.0
+    assert watched["phase"] == "flythrough" and 0.0 < watched["duration_s"] < 10.0
+    assert trained == {"phase": "training", "duration_s": 125.0, "reason": "all delivered"}
+
+
+@pytest.mark.parametrize("opened", ["", "x", "-1", "9" * 15, "9" * 400])
+def test_a_form_that_was_tampered_with_only_spoils_its_own_reading_time(client, pool, opened):
+    link = new_visit(client, opened=opened)
+    go_through(client, link)
+    assert before_the_task(pool)[0] == {"phase": "story", "duration_s": 0.0}
+
+
+def test_only_the_hash_of_a_token_is_kept(client, tmp_path, caplog):
+    caplog.set_level("INFO", "mjsim.play")
+    token = new_visit(client).removeprefix("/play/")
+    assert token not in caplog.text and token_hash(token)[:12] in caplog.text
+    assert (tmp_path / token_hash(token) / VISIT).is_file()
+    assert not [p for p in tmp_path.rglob("*") if token in p.name or (p.is_file() and token in p.read_text())]
+
+
+@pytest.mark.parametrize("token", ["x", "x" * 43, "%2e%2e", "..%2f..%2fetc", "a" * 5000, "%00", "é" * 43])
+def test_an_unknown_token_is_no_visit(client, token):
+    assert client.get(f"/play/{token}").status_code == 404
+    with pytest.raises(WebSocketDisconnect), connected(client, f"/play/{token}"):
+        pass
+
+
+@pytest.mark.parametrize("path", ["../server.py", "%2e%2e/server.py", "..%2fserver.py", "/etc/passwd", ""])
+def test_static_files_cannot_be_left(client, path):
+    assert client.get(f"/static/{path}").status_code == 404
+
+
+@pytest.mark.parametrize("path", ["/", "/nothing", "/static/play.js", "/static/nothing"])
+def test_every_answer_has_strict_headers(client, path):
+    headers = client.get(path).headers
+    policy = headers["content-security-policy"]
+    assert "default-src 'none'" in policy and "script-src 'self';" in policy and "unsafe" not in policy
+    assert headers["x-content-type-options"] == "nosniff" and headers["x-frame-options"] == "DENY"
+
+
+def test_no_page_has_a_script_or_style_of_its_own(client):
+    for text in (client.get("/").text, client.get(new_visit(client)).text):
+        assert not [own for own in ("<script>", "<style", " style=", " onclick") if own in text]
+        assert "http" not in text.replace("http-equiv", "")
+
+
+OWN_HOSTS = "127.0.0.1:8000", "localhost:8000", "[::1]:8000"
+OTHER_HOSTS = "evil.example", "192.168.7.9:8000", "", "user@127.0.0.1:8000", "127.0.0.1:x", "[::1"
+
+
+@pytest.mark.parametrize("host", OWN_HOSTS + OTHER_HOSTS)
+def test_only_own_addresses_are_served(client, host):
+    assert client.get("/", headers={"Host": host}).status_code == (200 if host in OWN_HOSTS else 400)
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "", "http://127.0.0.1:9999", "https://127.0.0.1:8000"]
+)
+def test_another_origin_is_refused(client, origin):
+    link = new_visit(client)
+    assert client.post("/visits", headers={"Origin": origin}).status_code == 403
+    with pytest.raises(WebSocketDisconnect), connected(client, link, origin):
+        pass
+
+
+def test_a_server_for_the_network_is_reached_at_the_addresses_of_the_machine():
+    assert "192.168.7.9" in allowed_hosts("192.168.7.9", None)
+    names = allowed_hosts("0.0.0.0", None)
+    assert {"localhost", "127.0.0.1", "[::1]", "0.0.0.0"} <= set(names) and "*" not in names
+
+
+def test_a_proxy_may_make_it_public(tmp_path, pool):
+    public = "https://play.example.org"
+    app = PlayServer(PlayConfig(PHASES, TRIALS, tmp_path), pool).app("127.0.0.1", public)
+    with TestClient(app, base_url=public, follow_redirects=False) as client:
+        assert client.post("/visits", headers={"Origin": public}).status_code == 303
+        assert client.post("/visits", headers={"Origin": ORIGIN}).status_code == 403
+        assert (
+            "connect-src 'self' wss://play.example.org;" in client.get("/").headers["content-security-policy"]
+        )
+        assert client.get("/", headers={"Host": "other.example.org"}).status_code == 400
+
+
+def test_large_bodies_and_many_visits_are_refused(client):
+    assert client.post("/visits", headers={"Origin": ORIGIN}, content=b"x" * 5000).status_code == 413
+    answers = [client.post("/visits", headers={"Origin": ORIGIN}).status_code for _ in range(40)]
+    assert answers.count(303) == 30 and answers.count(429) == 10
+
+
+@pytest.mark.parametrize(
+    ("message", "code"),
+    [
+        (b"\0" * 100, "malformed"),
+        ("", "malformed"),
+        ("{", "malformed"),
+        ("[" * 50000, "malformed"),
+        ('"hello"', "malformed"),
+        ('{"type":"open","folder":"/","run":"/"}', "malformed"),
+        ('{"type":"seen","frame":-1}', "malformed"),
+        ('{"type":"run","more":1}', "malformed"),
+        ('{"type":"inputs","inputs":[{"number":1,"forward":2}]}', "malformed"),
+        ('{"type":"inputs","inputs":[{"number":1,"forward":NaN}]}', "malformed"),
+        (json.dumps(inputs(*range(1, 70))), "malformed"),
+        (json.dumps(inputs(2, 1)), "out of order"),
+        (json.dumps(inputs(1, 1)), "out of order"),
+        (json.dumps(inputs(2**53)), "out of order"),
+        (json.dumps(hello()), "out of order"),
+        ('{"type":"takeover"}', "out of order"),
+    ],
+)
+def test_a_bad_message_gets_a_typed_error_and_stops_nothing(client, message, code):
+    with connected(client, new_visit(client)) as socket:
+        started(socket)
+        socket.send_bytes(message) if isinstance(message, bytes) else socket.send_text(message)
+        error = until(socket, "error")[-1]
+        assert error["code"] == code and "Traceback" not in error["message"]
+        socket.send_json(inputs(1))
+        assert until(socket, "taken")[-1]["input"] == 1
+
+
+@pytest.mark.parametrize(
+    "message", [{"type": "run"}, inputs(1), {"type": "seen", "frame": 1}, {"type": "takeover"}]
+)
+def test_nothing_comes_before_hello(client, message):
+    with connected(client, new_visit(client)) as socket:
+        socket.send_json(message)
+        assert socket.receive_json()["code"] == "too early"
+
+
+def test_inputs_before_the_clock_runs_are_too_early(client):
+    with connected(client, new_visit(client)) as socket:
+        socket.send_json(hello())
+        until_phase(socket, "ready")
+        socket.send_json(inputs(1))
+        assert until(socket, "error")[-1]["code"] == "too early"
+
+
+def test_a_flood_is_cut_off_and_others_are_not_disturbed(tmp_path, pool):
+    with (
+        serving(tmp_path, pool, sessions=2) as client,
+        connected(client, new_visit(client)) as quiet,
+        connected(client, new_visit(client)) as loud,
+    ):
+        started(quiet)
+        started(loud)
+        with pytest.raises(WebSocketDisconnect) as closed:
+            for _ in range(2000):
+                loud.send_json({"type": "run"})
+            until(loud, "nothing")
+        assert closed.value.code == protocol.TOO_MUCH
+        quiet.send_json(inputs(1))
+        assert until(quiet, "taken")[-1]["input"] == 1
+
+
+def test_a_second_page_takes_over_by_asking_and_the_first_is_told(client, monkeypatch):
+    monkeypatch.setattr("experiments.web.server.browser_socket.CLOSE_TIMEOUT", 0.1)
+    link = new_visit(client)
+    with connected(client, link) as first:
+        started(first)
+        with connected(client, link) as second:
+            second.send_json(hello(tab="tab-00000002"))
+            assert second.receive_json()["type"] == "occupied"
+            first.send_json(inputs(1))
+            assert until(first, "taken")[-1]["input"] == 1
+            second.send_json({"type": "takeover"})
+            assert until(first, "replaced")
+            with pytest.raises(WebSocketDisconnect) as closed:
+                first.receive_json()
+            assert closed.value.code == protocol.REPLACED
+            state = until_phase(second, "paused")
+            assert state["reason"] == "taken over" and state["input"] == 1
+
+
+def test_a_page_that_connects_again_need_not_ask(client):
+    link = new_visit(client)
+    with connected(client, link) as first:
+        started(first)
+        with connected(client, link) as second:
+            second.send_json(hello())
+            assert until_phase(second, "paused")["reason"] == "taken over"
+
+
+def test_without_a_browser_the_session_is_paused(client, pool):
+    link = new_visit(client)
+    with connected(client, link) as socket:
+        started(socket)
+        socket.send_json(inputs(1))
+        until(socket, "taken")
+    with connected(client, link) as socket:
+        socket.send_json(hello(tab="tab-00000002"))
+        assert until_phase(socket, "paused")["reason"] == "disconnected"
+    assert Pause("disconnected") in pool.workers[0].told
+
+
+def test_workers_that_die_again_and_again_are_not_replaced_for_ever(client, pool):
+    with connected(client, new_visit(client)) as socket:
+        started(socket)
+        for crash in range(3):
+            with pool.given:
+                pool.workers[-1].die()
+            until_phase(socket, "loading" if len(pool.workers) < MAX_CRASHES else "failed")
+            assert pool.discarded[crash] is pool.workers[crash]
+
+
+def test_beyond_the_limit_people_wait_in_a_queue(client):
+    with connected(client, new_visit(client)) as first, connected(client, new_visit(client)) as second:
+        started(first)
+        second.send_json(hello())
+        assert until(second, "queue")[-1]["position"] == 1
+        with connected(client, new_visit(client)) as third:
+            third.send_json(hello())
+            assert until(third, "queue")[-1]["position"] == 2
+        left(first)
+        until_phase(first, "ready")
+        left(first)
+        until_phase(second, "ready")
+
+
+def test_an_idle_session_gives_its_place_back(tmp_path, pool, monkeypatch):
+    monkeypatch.setattr("experiments.web.server.sessions.WATCH_PERIOD", 0.05)
+    with serving(tmp_path, pool, idle=0.1) as client, connected(client, new_visit(client)) as socket:
+        started(socket)
+        assert until(socket, "error")[-1]["code"] == "idle"
+        with pytest.raises(WebSocketDisconnect) as closed:
+            socket.receive_json()
+        assert closed.value.code == protocol.IDLE
+    assert pool.discarded
+
+
+def test_a_closed_page_keeps_no_place_from_those_who_wait(tmp_path, monkeypatch, pool):
+    monkeypatch.setattr("experiments.web.server.sessions.MAX_AWAY", 0.1)
+    monkeypatch.setattr("experiments.web.server.sessions.WATCH_PERIOD", 0.05)
+    with serving(tmp_path, pool) as client:
+        link = new_visit(client)
+        with connected(client, link) as first:
+            started(first)
+        with connected(client, new_visit(client)) as second:
+            second.send_json(hello())
+            until_phase(second, "ready")
+            with connected(client, link) as back:
+                back.send_json(hello())
+                assert until(back, "queue")[-1]["position"] == 1
+
+
+def test_a_damaged_visit_is_named_in_the_log_only(client, tmp_path, caplog):
+    token = Visits(tmp_path).create(["training", "task"], TRIALS)
+    path = tmp_path / token_hash(token) / VISIT
+    path.write_text("{")
+    answer = client.get(f"/play/{token}")
+    assert answer.status_code == 500 and str(tmp_path) not in answer.text
+    assert "is damaged" in caplog.text
+
+
+def test_frames_have_a_fixed_head():
+    frame = Frame(7, 8, 2**40, "h264", True, 640, 480, 12.5, b"picture")
+    data = frame.packed()
+    assert protocol.FRAME_HEAD.size == 28 and data[28:] == b"picture"
+    assert protocol.FRAME_HEAD.unpack(data[:28]) == (1, 2, 1, 0, 640, 480, 7, 8, 2**40, 12.5)
+
+
+def documented(section):
+    """Fields by type of message, as a table of docs/protocol.md has them."""
+    text = (Path(__file__).parents[4] / "docs" / "protocol.md").read_text("utf-8")
+    table = text.split(f"## {section}\n")[1].split("\n## ")[0]
+    rows = [row.split("|") for row in table.splitlines() if row.startswith("| `")]
+    return {row[1].strip(" `"): set(re.findall(r"`(\w+)`", row[2])) for row in rows if len(row) > 4}
+
+
+@pytest.mark.parametrize(
+    ("section", "union"), [("From the client", protocol.FromBrowser), ("From the server", protocol.ToBrowser)]
+)
+def test_the_protocol_is_documented(section, union):
+    types = {kind.__struct_config__.tag: set(kind.__struct_fields__) for kind in union.__args__}
+    found = documented(section)
+    assert {name: found[name] for name in types} == types
+
+
+def test_documented_close_codes_and_limits_are_those_of_the_code():
+    text = (Path(__file__).parents[4] / "docs" / "protocol.md").read_text("utf-8")
+    for code in (protocol.REFUSED, protocol.REPLACED, protocol.IDLE, protocol.TOO_MUCH, protocol.SLOW):
+        assert str(code) in text
+    assert set(re.findall(r"`([a-z ]+)` \(", text)) >= {"malformed", "too early", "out of order", "too much"}

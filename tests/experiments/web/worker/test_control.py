@@ -1,0 +1,86 @@
+"""The state machine of a session, and the inputs that wait for it."""
+
+import threading
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.web.controls import Input
+from experiments.web.state import (
+    FAILED,
+    LOADING,
+    OVER,
+    PAUSED,
+    READY,
+    RUNNING,
+    TRANSITIONS,
+    SessionPhase,
+    Trigger,
+)
+from experiments.web.worker.control import SessionControl
+
+
+def after(*triggers):
+    """Phases that a session announces, and its control."""
+    phases = []
+    control = SessionControl(lambda state: phases.append(state.phase))
+    for trigger in triggers:
+        control.apply(trigger)
+    return phases, control
+
+
+@pytest.mark.parametrize(
+    ("triggers", "phases"),
+    [
+        (("opened", "run", "pause", "run", "end"), (READY, RUNNING, PAUSED, RUNNING, OVER)),
+        (("restored", "run"), (PAUSED, RUNNING)),
+        (("run", "pause", "opened", "pause", "end", "run"), (READY, OVER)),
+        (("end", "opened", "restored"), (OVER,)),
+        (("opened", "fail", "run", "end"), (READY, FAILED)),
+    ],
+)
+def test_a_life_follows_the_table(triggers, phases):
+    assert tuple(after(*map(Trigger, triggers))[0]) == phases
+
+
+@given(st.lists(st.sampled_from(Trigger)))
+def test_only_transitions_of_the_table_happen(triggers):
+    phases, _ = after(*triggers)
+    for before, then in zip([LOADING, *phases], phases, strict=False):
+        assert then in {TRANSITIONS.get((before, trigger)) for trigger in Trigger}
+    assert set(SessionPhase) - {LOADING} == set(TRANSITIONS.values()), "every phase is reached"
+
+
+def test_what_is_sent_again_counts_once():
+    _, control = after()
+    for numbers in ((1, 2), (1, 2, 3), (3,), (4,)):
+        control.add([Input(number=number) for number in numbers])
+    assert [new.number for new in control.take_inputs()] == [1, 2, 3, 4]
+    assert control.take_inputs() == () and control.state.input == 4
+
+
+def test_a_restored_session_continues_its_numbers():
+    _, control = after()
+    control.apply(Trigger.RESTORED, "disconnected", last=7)
+    control.add([Input(number=7), Input(number=8)])
+    assert [new.number for new in control.take_inputs()] == [8]
+    assert control.state.reason == "disconnected"
+
+
+def test_pauses_and_blurs_are_noted_in_order_with_their_time():
+    _, control = after(Trigger.OPENED, Trigger.RUN, Trigger.PAUSE)
+    control.note_blur(True)
+    control.apply(Trigger.RUN)
+    notes = control.take_notes()
+    assert [event for event, _ in notes] == ["pause", "blur", "resume"]
+    assert all(fields["wall"] > 0.0 for _, fields in notes) and control.take_notes() == []
+
+
+def test_a_thread_that_waits_sees_the_change():
+    _, control = after(Trigger.OPENED)
+    waiting = threading.Thread(target=control.wait_for_change, args=(READY, 60.0))
+    waiting.start()
+    control.apply(Trigger.RUN)
+    waiting.join(10.0)
+    assert not waiting.is_alive()

@@ -1,0 +1,416 @@
+"""Rules of the assistance conditions (PAPER section 5), their discovery, and the message bar's texts."""
+
+import dataclasses
+
+import hud_sample as sample
+import numpy as np
+import pytest
+
+from hud.compose import Compositor, compose
+from hud.conditions import condition, condition_names
+from hud.errors import ConditionError, HudError, MessageError, TaskViewError
+from hud.lists import in_sentence
+from hud.markers import breadcrumbs, flagpoles
+from hud.messages import FADE, SHOWN, TEXTS, fade, message
+from hud.options import option_names
+from hud.options.reroute import CLEARANCE
+from hud.schema import from_dict, to_dict
+from hud.state import HudState, InventorySlot, MessageKind
+from hud.task import Alternative, KnownPlan, TaskStep
+
+COUNTS = (6, 12, 18, 24)
+
+
+def shown(name, view):
+    return condition(name)(view)
+
+
+def with_path(view, *points):
+    """A view in which another path leads to the next step."""
+    ahead = KnownPlan(view.plan, segment=view.segment, path=np.array(points), goal=view.goal)
+    return dataclasses.replace(view, ahead=ahead)
+
+
+def with_status(view, **status):
+    objects = tuple(dataclasses.replace(o, status=status.get(o.name, o.status)) for o in view.objects)
+    return dataclasses.replace(view, objects=objects)
+
+
+def test_every_file_of_the_package_is_a_condition():
+    assert condition_names() == ("guided", "highlight", "none", "optimal")
+    for name in condition_names():
+        assert isinstance(shown(name, sample.task(6)), HudState)
+
+
+@pytest.mark.parametrize(
+    ("name", "named"),
+    [
+        ("magic", r"'magic'.*highlight, none, optimal"),
+        ("none-sparkle", r"'sparkle'.*minimap, pin, .*regret, .*xray"),
+        ("magic-minimap", r"'magic'.*-minimap or -pin.* or -xray"),
+        ("hud.nowhere:hud_state", "condition"),
+        ("hud.conditions.none:missing", "condition"),
+        ("hud.conditions.none:__doc__", "condition"),
+        (":x", "condition"),
+    ],
+)
+def test_an_unknown_name_is_refused_with_the_choices(name, named):
+    with pytest.raises(ConditionError, match=named) as caught:
+        condition(name)
+    assert isinstance(caught.value, HudError)
+
+
+@pytest.mark.parametrize("name", ["none", "highlight", "optimal", "guided"])
+@pytest.mark.parametrize("count", COUNTS)
+def test_all_conditions_list_every_bin_with_picture_and_place(name, count):
+    view = sample.task(count, steps=3)
+    listed = shown(name, view).bins
+    assert [b.label for b in listed] == [r.label for r in view.receptacles]
+    for entry, receptacle in zip(listed, view.receptacles, strict=True):
+        assert entry.picture == receptacle.picture
+        assert entry.place == receptacle.room
+
+
+@pytest.mark.parametrize("name", ["none", "highlight", "optimal", "guided"])
+def test_hands_progress_clock_and_message_pass_through(name):
+    text = message("hands_full")
+    view = sample.task(12, steps=6, message=text, clock=12.5)
+    state = shown(name, view)
+    labels = {o.name: o.label for o in view.objects}
+    assert [slot and slot.label for slot in state.inventory] == [
+        None if h is None else labels[h] for h in view.hands
+    ]
+    assert (state.delivered, state.total, state.clock, state.message) == (2, 12, 12.5, text)
+    assert all(slot is not None and slot.label for slot in state.inventory)
+
+
+def test_who_carries_one_object_has_one_hand_on_show():
+    view = dataclasses.replace(sample.task(6), capacity=1)
+    state = shown("none", view)
+    assert state.inventory == (None, InventorySlot())
+    assert from_dict(to_dict(state)) == state
+    frame, two = sample.backdrop(640, 480), shown("none", sample.task(6))
+    rect = Compositor({}).layout(state, 640, 480).panels["inventory"]
+    drawn, other = (compose(frame, s, {}) for s in (state, two))
+    middle = rect.x + rect.width // 2
+    assert np.array_equal(drawn[rect.y :, rect.x : middle], frame[rect.y :, rect.x : middle])
+    assert np.array_equal(drawn[:, middle:], other[:, middle:])
+
+
+@pytest.mark.parametrize("name", ["none", "highlight"])
+def test_lists_start_in_the_participants_order(name):
+    view = sample.task(12)
+    reordered = dataclasses.replace(view, order=view.order[::-1])
+    labels = {o.name: o.label for o in view.objects}
+    assert [i.text for i in shown(name, view).checklist] == [labels[n] for n in view.order]
+    assert [i.text for i in shown(name, reordered).checklist] == [labels[n] for n in view.order[::-1]]
+
+
+@pytest.mark.parametrize("name", ["none", "highlight"])
+def test_picked_objects_are_crossed_out_and_move_to_the_bottom_in_order_of_picking(name):
+    view = sample.task(6)
+    steps = (("pick", "object_04"), ("pick", "object_01"), ("place", "object_04"))
+    view = with_status(view, object_04="delivered", object_01="carried")
+    rows = shown(name, dataclasses.replace(view, steps_done=steps)).checklist
+    waiting = [n for n in view.order if n not in ("object_04", "object_01")]
+    labels = {o.name: o.label for o in view.objects}
+    assert [r.text for r in rows] == [labels[n] for n in (*waiting, "object_04", "object_01")]
+    assert [r.done for r in rows] == [False] * 4 + [True] * 2
+
+
+def test_a_dropped_object_returns_to_its_place_in_the_list():
+    view = sample.task(6)
+    dropped = dataclasses.replace(view, steps_done=(("pick", view.order[0]),))
+    rows = shown("none", dropped).checklist
+    assert rows == shown("none", view).checklist
+    assert not any(r.done for r in rows)
+
+
+def test_none_names_bins_but_neither_rooms_nor_anything_in_the_world():
+    view = sample.task(24, steps=5)
+    state = shown("none", view)
+    assert state.markers == () and state.pointer is None
+    bins = {o.label: view.receptacle(o.receptacle) for o in view.objects}
+    for row in state.checklist:
+        assert row.detail == f"→ {bins[row.text].label}"
+        assert row.target_picture == bins[row.text].picture and row.picture == f"object:{row.text}"
+        assert row.number is None and not row.current
+
+
+def test_highlight_adds_the_room_of_what_lies_about():
+    view = sample.task(24, steps=5)
+    rooms = {o.label: o.room for o in view.objects}
+    for row in shown("highlight", view).checklist:
+        assert row.detail.startswith(rooms[row.text]) is not row.done
+
+
+def test_highlight_flags_exactly_the_misplaced_objects():
+    view = sample.task(12, steps=6)
+    flags = shown("highlight", view).markers
+    assert {m.role for m in flags} == {"flagpole"}
+    poles = [m for m in flags if m.shape == "cylinder"]
+    loose = [o for o in view.objects if o.status == "loose"]
+    assert len(loose) == 12 - 4
+    assert {m.position[:2] for m in poles} == {o.position[:2] for o in loose}
+    assert all(m.x_ray for m in flags), "they are known through walls"
+    for pole in poles:
+        assert pole.position[2] - pole.size[1] > 0.1, "the pole stands clear above the object"
+
+
+def test_optimal_numbers_the_steps_and_highlights_the_next():
+    view = sample.task(6, steps=3)
+    rows = shown("optimal", view).checklist
+    assert [r.number for r in rows] == list(range(1, 13))
+    assert [r.done for r in rows] == [True] * 3 + [False] * 9
+    assert [r.current for r in rows] == [False] * 3 + [True] + [False] * 8
+    steps = (*view.steps_done, *view.plan)
+    for row, (kind, name) in zip(rows, steps, strict=True):
+        item = view.object(name)
+        assert row.text == item.label and row.picture == item.picture
+        if kind == "pick":
+            assert row.detail.startswith("Pick up")
+            assert (item.room in row.detail) is not row.done
+        else:
+            assert row.detail.startswith(f"Put in {view.receptacle(item.receptacle).label}")
+            assert (view.receptacle(item.receptacle).room in row.detail) is not row.done
+
+
+def test_optimal_keeps_the_order_in_which_steps_were_really_done():
+    view = sample.task(6)
+    deviated = dataclasses.replace(
+        view, steps_done=(TaskStep("pick", "object_05"),), ahead=KnownPlan(view.plan[:3])
+    )
+    assert [r.text for r in shown("optimal", deviated).checklist] == [
+        view.object(n).label for n in ("object_05", "object_00", "object_01", "object_00")
+    ]
+
+
+def test_optimal_shows_breadcrumbs_along_the_segment_and_the_flagpoles_of_highlight_and_nothing_else():
+    view = with_path(sample.task(12, steps=5), [5.0, 5.0], [6.0, 6.0])
+    state = shown("optimal", view)
+    crumbs = tuple(m for m in state.markers if m.role == "breadcrumb")
+    assert view.segment is not None and crumbs == breadcrumbs(view.segment)
+    assert crumbs and not any(m.x_ray for m in crumbs), "walls hide the path"
+    assert state.markers == (*crumbs, *shown("highlight", view).markers)
+    assert (state.pointer, state.minimap, state.rerouted) == (None, None, False)
+
+
+def test_guided_is_optimal_with_its_options():
+    view = dataclasses.replace(
+        with_path(sample.task(12, steps=5), [5.0, 5.0], [9.0, 9.0]), camera=sample.camera(640, 480, yaw=3.0)
+    )
+    state = shown("guided", view)
+    assert state == shown("optimal-reroute-rims-pin-pointer", view)
+    assert state == shown("guided-pin-pointer-rims", view), "an option that is there already adds nothing"
+    assert {m.role for m in state.markers} == {"breadcrumb", "rim", "goal", "flagpole"}
+    assert state.pointer is not None and state.rerouted
+    assert view.path is not None
+    assert tuple(m for m in state.markers if m.role == "breadcrumb") == breadcrumbs(view.path, CLEARANCE)
+    assert {"reroute", "rims", "pin", "pointer", "bins", "minimap", "regret", "xray"} == set(option_names())
+
+
+NOTHING_TO_ADD = (
+    "none-minimap none-regret highlight-regret optimal-regret none-reroute-rims highlight-reroute-rims"
+)
+
+
+@pytest.mark.parametrize("name", NOTHING_TO_ADD.split())
+def test_options_add_nothing_where_there_is_nothing_to_add(name):
+    """No map of the house, no regret that is known, no breadcrumbs."""
+    view = with_path(sample.task(12, steps=5), [5.0, 5.0], [9.0, 9.0])
+    assert shown(name, view) == shown(name.partition("-")[0], view)
+
+
+def test_bins_pins_the_bins_of_what_is_in_the_hands():
+    for steps in range(5):
+        view = sample.task(12, steps=steps)
+        carried = {view.object(name).receptacle for name in view.hands if name is not None}
+        pins = {m.position[:2] for m in shown("none-bins", view).markers}
+        assert pins == {view.receptacle(key).position[:2] for key in carried}
+
+
+def test_the_pointer_is_shown_only_while_the_goal_is_out_of_view():
+    view = sample.task(6, steps=0)
+    away = dataclasses.replace(view, camera=sample.camera(640, 480, yaw=3.0))
+    facing = dataclasses.replace(view, camera=sample.camera(640, 480, yaw=0.6))
+    assert view.goal is not None and view.goal[0] < 0, "the goal is ahead on the left"
+    assert shown("optimal-pointer", view).pointer is None
+    assert shown("optimal-pointer", facing).pointer is None
+    assert shown("optimal-pointer", away).pointer is not None
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"order": ("object_00",)}, "order"),
+        ({"hands": ("ghost", None)}, "ghost"),
+        ({"steps_done": (("throw", "object_00"),)}, "throw"),
+        ({"receptacles": ()}, "dish_bin"),
+    ],
+)
+def test_an_inconsistent_view_is_refused_by_name(change, named):
+    with pytest.raises(TaskViewError, match=named):
+        dataclasses.replace(sample.task(6), **change)
+
+
+@pytest.mark.parametrize(
+    ("asked", "ahead", "named"),
+    [
+        ("plan", KnownPlan((TaskStep("pick", "ghost"),)), "ghost"),
+        ("path", KnownPlan(path=np.zeros((2, 3))), r"path.*\(2, 3\)"),
+        ("segment", KnownPlan(segment=np.zeros((2, 3))), r"segment.*\(2, 3\)"),
+    ],
+)
+def test_an_inconsistent_plan_is_refused_when_it_is_asked_for(asked, ahead, named):
+    view = dataclasses.replace(sample.task(6), ahead=ahead)
+    with pytest.raises(TaskViewError, match=named):
+        getattr(view, asked)
+
+
+def test_an_unknown_status_is_refused():
+    with pytest.raises(TaskViewError, match="lost"):
+        with_status(sample.task(6), object_00="lost")
+
+
+# Refusals and events that the physics side reports; the message bar must have a text for each.
+REPORTED = {
+    "busy", "nothing_in_reach", "out_of_reach", "hands_full", "hands_empty", "not_carried", "already_carried",
+    "already_delivered", "not_the_receptacle", "receptacle_out_of_reach", "unknown_object",
+    "picked", "pick_failed", "placed", "place_failed", "grip_lost", "dislodged",
+}  # fmt: skip
+
+
+def test_all_that_is_reported_has_a_message_that_is_a_sentence_with_and_without_labels():
+    assert set(TEXTS) >= REPORTED
+    for key in TEXTS:
+        for bar in (message(key), message(key, object="Blue mug", receptacle="Office supply box")):
+            assert bar.text[0].isupper() and bar.text.endswith(".") and "{" not in bar.text
+            assert "Blue mug" not in bar.text, "labels read as part of the sentence"
+        assert (message(key).kind is MessageKind.SUCCESS) is (key in ("picked", "placed", "finished"))
+    with pytest.raises(MessageError, match=r"'oops'.*hands_full"):
+        message("oops")
+
+
+@pytest.mark.parametrize(
+    ("label", "inside"),
+    [
+        ("Blue mug", "blue mug"), ("T-shirt", "T-shirt"), ("LEGO car", "LEGO car"), ("Office-supply box",
+        "office-supply box"), ("Turquoise T-shirt", "turquoise T-shirt"), ("Stapler", "stapler"), ("", ""),
+    ],
+)  # fmt: skip
+def test_labels_inside_a_sentence(label, inside):
+    assert in_sentence(label) == inside
+
+
+def test_messages_fade_linearly_after_they_were_shown():
+    assert [fade(t) for t in (0.0, SHOWN, SHOWN + FADE / 4, SHOWN + FADE, 1e9)] == pytest.approx(
+        [1, 1, 0.75, 0, 0]
+    )
+
+
+@pytest.mark.parametrize("base", ["none", "highlight", "optimal"])
+def test_x_ray_changes_nothing_but_that_markers_show_through_walls(base):
+    view = sample.task(12, steps=5)
+    plain, x_ray = shown(base, view), shown(f"{base}-xray", view)
+    assert all(m.x_ray for m in x_ray.markers)
+    through = tuple(dataclasses.replace(m, x_ray=True) for m in plain.markers)
+    assert dataclasses.replace(plain, markers=through) == x_ray
+
+
+@pytest.mark.parametrize("base", ["none", "highlight", "optimal"])
+def test_flagpoles_are_found_by_object_where_they_are_drawn(base):
+    view = sample.task(12, steps=6)
+    near = dataclasses.replace(
+        view, position=view.objects[7].position[:2]
+    )  # one has a low pole without a flag
+    for seen in (view, near):
+        loose = {o.name: o.position[:2] for o in seen.objects if o.status == "loose"}
+        assert flagpoles(shown(base, seen)) == ({} if base == "none" else loose)
+
+
+@pytest.mark.parametrize("base", ["none", "highlight", "optimal"])
+def test_the_map_tells_no_more_than_the_condition(base):
+    view = dataclasses.replace(
+        sample.task(12, steps=5), bounds=(-4.0, -1.0, 4.0, 7.0), position=(0.5, 0.25), heading=0.7
+    )
+    state = shown(f"{base}-minimap", view)
+    assert dataclasses.replace(state, minimap=None) == shown(base, view)
+    found = state.minimap
+    assert found is not None
+    assert (found.bounds, found.position, found.heading) == (view.bounds, view.position, view.heading)
+    loose = {o.position[:2] for o in view.objects if o.status == "loose"}
+    assert set(found.objects) == (set() if base == "none" else loose)
+    assert len(found.objects) == len(set(found.objects))
+    crumbs = [m.position[:2] for m in state.markers if m.role == "breadcrumb"]
+    assert list(found.path) == crumbs and (len(crumbs) > 0) is (base == "optimal")
+    assert found.goal is None
+    assert shown(f"{base}-pin-minimap", view).minimap.goal == view.goal[:2]
+
+
+def knowing(view, *alternatives):
+    return dataclasses.replace(view, alternatives=lambda: alternatives)
+
+
+def details(state):
+    return {f"{row.number or ''}{row.text}": " ".join(row.detail.split()) for row in state.checklist}
+
+
+def test_regrets_stand_beside_what_can_be_done_next_and_nowhere_else():
+    plain = sample.task(6, steps=1)  # the mug in one hand; next the toy car, then both are placed
+    mug, car, novel, shirt = (o.name for o in plain.objects[:4])
+    view = knowing(
+        plain,
+        Alternative("pick", car, 0.0),
+        Alternative("place", mug, 0.004),
+        Alternative("pick", novel, 2.34),
+        Alternative("pick", shirt, 1.0, at_least=True),
+    )
+    assert details(shown("optimal-regret", view)) == details(shown("optimal", view)) | {
+        "3Blue mug": "Put in Dish bin · Kitchen · +0 m",
+        "5Novel": "Pick up · Bedroom · +2.3 m",
+        "6T-shirt": "Pick up · Kitchen · over +1.0 m",
+    }
+    listed = details(shown("none-regret", view))
+    assert listed["Toy car"] == "→ Toy box · +0 m"
+    assert listed["Novel"] == "→ Bookshelf · +2.3 m"
+    assert listed["Blue mug"] == "→ Dish bin · +0 m"
+    assert not any("m" in listed[other].partition("·")[2] for other in ("Stapler", "Cardboard box"))
+
+
+def test_a_small_regret_is_not_shown_as_none():
+    view = sample.task(6)
+    view = knowing(view, Alternative("pick", view.objects[2].name, 0.03))
+    assert "+0.1 m" in details(shown("optimal-regret", view))["5Novel"]
+
+
+def test_a_step_that_was_done_and_can_be_done_again_is_noted_once():
+    """The mug was dropped: picking it up is a step that is done and one that is possible."""
+    plain = sample.task(6, steps=1)
+    mug = dataclasses.replace(plain.objects[0], status="loose")
+    again = (TaskStep("pick", plain.objects[1].name), TaskStep("pick", mug.name))
+    view = dataclasses.replace(
+        plain, objects=(mug, *plain.objects[1:]), hands=(None, None), ahead=KnownPlan(again + plain.plan[2:])
+    )
+    rows = shown("optimal-regret", knowing(view, Alternative("pick", mug.name, 5.0))).checklist
+    assert ["+5.0 m" in row.detail for row in rows[:4]] == [False, False, True, False]
+
+
+def test_options_combine_and_follow_outside_conditions():
+    view = dataclasses.replace(sample.task(6), bounds=(-4.0, -1.0, 4.0, 7.0))
+    both = shown("hud.conditions.highlight:hud_state-xray-minimap", view)
+    assert both == shown("highlight-minimap-xray", view)
+    assert both.minimap is not None and all(m.x_ray for m in both.markers)
+
+
+def test_flags_of_near_objects_are_low():
+    """So that no flag fills the view of somebody who stands before the object."""
+    view = sample.task(6)
+    item = view.objects[0]
+    x, y, _ = item.position
+
+    def top(distance):
+        markers = shown("highlight", dataclasses.replace(view, position=(x + distance, y))).markers
+        here = [m for m in markers if np.hypot(m.position[0] - x, m.position[1] - y) < 0.2]
+        return max(m.position[2] + (m.size[2] if m.shape == "box" else m.size[1]) for m in here)
+
+    assert top(1.2) < 0.9 and top(2.0) > 1.4

@@ -1,0 +1,94 @@
+"""Machine code of kernels on disk."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from experiments.trials.compile_notice import NOTICE
+from mjsim import kernels
+
+CALLEE = "from mjsim.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
+CALLER = (
+    "from mjsim.kernels import kernel\nfrom planner.callee import factor\nfrom planner.limits import OFFSET\n\n\n"
+    "@kernel\ndef twice(x):\n    return 2 * factor() * x + OFFSET\n\n\n"
+    "print(twice(1), sum(twice.stats.cache_hits.values()))\n"
+)
+
+
+def _project(root):
+    """A project of two packages with the real `mjsim.kernels` and two kernels."""
+    for package in ("mjsim", "planner"):
+        (root / package).mkdir()
+        (root / package / "__init__.py").touch()
+    (root / "mjsim/kernels.py").write_bytes(Path(kernels.__file__).read_bytes())
+    (root / "planner/caller.py").write_text(CALLER, encoding="utf-8")
+    _set(root, factor=1, offset=0)
+
+
+def _set(root, factor, offset):
+    (root / "planner/callee.py").write_text(CALLEE.format(factor=factor), encoding="utf-8")
+    (root / "planner/limits.py").write_text(f"OFFSET = {offset}\n", encoding="utf-8")
+
+
+def _run(root, cache):
+    run = subprocess.run(
+        [sys.executable, "-c", "import planner.caller"],
+        cwd=root,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+    )
+    assert not run.stderr
+    return run.stdout.strip()
+
+
+@pytest.mark.slow
+def test_a_kernel_is_compiled_anew_when_one_that_it_calls_or_a_constant_has_changed(tmp_path):
+    _project(tmp_path)
+    printed = []
+    for factor, offset in ((1, 0), (10, 0), (10, 0), (10, 5)):
+        _set(tmp_path, factor, offset)
+        printed.append(_run(tmp_path, tmp_path / "cache"))
+    assert printed == ["2 0", "20 0", "20 1", "25 0"]  # the result, and whether it came from disk
+
+
+@pytest.mark.slow
+def test_an_unrelated_edit_recompiles_nothing_and_unused_machine_code_goes(tmp_path):
+    _project(tmp_path)
+    cache = tmp_path / "cache"
+    _run(tmp_path, cache)
+    (tmp_path / "planner/other.py").write_text("x = 1\n", encoding="utf-8")
+    assert _run(tmp_path, cache) == "2 1"
+    old = set(cache.iterdir())
+    (cache / "of-somebody-else").mkdir()
+    long_ago = time.time() - kernels.UNUSED - 1
+    for folder in cache.iterdir():
+        os.utime(folder, (long_ago, long_ago))
+    _set(tmp_path, factor=3, offset=0)
+    _run(tmp_path, cache)
+    new = set(cache.iterdir())
+    assert not old & new
+    assert len(new) == 3  # of the two modules, and of somebody else
+
+
+def test_kernels_work_where_nothing_can_be_cached(tmp_path):
+    """Neither where no folder can be made, nor where numba refuses."""
+    _project(tmp_path)
+    assert _run(tmp_path, Path("/proc/self/nowhere")) == "2 0"
+    function = eval("lambda x: x + 1")  # it has no file
+    assert kernels.kernel(function)(2) == 3
+
+
+def test_compiling_is_announced_once():
+    """Nobody may take a first command for one that hangs."""
+    script = (
+        "import numba; from experiments.trials.compile_notice import announce_compiling; announce_compiling()\n"
+        "f = numba.njit(lambda x: x + 1); print(f(1), f(1.5))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert run.stdout.strip() == "2 2.5"
+    assert run.stderr == f"mjsim: {NOTICE}\n"

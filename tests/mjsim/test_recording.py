@@ -1,0 +1,129 @@
+"""The state of a world as a value: complete, exact, and hashed."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from small_worlds import do, finish, scene_of
+
+from mjsim.actions import Pick
+from mjsim.errors import StateError
+from mjsim.model.scene import compose
+from mjsim.world import World
+from mjsim.world_state import StateHash, WorldState, engine_versions, model_fingerprint
+
+FEW = settings(
+    max_examples=15,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+
+
+@pytest.fixture(scope="module")
+def world(small_catalogue):
+    return World(scene_of(small_catalogue, (1.0, 1.0, 0.0), ("cube", 1.6, 1.3)))
+
+
+def test_a_state_does_not_change_when_the_world_goes_on(world):
+    world.reset()
+    state = world.state()
+    before = state.hash
+    world.restore(state)
+    do(world, Pick())
+    assert state.hash == before
+    assert world.state().hash != before
+
+
+def test_a_busy_world_has_no_state(world):
+    world.reset()
+    world.step(Pick())
+    with pytest.raises(StateError, match=r"busy at t = .* take its state between motions"):
+        world.state()
+    finish(world)
+    world.state()
+
+
+@pytest.mark.parametrize("size", [0, 7])
+def test_a_state_of_another_scene_is_refused(world, size):
+    with pytest.raises(StateError, match=f"a state of {size} numbers"):
+        world.restore(WorldState(np.zeros(size), world.state().details))
+
+
+def test_a_state_that_is_not_finite_is_refused(world):
+    world.reset()
+    state = world.state()
+    state.physics[3] = np.nan
+    with pytest.raises(StateError, match="1 of them not finite"):
+        world.restore(state)
+
+
+@pytest.mark.parametrize("details", ["{}", "[]", "{", '{"health": {"altitude": 3}}'])
+def test_details_of_something_else_are_refused(details):
+    with pytest.raises(StateError, match="details do not fit"):
+        WorldState.from_json(np.zeros(1), details)
+
+
+def test_details_of_another_shape_are_refused(world):
+    world.reset()
+    state = world.state()
+    rig = dataclasses.replace(state.details.person.rig, motion=np.zeros(3))
+    changes = {"rig": rig}, {"grips": ((99, 0), None)}
+    for change in changes:
+        person = dataclasses.replace(state.details.person, **change)
+        with pytest.raises(StateError, match="details do not fit"):
+            world.restore(WorldState(state.physics, dataclasses.replace(state.details, person=person)))
+    world.reset()
+
+
+def test_a_state_of_other_objects_is_refused(world):
+    world.reset()
+    state = world.state()
+    for changes in ({"status": state.details.status[1:]}, {"hands": ("nobody's", None)}):
+        details = dataclasses.replace(state.details, **changes)
+        with pytest.raises(StateError, match="same episode"):
+            world.restore(WorldState(state.physics, details))
+    world.reset()
+
+
+@FEW
+@given(field=st.sampled_from(["qpos", "qvel", "ctrl", "eq_active", "time"]), data=st.data())
+def test_the_hash_tells_states_apart_by_the_last_bit(scene, field, data):
+    physics = mujoco.MjData(scene.model)
+    hasher = StateHash(scene.model)
+    before = hasher.of(physics)
+    if field == "time":
+        physics.time = np.nextafter(physics.time, 1.0)
+    else:
+        values = getattr(physics, field)
+        place = data.draw(st.integers(0, len(values) - 1))
+        values[place] = 1 if field == "eq_active" else np.nextafter(values[place], 9.0)
+    assert hasher.of(physics) != before
+    mujoco.mj_resetData(scene.model, physics)
+    assert hasher.of(physics) == before
+
+
+def test_the_fingerprint_is_of_what_moves_not_of_looks(episode, catalogue):
+    models = [compose(episode, catalogue).model for _ in range(2)]
+    before = model_fingerprint(models[0])
+    assert model_fingerprint(models[1]) == before
+    models[0].geom_rgba[:] = 0.5
+    models[0].tex_data[:] = 0
+    models[0].mat_specular[:] = 0.0
+    assert model_fingerprint(models[0]) == before
+    for name in ("body_mass", "geom_friction", "mesh_vert", "dof_damping", "geom_pos", "eq_solref"):
+        values = getattr(models[0], name).reshape(-1)
+        kept, values[-1] = float(values[-1]), np.nextafter(values[-1], 9.0, dtype=values.dtype)
+        assert model_fingerprint(models[0]) != before, name
+        values[-1] = kept
+    assert model_fingerprint(models[0]) == before
+    models[0].opt.impratio = 9.0
+    assert model_fingerprint(models[0]) != before
+
+
+def test_versions_name_the_engine():
+    versions = engine_versions()
+    assert versions["mujoco"] == mujoco.__version__
+    assert all(isinstance(value, str) and value for value in versions.values())

@@ -1,0 +1,77 @@
+"""The exact planner gives the same plan whatever runs beside it, and its selection of states is right."""
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.exact.nodes import smallest_but
+from planner.exact.solver import ExactSolver
+from planner.problem import RoutingProblem, Shipment
+from planner.solver import SolveLimit
+
+SEARCH = ExactSolver(table_bytes=0, passes=((60, 300), (200, 600)))
+
+IN_ANOTHER_PROCESS = """
+import sys
+import numpy as np
+from planner.exact.solver import ExactSolver
+from planner.problem import RoutingProblem, Shipment
+d = np.load(sys.stdin.buffer)
+problem = RoutingProblem(d, 0, tuple(Shipment(7 + k, 1 + k % 6) for k in range(len(d) - 7)))
+plan = ExactSolver(table_bytes=0, passes=((60, 300), (200, 600))).solve(problem, seed=3)
+print([*map(str, plan.visits)], plan.lower_bound.hex())
+"""
+
+
+def problem_of(seed, n=16):
+    places = np.random.default_rng(seed).uniform(0, 10, (7 + n, 2))
+    d = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    return RoutingProblem(d, 0, tuple(Shipment(7 + k, 1 + k % 6) for k in range(n)))
+
+
+def claim(plan):
+    """All of a plan but the time it took."""
+    return plan.visits, plan.cost, plan.lower_bound, plan.status, plan.certificate
+
+
+def test_threads_that_solve_at_once_do_not_disturb_each_other():
+    problems = [problem_of(seed) for seed in range(4)]
+    alone = [claim(SEARCH.solve(p, seed=3, limit=SolveLimit(work=60_000))) for p in problems]
+    for threads in (2, 8):
+        with ThreadPoolExecutor(threads) as pool:
+            together = pool.map(
+                lambda p: claim(SEARCH.solve(p, seed=3, limit=SolveLimit(work=60_000))), problems * 3
+            )
+            assert list(together) == alone * 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("threads", ["1", "7"])
+def test_a_process_with_any_number_of_threads_finds_the_same_plan(threads, tmp_path):
+    problem = problem_of(11)
+    np.save(tmp_path / "distances.npy", problem.distances)
+    names = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+    with (tmp_path / "distances.npy").open("rb") as distances:
+        printed = subprocess.run(
+            [sys.executable, "-c", IN_ANOTHER_PROCESS],
+            stdin=distances,
+            env=os.environ | dict.fromkeys(names, threads),
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+    plan = SEARCH.solve(problem, seed=3)
+    assert printed.strip() == f"{[*map(str, plan.visits)]} {plan.lower_bound.hex()}"
+
+
+@given(st.lists(st.integers(-(2**29), 2**29), min_size=1, max_size=40), st.data())
+def test_the_bar_for_the_best_states_is_the_order_statistic(values, data):
+    size = data.draw(st.integers(1, len(values)))
+    count = data.draw(st.integers(1, size))
+    assert smallest_but(np.array(values, np.int64), size, count) == sorted(values[:size])[count - 1]

@@ -1,0 +1,368 @@
+"""Live replanning: a plan at once, better ones later, and no change of mind without a reason."""
+
+import contextlib
+import json
+import threading
+
+import planning_cases
+import pytest
+from planning_cases import Task, asked, planner_of, two_rooms
+
+from experiments.cli.main import main
+from experiments.record import records
+from experiments.record.records import EventLog
+from experiments.replay.log_source import LogSource
+from experiments.trials import setup
+from experiments.trials.setup import prepare_session, prepared_planner
+from experiments.trials.trial_config import TrialConfig
+from mjsim.model.scene import compose
+from planner.checker import check
+from planner.errors import ProblemError, UnreachableError
+from planner.exact.solver import ExactSolver
+from planner.exact.warm_start import NOTHING_KNOWN
+from planner.greedy_solver import nearest_first
+from planner.plan import Plan, Status, VisitKind
+from planner.regret import RegretEvaluator
+from planner.route import TaskState, remaining
+from planner.service import Mode, Planner
+from planner.solver import SolveLimit, solver
+from planner.solver_source import TIE, SolverSource
+from planner.task_problems import TaskProblems
+from planner.tour import possible_next, tour_length
+
+SEARCH = ExactSolver(table_bytes=0, passes=((100, 3_000), (1_000, 30_000)))
+
+
+@pytest.fixture(scope="module")
+def geodesics():
+    return two_rooms()
+
+
+def live(geodesics, solver, **options):
+    return contextlib.closing(planner_of(geodesics, solver, Mode.LIVE, **options))
+
+
+class Script:
+    """A solver that hands out prepared orders of visits, the later ones only when told to."""
+
+    name = "script"
+
+    def __init__(self, *orders, bound=0.0, fail=None):
+        self.orders, self.bound, self.fail = orders, bound, fail
+        self.go = threading.Event()
+
+    def improve(self, problem, *, seed=0, limit=None):  # noqa: ARG002 - the interface of solvers
+        for k, order in enumerate(self.orders):
+            if k:
+                self.go.wait(10)
+            visits = order(problem)
+            cost = tour_length(problem, visits)
+            optimal = cost <= self.bound
+            status = Status.OPTIMAL if optimal else Status.FEASIBLE
+            yield Plan(tuple(visits), cost, cost if optimal else self.bound, status, 0.0)
+        if self.fail is not None:
+            raise self.fail
+
+
+def one_after_another(*shipments):
+    return lambda problem: [visit for k in shipments for visit in (problem.pick(k), problem.place(k))]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_from_any_state_the_shown_route_ends_up_optimal(geodesics, seed):
+    task = Task(geodesics, 9, seed)
+    planner = SEARCH if seed % 2 else solver("exact")
+    with live(geodesics, planner) as guide:
+        guide.prepare(task.state)
+        for _ in range(12):
+            task.misfortune()
+            before = guide.replans
+            asked(guide, task.state)
+            guide.wait()
+            guide.improve(task.state)
+            assert remaining(guide.route.visits, task.state) == guide.route.visits
+            if guide.replans > before:  # else it follows the plan, though from another place
+                exact = solver("exact").solve(TaskProblems(geodesics).problem(task.state))
+                assert guide.route.plan.cost == pytest.approx(exact.cost, abs=TIE + 1e-3)
+                check(TaskProblems(geodesics).problem(task.state), guide.route.plan)
+            if guide.route.next is not None:
+                task.do(*guide.route.next)
+        assert guide.replans >= 4
+
+
+def test_a_prepared_route_is_followed_to_its_end_without_a_change_of_mind(geodesics):
+    task = Task(geodesics, 8, 3)
+    with live(geodesics, SEARCH) as guide:
+        guide.prepare(task.state)
+        planned = asked(guide, task.state)
+        assert planned.plan.status is Status.OPTIMAL
+        expected, walked = planned.visits, 0.0
+        for stop in expected:
+            assert guide.route.next == stop
+            walked += geodesics.shortest_path(task.position, task.place(stop)).geodesic_distance
+            task.do(*stop)
+            asked(guide, task.state)
+            guide.wait()
+            assert guide.improve(task.state) is None
+        assert guide.replans == 0
+        assert walked == pytest.approx(planned.plan.cost, abs=1e-6)
+
+
+@pytest.fixture
+def mirrored():
+    bin_ = (2.0, 6.0)
+    return TaskState((2.0, 2.0), {"left": (1.0, 2.0), "right": (3.0, 2.0)}, (), {"left": bin_, "right": bin_})
+
+
+def test_of_two_equal_tours_the_shown_one_stays_and_takes_over_the_proof(geodesics, mirrored):
+    script = Script(one_after_another(0, 1), one_after_another(1, 0))
+    script.bound = -1.0
+    with live(geodesics, script) as guide:
+        shown = asked(guide, mirrored)
+        assert shown.plan.status is Status.FEASIBLE
+        script.bound = shown.plan.cost + 1e-3
+        script.go.set()
+        guide.wait()
+        better = guide.improve(mirrored)
+        assert better.visits == shown.visits
+        assert better.plan.status is Status.OPTIMAL
+        assert better.plan.visits == shown.plan.visits
+        assert guide.improve(mirrored) is None
+
+
+def test_a_shorter_tour_is_shown_unless_it_is_too_late(geodesics):
+    state = TaskState(
+        (1.0, 1.0), {"near": (1.0, 2.0), "far": (1.0, 5.0)}, (), {"near": (1.0, 2.2), "far": (1.0, 5.2)}
+    )
+    for position, switches in (((1.0, 1.0), True), ((1.0, 5.5), False)):
+        script = Script(one_after_another(1, 0), one_after_another(0, 1))
+        with live(geodesics, script) as guide:
+            shown = asked(guide, state)
+            assert guide.improve(state) is None
+            script.go.set()
+            guide.wait()
+            now = TaskState(position, state.loose, (), state.deliveries)
+            better = guide.improve(now)
+            if switches:
+                assert better.plan.cost < shown.plan.cost - TIE
+                assert better.next.object == "near"
+            assert guide.route.next.object == ("near" if switches else "far")
+
+
+def test_a_proof_that_begins_otherwise_than_what_was_done_is_asked_for_anew(geodesics, mirrored):
+    script = Script(one_after_another(0, 1), one_after_another(1, 0))
+    with live(geodesics, script) as guide:
+        asked(guide, mirrored)
+        left = TaskState((1.0, 2.0), {"right": (3.0, 2.0)}, ("left",), mirrored.deliveries)
+        asked(guide, left)
+        assert guide.replans == 0
+        script.orders = (lambda problem: nearest_first(problem),)
+        script.go.set()
+        guide.wait()
+        assert guide.improve(left) is None  # it said: first the right one
+        guide.wait()
+        guide.improve(left)
+        assert len(guide.route.visits) == 3
+        check(TaskProblems(geodesics).problem(left), guide.route.plan)
+
+
+def test_what_a_proof_dies_of_is_told(geodesics, mirrored):
+    script = Script(one_after_another(0, 1), fail=ProblemError("no such thing"))
+    with live(geodesics, script) as guide:
+        asked(guide, mirrored)
+        guide.wait()
+        with pytest.raises(ProblemError, match="no such thing"):
+            guide.improve(mirrored)
+
+
+def test_objects_out_of_reach_are_listed_by_name_and_the_guide_goes_on(geodesics):
+    task = Task(geodesics, 4, 0)
+    with live(geodesics, solver("exact")) as guide:
+        guide.prepare(task.state)
+        home, bin_ = task.loose["object_01"], task.deliveries["object_02"]
+        task.loose["object_01"] = (20.0, 20.0)
+        task.deliveries["object_02"] = (1.0, -5.0)
+        with pytest.raises(UnreachableError) as caught:
+            asked(guide, task.state)
+        assert set(caught.value.names) == {"object_01", "object_02"}
+        task.loose["object_01"], task.deliveries["object_02"] = home, bin_
+        assert len(asked(guide, task.state).visits) == 8
+
+
+@pytest.mark.parametrize("name", ["ortools", "greedy"])
+def test_other_solvers_can_guide_live_too(geodesics, name):
+    task = Task(geodesics, 4, 1)
+    with live(geodesics, solver(name), limit=SolveLimit(work=20)) as guide:
+        guide.prepare(task.state, seconds=30)
+        check(TaskProblems(geodesics).problem(task.state), guide.route.plan)
+
+
+def test_what_is_known_of_some_objects_serves_a_problem_with_others(geodesics):
+    task = Task(geodesics, 16, 1)
+    problems = TaskProblems(geodesics)
+    problem = problems.problem(task.state)
+    plan = SEARCH.solve(problem)
+    warm = NOTHING_KNOWN.updated(problem, plan)
+    first = next(SEARCH.improve(problem, warm=warm))
+    check(problem, first)
+    assert first.cost == pytest.approx(plan.cost)
+    del task.loose["object_00"]
+    task.loose["new"], task.deliveries["new"] = task.anywhere(), task.deliveries["object_00"]
+    other = problems.problem(task.state)
+    *_, found = SEARCH.improve(other, warm=warm)
+    check(other, found)
+    assert found.cost == pytest.approx(solver("exact").solve(other).cost, abs=1e-3)
+
+
+class Stuck:
+    """A solver that hands out a first plan and then gets stuck, and notes who waits for it."""
+
+    name = "stuck"
+
+    def __init__(self):
+        self.free = threading.Event()
+        self.waiting = []
+
+    def solve(self, *_, **__):
+        raise AssertionError("nobody may ask for a finished plan")
+
+    def improve(self, problem, *, seed=0, limit=None):  # noqa: ARG002 - the interface of solvers
+        held = [problem.place(k) for k in range(len(problem.shipments), len(problem.names))]
+        visits = held + one_after_another(*range(len(problem.shipments)))(problem)
+        cost = tour_length(problem, visits)
+        yield Plan(tuple(visits), cost, 0.0, Status.FEASIBLE, 0.0)
+        self.waiting.append(threading.get_ident())
+        assert self.free.wait(60)
+
+
+def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
+    log, planner = EventLog(), Stuck()
+    config = TrialConfig(objects=6, assistance="highlight", seed=3, live=True, regret=False)
+    scene = compose(house.sample_episode(objects=6, seed=3), house.catalogue)
+    planner.free.set()  # the familiarisation may wait
+    monkeypatch.setattr(setup, "solver", lambda _: planner)
+    with contextlib.closing(prepared_planner(config, house, scene.episode)) as guide:
+        session, _ = prepare_session(config, house, scene, log, planner=guide)
+        planner.free.clear()
+        assert session.run() == "all delivered"
+        assert guide.replans >= 2
+        planner.free.set()
+        guide.wait()
+        assert len(planner.waiting) == guide.replans + 1  # the first one for the familiarisation
+        assert threading.get_ident() not in planner.waiting
+    plans = [event for event in log.events if event["event"] == "plan"]
+    assert len(plans) == guide.replans + 1
+    assert plans[0]["t"] == 0.0
+
+
+def test_the_command_line_runs_live_and_its_replay_shows_the_logged_plans(tmp_path, monkeypatch):
+    """Not even a planner that would plan otherwise changes what a replay shows."""
+    run = str(tmp_path / "run")
+    options = ["--objects", "16", "--seed", "4", "--user", "boltzmann:20", "--time-limit", "14", "--no-video"]
+    assert main(["run", "--live", *options, "--assistance", "optimal-regret", "--out", run]) == 0
+    metrics = json.loads((tmp_path / "run" / records.METRICS).read_text())
+    assert metrics["live"] is True
+    assert metrics["unjudged_visits"] == 0
+    plans = json.loads((tmp_path / "run" / records.PLAN).read_text())
+    assert metrics["replans"] == sum(not plan.get("improved", False) for plan in plans) - 1 >= 1
+    assert all(plan["lower_bound_m"] <= plan["cost_m"] + 1e-9 for plan in plans)
+    asked = []
+    monkeypatch.setattr(ExactSolver, "solve", lambda *_, **__: asked.append("solve"))
+    monkeypatch.setattr(ExactSolver, "improve", lambda *_, **__: asked.append("improve"))
+    assert main(["replay", run]) == 0
+    assert asked == []
+
+
+def test_a_better_plan_that_was_logged_is_handed_out_when_it_was_shown(geodesics, mirrored):
+    def logged(t, order, **more):
+        visits = [[kind, name] for name in order for kind in ("pick", "place")]
+        numbers = {"cost_m": 9.0, "lower_bound_m": 8.0, "status": "feasible"}
+        return {"t": t, "event": "plan", "visits": visits, **numbers, **more}
+
+    first, second = ("left", "right"), ("right", "left")
+    plans = LogSource([logged(0.0, first), logged(1.0, second, improved=True)])
+    guide = Planner(plans, RegretEvaluator(geodesics))
+    assert asked(guide, mirrored).next.object == "left"
+    plans.clock = lambda: 0.5
+    assert not guide.pending
+    assert guide.improve(mirrored) is None
+    plans.clock = lambda: 1.0
+    assert guide.pending
+    assert guide.improve(mirrored).next.object == "right"
+    assert not guide.pending
+    assert guide.replans == 0
+
+
+def test_a_logged_route_is_followed_live_from_where_the_log_ends(geodesics):
+    task = Task(geodesics, 6, 2)
+    with live(geodesics, solver("exact")) as guide:
+        shown = asked(guide, task.state)
+        source = SolverSource(geodesics, solver("exact"))
+        source.adopt(task.state)
+        guide.use(source)
+        assert asked(guide, task.state).visits == shown.visits
+        task.do(*next(v for v in possible_next(source.problems.problem(task.state)) if v != shown.next))
+        assert asked(guide, task.state).visits != shown.visits
+        assert guide.replans == 1
+
+
+@pytest.fixture
+def slow(monkeypatch):
+    """An evaluator that answers only when told to."""
+    go, states = threading.Event(), []
+
+    class Slow(RegretEvaluator):
+        def limited(self, limit):
+            return Slow(self._geodesics, limit=limit)
+
+        def all(self, state, plan=None):
+            states.append(state)
+            go.wait(10)
+            return super().all(state, plan)
+
+    monkeypatch.setattr(planning_cases, "RegretEvaluator", Slow)
+    return go, states
+
+
+def test_the_caller_never_waits_for_regrets_and_they_are_those_of_a_run_that_repeats(geodesics, slow):
+    go, states = slow
+    state = Task(geodesics, 8, 1).state
+    with live(geodesics, solver("exact")) as guide:
+        guide.ask(state)
+        for _ in range(50):
+            assert guide.regrets() == {}
+            guide.ask(state)
+        go.set()
+        guide.wait()
+        assert len(states) == 1  # asked often, found once
+        assert guide.regrets() == RegretEvaluator(geodesics).all(state) != {}
+
+
+def test_regrets_of_a_state_that_is_past_are_not_shown(geodesics, slow):
+    go, _ = slow
+    task = Task(geodesics, 6, 2)
+    with live(geodesics, solver("exact")) as guide:
+        guide.ask(task.state)
+        guide.regrets()
+        task.do(VisitKind.PICK, "object_03")
+        guide.ask(task.state)
+        go.set()
+        guide.regrets()
+        guide.wait()
+        assert (VisitKind.PLACE, "object_03") in guide.regrets()
+        assert (VisitKind.PICK, "object_03") not in guide.regrets()
+
+
+def test_visits_are_judged_after_the_task(geodesics):
+    task, expected = Task(geodesics, 7, 3), {}
+    inline = planner_of(geodesics, solver("exact"))
+    with live(geodesics, solver("exact")) as guide:
+        for number in range(4):
+            stop = list(RegretEvaluator(geodesics).all(task.state))[-1]
+            for planner in (guide, inline):
+                planner.ask(task.state)
+            expected[number] = inline.judge(stop, number)
+            assert guide.judge(stop, number) is None
+            task.do(*stop)
+        assert dict(guide.finish()) == pytest.approx(expected, abs=1e-9)
+        assert guide.finish() == inline.finish() == []

@@ -1,0 +1,151 @@
+"""Regrets from one table or one pass against a plain recursion and against solving the rest after each visit."""
+
+import dataclasses
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from planning_cases import optimum, random_problem
+
+from planner.errors import ProblemError
+from planner.exact.solver import ExactSolver
+from planner.geodesics import Geodesics
+from planner.navmesh import NavMesh
+from planner.plan import Visit, VisitKind
+from planner.regret import after, one_by_one, regrets
+from planner.route import TaskState
+from planner.solver import SolveLimit, solver
+from planner.task_problems import TaskProblems
+from planner.tour import possible_next
+
+seeds = st.integers(0, 2**32 - 1)
+TABLE, PASS = ExactSolver(), ExactSolver(table_bytes=0)
+
+
+def expected(problem):
+    """Cost of the task by next visit."""
+    return {
+        visit: problem.distances[problem.start, problem.location(visit)] + optimum(after(problem, visit))
+        for visit in possible_next(problem)
+    }
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=seeds, n=st.integers(0, 5), onboard=st.integers(0, 2), coincide=st.booleans(), table=st.booleans()
+)
+def test_regrets_are_those_of_trying_everything(seed, n, onboard, coincide, table):
+    problem = random_problem(seed, n, onboard, coincide=coincide)
+    found = regrets(problem, TABLE if table else PASS, radius=100.0)
+    costs = expected(problem)
+    assert {r.visit for r in found} == set(costs)
+    for r in found:
+        assert r.proven
+        assert not r.capped
+        assert r.cost == pytest.approx(costs[r.visit], abs=5e-3)
+        assert r.regret == pytest.approx(costs[r.visit] - min(costs.values()), abs=5e-3)
+    assert [r.regret for r in found] == sorted(r.regret for r in found)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=seeds, n=st.integers(3, 11), onboard=st.integers(0, 2), radius=st.floats(0, 4))
+def test_within_the_radius_regrets_are_exact_and_beyond_it_true_lower_bounds(seed, n, onboard, radius):
+    problem = random_problem(seed, n, onboard)
+    exact = {r.visit: r for r in regrets(problem, TABLE)}
+    found = regrets(problem, PASS, radius=radius)
+    assert len(found) == len(exact)
+    for r in found:
+        truth = exact[r.visit].regret
+        if r.capped:
+            assert truth > radius - 1e-3
+            assert radius - 1e-3 <= r.regret <= truth + 1e-3
+        else:
+            assert r.regret == pytest.approx(truth, abs=1e-9)
+            assert r.regret <= radius + 1e-9
+
+
+@pytest.mark.parametrize("onboard", [0, 1, 2])
+def test_one_table_says_what_solving_after_each_visit_says(onboard):
+    problem = random_problem(3, 11, onboard, bins=6)
+    generic = {r.visit: r.cost for r in one_by_one(problem, TABLE)}
+    for r in regrets(problem, TABLE):
+        assert r.cost == pytest.approx(generic[r.visit], abs=5e-3)
+
+
+def test_beyond_the_table_the_nearest_alternatives_are_exact():
+    problem = random_problem(8, 20, bins=6)
+    found = regrets(problem, TABLE, radius=0.5)
+    assert found[0].regret == 0
+    assert any(r.capped for r in found)
+    for r in found[:3]:
+        rest = TABLE.solve(after(problem, r.visit))
+        truth = problem.distances[0, problem.location(r.visit)] + rest.cost
+        if r.capped:
+            assert truth >= r.cost - 5e-3
+        else:
+            assert truth == pytest.approx(r.cost, abs=5e-3)
+
+
+@pytest.mark.parametrize("capacity", [1, 3])
+def test_other_capacities_are_solved_visit_by_visit(capacity):
+    problem = random_problem(4, 4, 1, capacity=capacity)
+    costs = expected(problem)
+    found = regrets(problem, TABLE)
+    assert {r.visit for r in found} == set(costs)
+    for r in found:
+        assert r.cost == pytest.approx(costs[r.visit], abs=5e-3)
+
+
+def test_other_solvers_cannot_prove_their_regrets():
+    problem = random_problem(4, 6)
+    costs = expected(problem)
+    for r in regrets(problem, solver("greedy")):
+        assert not r.proven
+        assert r.cost >= costs[r.visit] - 1e-6
+
+
+def test_a_regret_is_not_proven_where_the_best_visit_is_not():
+    problem = random_problem(4, 16)
+    hurried = dataclasses.replace(PASS, passes=((2, 3_000),))
+    found = regrets(problem, hurried, limit=SolveLimit(work=10))
+    if not all(r.proven for r in found):
+        assert not any(r.proven for r in found)
+
+
+def test_equal_visits_have_equal_regrets():
+    one = random_problem(2, 5)
+    twin = dataclasses.replace(one, shipments=(*one.shipments, one.shipments[2]), names=())
+    by_shipment = {twin.number[r.visit.object]: r.regret for r in regrets(twin, TABLE)}
+    assert by_shipment[2] == by_shipment[5]
+
+
+def test_a_negative_radius_and_an_impossible_visit_are_refused():
+    problem = random_problem(1, 2, 2)
+    with pytest.raises(ProblemError, match="radius"):
+        regrets(problem, TABLE, radius=-1.0)
+    with pytest.raises(ProblemError, match="not possible now"):
+        after(problem, problem.pick(0))
+
+
+def test_regrets_of_a_live_task_go_by_name():
+    geodesics = Geodesics(NavMesh.build([np.array([(3, 3), (4, 3), (4, 4), (3, 4)])], (0, 0, 8, 8)))
+    loose = {"near": (1.0, 2.0), "far": (7.0, 7.0)}
+    state = TaskState((1.0, 1.0), loose, ("held",), dict.fromkeys((*loose, "held"), (1.0, 3.0)))
+    found = {r.visit: r for r in regrets(TaskProblems(geodesics).problem(state), TABLE)}
+    assert set(found) == {(VisitKind.PICK, "near"), (VisitKind.PICK, "far"), (VisitKind.PLACE, "held")}
+    assert next(iter(found)) == (VisitKind.PICK, "near")  # it lies on the way of what is held
+    assert found[Visit(VisitKind.PICK, "near")].regret == 0
+    # Place first: back for the near one, then from there to the far one instead of from the bin.
+    detour = 1 + geodesics.shortest_path(loose["near"], loose["far"]).geodesic_distance
+    direct = geodesics.shortest_path((1.0, 3.0), loose["far"]).geodesic_distance
+    assert found[Visit(VisitKind.PLACE, "held")].regret == pytest.approx(detour - direct, abs=5e-3)
+
+
+def test_regrets_can_be_given_up():
+    stop = threading.Event()
+    stop.set()
+    found = regrets(random_problem(1, 12), PASS, limit=SolveLimit(stop=stop))
+    assert len(found) == 12

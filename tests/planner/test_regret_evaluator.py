@@ -1,0 +1,102 @@
+"""Judging the visits of a task: against fresh regrets, against the length of what was done, and beyond the table."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from planning_cases import Task, optimum, two_rooms
+
+from planner.exact.solver import ExactSolver
+from planner.plan import Visit, VisitKind
+from planner.regret import RegretEvaluator, regrets
+from planner.solver import SolveLimit, solver
+from planner.task_problems import TaskProblems
+
+SEARCH = ExactSolver(table_bytes=0)
+
+
+@pytest.fixture(scope="module")
+def geodesics():
+    return two_rooms()
+
+
+def possible(task):
+    picks = [Visit(VisitKind.PICK, name) for name in task.loose] if len(task.carried) < 2 else []
+    return picks + [Visit(VisitKind.PLACE, name) for name in task.carried]
+
+
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_table_that_was_kept_says_what_a_fresh_one_would(geodesics, seed):
+    task, rng = Task(geodesics, 7, seed), np.random.default_rng(seed)
+    evaluator, fresh = RegretEvaluator(geodesics), TaskProblems(geodesics)
+    while possible(task):
+        state = task.state
+        found = evaluator.all(state)
+        expected = {r.visit: r.regret for r in regrets(fresh.problem(state), solver("exact"))}
+        assert {stop: r.regret for stop, r in found.items()} == pytest.approx(expected, abs=3e-3)
+        assert all(evaluator.of(state, stop) == found[stop].regret for stop in found)
+        if rng.random() < 0.15:
+            task.misfortune()
+        else:
+            task.do(*possible(task)[int(rng.integers(len(possible(task))))])
+
+
+@pytest.mark.slow
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), planner=st.sampled_from([None, SEARCH]))
+def test_regrets_add_up_to_the_detour_of_the_whole_task(geodesics, seed, planner):
+    """Whatever order things are done in: its length is the optimum's and all regrets together."""
+    task, rng = Task(geodesics, 6, seed), np.random.default_rng(seed)
+    evaluator = RegretEvaluator(geodesics, solver=planner)
+    shortest = optimum(TaskProblems(geodesics).problem(task.state))
+    walked = regretted = 0.0
+    while possible(task):
+        state, here = task.state, task.position
+        stop = possible(task)[int(rng.integers(len(possible(task))))]
+        regretted += evaluator.of(state, stop)
+        task.do(*stop)
+        walked += geodesics.shortest_path(here, task.position).geodesic_distance
+    assert walked == pytest.approx(shortest + regretted, abs=0.02)
+    assert regretted >= 0
+
+
+def test_a_regret_far_beyond_the_radius_is_exact_all_the_same(geodesics):
+    task = Task(geodesics, 12, 2)
+    table, search = RegretEvaluator(geodesics), RegretEvaluator(geodesics, solver=SEARCH, radius=0.2)
+    capped = {stop for stop, regret in search.all(task.state).items() if regret.capped}
+    assert capped
+    for stop, regret in table.all(task.state).items():
+        assert search.of(task.state, stop) == pytest.approx(regret.regret, abs=3e-3)
+        if stop in capped:
+            assert search.all(task.state)[stop].regret <= regret.regret + 3e-3
+
+
+def test_a_plan_that_is_known_to_be_best_need_not_be_found_again(geodesics):
+    class Counting(ExactSolver):
+        solved = 0
+
+        def solve(self, *args, **options):
+            type(self).solved += 1
+            return super().solve(*args, **options)
+
+    task = Task(geodesics, 12, 3)
+    plan = SEARCH.solve(TaskProblems(geodesics).problem(task.state))
+    evaluator, stop = RegretEvaluator(geodesics, solver=Counting(table_bytes=0)), possible(task)[4]
+    known = evaluator.of(task.state, stop, plan)
+    assert Counting.solved == 0
+    assert known == pytest.approx(RegretEvaluator(geodesics).of(task.state, stop), abs=3e-3)
+    evaluator.all(task.state, plan)
+    assert Counting.solved == 0
+
+
+def test_what_is_impossible_or_not_proven_has_no_regret(geodesics):
+    task = Task(geodesics, 14, 1)
+    evaluator = RegretEvaluator(geodesics, solver=SEARCH, limit=SolveLimit(work=1))
+    assert evaluator.of(task.state, Visit(VisitKind.PLACE, "object_00")) is None
+    hard = [evaluator.of(task.state, stop) for stop in possible(task)]
+    assert None in hard
+
+
+def test_nothing_left_is_nothing_to_judge(geodesics):
+    assert RegretEvaluator(geodesics).all(Task(geodesics, 0).state) == {}

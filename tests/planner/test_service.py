@@ -1,0 +1,182 @@
+"""The plan is kept while it is followed and made anew after a deviation; in a thread the answers are the same."""
+
+import contextlib
+import itertools
+
+import pytest
+from planning_cases import BINS, Task, asked, planner_of, two_rooms
+
+from planner.errors import PlannerError, ProblemError, UnreachableError
+from planner.exact.solver import ExactSolver
+from planner.plan import VisitKind
+from planner.route import TaskState
+from planner.service import Mode
+from planner.solver import SolveLimit, solver
+from planner.task_problems import TaskProblems
+
+
+@pytest.fixture(scope="module")
+def geodesics():
+    return two_rooms()
+
+
+def guided(geodesics, **options):
+    return planner_of(geodesics, solver("ortools"), limit=SolveLimit(work=30), **options)
+
+
+def length(geodesics, task, visits):
+    """Length of a tour, leg by leg."""
+    stops = [task.position, *map(task.place, visits)]
+    return sum(geodesics.shortest_path(a, b).geodesic_distance for a, b in itertools.pairwise(stops))
+
+
+def test_a_followed_plan_is_walked_to_its_end_without_replanning(geodesics):
+    task, guide = Task(geodesics, 5), guided(geodesics)
+    route = asked(guide, task.state)
+    planned, walked = route, 0.0
+    for expected in planned.visits:
+        assert route.next == expected
+        walked += geodesics.shortest_path(task.position, task.place(expected)).geodesic_distance
+        task.do(*expected)
+        route = asked(guide, task.state)
+        left = TaskProblems(geodesics).length(task.state, route.visits)
+        assert left == pytest.approx(planned.plan.cost - walked, abs=1e-6)
+    assert route.next is None
+    assert guide.replans == 0
+    assert not guide.pending and guide.improve(task.state) is None
+    assert walked == pytest.approx(planned.plan.cost, abs=1e-6)
+
+
+def test_two_visits_between_updates_are_still_the_plan(geodesics):
+    task, guide = Task(geodesics, 4), guided(geodesics)
+    planned = asked(guide, task.state).visits
+    for visit in planned[:2]:
+        task.do(*visit)
+    assert asked(guide, task.state).visits == planned[2:]
+    assert guide.replans == 0
+
+
+def test_a_deviation_is_replanned_and_counted(geodesics):
+    task, guide = Task(geodesics, 5), guided(geodesics)
+    route = asked(guide, task.state)
+    other = next(name for name in task.loose if name != route.next.object)
+    task.do(VisitKind.PICK, other)
+    route = asked(guide, task.state)
+    assert guide.replans == 1
+    # The new plan is the best from the new state, as planning afresh finds it.
+    assert route.plan.cost == asked(guided(geodesics), task.state).plan.cost
+    assert (VisitKind.PICK, other) not in route.visits
+    assert (VisitKind.PLACE, other) in route.visits
+    assert len(set(route.visits)) == 9
+
+
+def test_a_nudge_moves_the_stop_and_a_long_push_replans(geodesics):
+    task, guide = Task(geodesics, 3), guided(geodesics)
+    order = asked(guide, task.state).visits
+    name = next(iter(task.loose))
+    x, y = task.loose[name]
+    task.loose[name] = (x + 0.1, y)
+    route = asked(guide, task.state)
+    assert route.visits == order
+    assert guide.replans == 0
+    planned = TaskProblems(geodesics).length(task.state, order)
+    assert planned == pytest.approx(length(geodesics, task, order), abs=1e-6)
+    task.loose[name] = (x + 0.5, y)
+    asked(guide, task.state)
+    assert guide.replans == 1
+
+
+def test_the_cost_is_the_length_of_the_geodesics_between_the_stops(geodesics):
+    task, guide = Task(geodesics, 4), guided(geodesics)
+    asked(guide, task.state)
+    # A state seen before, objects moved and back: reused distances must be those of the right places.
+    moved = dict(list(task.state.loose.items())[::-1])
+    moved["object_01"] = (3.3, 3.3)
+    for loose in (moved, task.state.loose):
+        route = asked(guide, TaskState((3.0, 4.5), loose, (), task.deliveries))
+        task.position, task.loose = (3.0, 4.5), loose
+        assert route.plan.cost == pytest.approx(length(geodesics, task, route.visits), abs=1e-9)
+
+
+def test_a_person_squeezed_against_a_wall_is_still_guided(geodesics):
+    guide = guided(geodesics)
+    route = asked(guide, TaskState((3.8, 1.0), {"mug": (1.0, 1.0)}, (), {"mug": BINS[0]}))
+    assert route.next is not None
+    assert route.next == (VisitKind.PICK, "mug")
+    to_bin = geodesics.shortest_path((1.0, 1.0), BINS[0]).geodesic_distance
+    assert route.plan.cost - to_bin == pytest.approx(2.65, abs=1e-3)
+
+
+def test_contradictory_states_are_refused():
+    for loose, carried, deliveries in (
+        ({"mug": (1, 1)}, ("mug",), {"mug": (2, 2)}),
+        ({}, ("mug", "mug"), {"mug": (2, 2)}),
+        ({"mug": (1, 1)}, (), {}),
+    ):
+        with pytest.raises(ProblemError, match="mug"):
+            TaskState((0, 0), loose, carried, deliveries)
+
+
+def test_there_is_no_route_before_the_first_question(geodesics):
+    guide = guided(geodesics)
+    assert guide.route is None and guide.next is None
+    assert guide.regrets() == {} and guide.regret((VisitKind.PICK, "mug")) is None
+    assert guide.improve(Task(geodesics, 3).state) is None
+
+
+def answers(guide, geodesics, seed, *, shown):
+    """Everything that a planner answers in a task with deviations."""
+    task, found = Task(geodesics, 7, seed), []
+    guide.prepare(task.state)
+    for step in range(8):
+        guide.ask(task.state, shown=shown, then=lambda route, new: found.append((route.visits, new)))
+        guide.do(lambda route: found.append(route.plan.cost))
+        other = sorted(task.loose)[-1] if task.loose and len(task.carried) < 2 else None
+        visit = (VisitKind.PICK, other) if step % 3 == 1 and other else guide.next
+        guide.do(lambda _, visit=visit, step=step: found.append(guide.judge(visit, step)))
+        found.append([regret.regret for regret in guide.regrets().values()])
+        task.do(*visit)
+    guide.settle()
+    return found, guide.replans, guide.finish()
+
+
+@pytest.mark.parametrize("shown", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_thread_gives_the_answers_that_are_given_inline(geodesics, seed, shown):
+    one, other = (planner_of(geodesics, solver("exact"), mode) for mode in (Mode.INLINE, Mode.THREAD))
+    with contextlib.closing(other):
+        assert answers(one, geodesics, seed, shown=shown) == answers(other, geodesics, seed, shown=shown)
+    assert one.replans > 0
+
+
+def test_a_plan_for_another_start_is_not_followed(geodesics):
+    task = Task(geodesics, 5, 1)
+    with contextlib.closing(planner_of(geodesics, solver("exact"), Mode.THREAD)) as guide:
+        guide.prepare(task.state)
+        task.position = task.anywhere()
+        found = asked(guide, task.state)
+    assert found.plan.cost == asked(planner_of(geodesics, solver("exact")), task.state).plan.cost
+    assert guide.replans == 0
+
+
+def test_a_task_that_cannot_be_done_is_reported_at_once(geodesics):
+    task = Task(geodesics, 3)
+    task.loose["object_01"] = (20.0, 20.0)
+    with (
+        contextlib.closing(planner_of(geodesics, solver("exact"), Mode.THREAD)) as guide,
+        pytest.raises(UnreachableError, match="object_01"),
+    ):
+        guide.ask(task.state, then=lambda *_: pytest.fail("there is no answer"))
+
+
+def test_a_planner_that_fails_in_a_thread_fails_the_next_caller_that_needs_it(geodesics):
+    class Lost(ExactSolver):
+        def solve(self, *_, **__):
+            raise PlannerError("out of ideas")
+
+    with contextlib.closing(planner_of(geodesics, Lost(), Mode.THREAD)) as guide:
+        guide.ask(Task(geodesics, 3).state)
+        guide.wait()
+        for needs in (lambda: guide.next, guide.regrets, guide.finish, lambda: guide.do(pytest.fail)):
+            with pytest.raises(PlannerError, match="out of ideas"):
+                needs()

@@ -1,0 +1,53 @@
+"""Plans for the successive states of a task: started from earlier ones, and as short as plans from nothing."""
+
+import pytest
+from planning_cases import Task, two_rooms
+
+from planner.checker import check
+from planner.exact.solver import ExactSolver
+from planner.plan import Status
+from planner.solver_source import SolverSource
+from planner.task_problems import TaskProblems
+
+TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
+
+
+@pytest.fixture(scope="module")
+def geodesics():
+    return two_rooms()
+
+
+@pytest.mark.parametrize("solver", [TABLE, SEARCH], ids=["table", "search"])
+@pytest.mark.parametrize("seed", range(4))
+def test_plans_stay_optimal_through_deviations_and_mishaps(geodesics, solver, seed):
+    task, problems = Task(geodesics, 10, seed), TaskProblems(geodesics)
+    planner, again = SolverSource(geodesics, solver), SolverSource(geodesics, solver)
+    for step in range(14):
+        problem = problems.problem(task.state)
+        plan = planner.plan(task.state, None, shown=False).plan
+        check(problem, plan)
+        assert plan.status is Status.OPTIMAL
+        assert plan.cost == pytest.approx(
+            TABLE.solve(problem).cost, abs=2e-3
+        )  # distances are rounded to 0.1 mm
+        assert (
+            again.plan(task.state, None, shown=False).visits == plan.visits
+        )  # the same sequence gives the same plans
+        if step % 3 == 2 or not plan.visits:
+            task.misfortune()
+        else:
+            task.do(*plan.visits[0])
+
+
+def test_a_table_is_filled_once_while_nothing_is_moved(geodesics, monkeypatch):
+    filled = []
+    monkeypatch.setattr(ExactSolver, "table_fits", lambda *_: not filled.append(None))
+    task, planner = Task(geodesics, 8, 1), SolverSource(geodesics, TABLE)
+    while (plan := planner.plan(task.state, None, shown=False)).visits:
+        picks = [visit for visit in plan.visits if visit.object in task.loose and visit.kind == "pick"]
+        task.do(*(picks[-1] if picks and len(task.carried) < 2 else plan.visits[0]))
+        task.position = task.anywhere()
+    assert len(filled) == 1
+    task.loose["object_00"] = task.anywhere()  # it was delivered, and now lies elsewhere
+    assert planner.plan(task.state, None, shown=False).visits
+    assert len(filled) == 2

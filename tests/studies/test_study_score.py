@@ -1,0 +1,186 @@
+"""`mjsim study score`: published numbers, rows that agree and that do not, pools."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+from study_people import SIZES, made_up_people, table_of
+
+from experiments.cli.main import main
+from experiments.errors import StatisticsError
+from experiments.trials.table import write_tables
+from studies.published import read_published
+from studies.score import DIRECTION, EFFECT_SIZE, INFERENCE, VARIANCE, draw, inconsistencies, score
+from studies.score_population import population_eta_squared
+
+PUBLISHED = read_published()
+
+
+@pytest.fixture(scope="module")
+def people():
+    return table_of(made_up_people())
+
+
+@pytest.fixture(scope="module")
+def pool():
+    return table_of(made_up_people(dict.fromkeys(SIZES, 200), seed=5))
+
+
+def rows_of(found, *kinds):
+    return [r for r in found.rows if r.kind in kinds and r.ours != "not simulated"]
+
+
+def test_degrees_of_freedom_are_those_of_the_design():
+    for test in PUBLISHED.tests:
+        cells = 3 if test.objects else 12
+        assert test.df[1] == PUBLISHED.people_of(test.objects) - cells
+
+
+def test_inconsistent_numbers_are_flagged():
+    lines = inconsistencies(PUBLISHED)
+    assert len(lines) == 2
+    assert "F(2,116) = 41.48" in lines[0]
+    assert lines[1].endswith("printed p =.001, but F(6,435) = 2.865 gives p = .0095")
+
+
+def test_what_is_not_significant_bounds_the_effect():
+    test = next(t for t in PUBLISHED.tests if t.p == "n.s." and t.effect == "objects")
+    _, high = test.interval(447)
+    critical = stats.f.ppf(0.95, 3, 435)
+    assert high == pytest.approx(3 * critical / (3 * critical + 435), rel=1e-12)
+    assert round(high, 3) == 0.018
+
+
+def test_a_study_is_judged_by_its_own_tests(people):
+    found = score(people, PUBLISHED)
+    assert not found.pool
+    assert found.as_published
+    assert len(rows_of(found, EFFECT_SIZE, INFERENCE)) == 20
+    assert (len(rows_of(found, DIRECTION)), len(rows_of(found, VARIANCE))) == (12, 4)
+    six = next(r for r in found.rows if r.kind == INFERENCE and r.measure == "ipl" and r.objects == 6)
+    test = stats.f_oneway(*people.groups("ipl", 6).values())
+    assert six.ours.startswith(f"F(2,116) = {test.statistic:.2f}")
+    assert six.agrees == (test.pvalue < 0.05)
+    assert all(r.agrees for r in rows_of(found, VARIANCE))
+
+
+def test_fitted_and_held_out_rows_are_counted_apart(people):
+    counts = {(what, which): of for what, which, _, of in score(people, PUBLISHED).summary()}
+    assert counts == {
+        ("effect sizes and inferences", "fitted"): 8,
+        ("effect sizes and inferences", "held out"): 12,
+        ("directions", "fitted"): 7,
+        ("directions", "held out"): 5,
+        ("variance orders", "fitted"): 1,
+        ("variance orders", "held out"): 3,
+    }
+
+
+def test_answers_are_not_simulated(people):
+    rows = [r for r in score(people, PUBLISHED).rows if r.measure.startswith("likert_")]
+    assert len(rows) == 10
+    assert {(r.ours, r.agrees) for r in rows} == {("not simulated", None)}
+
+
+def test_conditions_that_are_swapped_fail(people):
+    """Whoever deviates most under optimal contradicts the directions and the variance orders."""
+    swap = {"none": "optimal", "optimal": "none", "highlight": "highlight"}
+    swapped = replace(people, assistance=np.array([swap[a] for a in people.assistance]))
+    found = score(swapped, PUBLISHED)
+    wrong = [r for r in rows_of(found, DIRECTION, VARIANCE) if not r.agrees]
+    assert {r.what for r in wrong} >= {"optimal < none", "optimal lowest", "optimal > highlight > none"}
+    assert not any(r.agrees for r in rows_of(found, VARIANCE))
+
+
+def test_people_who_are_all_alike_agree_with_nothing_but_what_is_not_there(people):
+    rng = np.random.default_rng(0)
+    columns = {name: rng.normal(size=447) for name in people.columns}
+    found = score(replace(people, columns=columns), PUBLISHED)
+    published = {(t.measure, t.effect, t.objects): t.significant for t in PUBLISHED.tests}
+    for row in rows_of(found, INFERENCE):
+        if published[row.measure, row.what, row.objects]:
+            assert not row.agrees
+
+
+def test_missing_cells_and_measures_say_so():
+    rows = [
+        r
+        for r in made_up_people()
+        if (r["objects"] != 6 and r["objects"] != 24) or r["assistance"] != "optimal"
+    ]
+    for row in rows:
+        del row["ipl_locations"]
+    found = {(r.kind, r.measure, r.what, r.objects): r for r in score(table_of(rows), PUBLISHED).rows}
+    assert found[INFERENCE, "ipl", "assistance", 6].remark == "ipl is not known"
+    assert "no people in the cell optimal" in found[INFERENCE, "deviations", "assistance", None].remark
+    assert found[DIRECTION, "deviations", "optimal < none", 6].agrees is None
+
+
+def test_part_of_the_design_judges_nothing_about_all_of_it():
+    """Deviations of these people rise from 6 to 12 objects; nothing is known of 18 and 24."""
+    rows = score(table_of([r for r in made_up_people() if r["objects"] <= 12]), PUBLISHED).rows
+    for row in rows:
+        if row.measure.startswith("likert_"):
+            continue
+        assert (row.agrees is None) == (row.objects not in (6, 12)), row
+        assert row.agrees is not None or row.remark == f"no people in the cell none, {row.objects or 18}"
+
+
+def test_people_of_no_published_cell_are_refused():
+    table = table_of(made_up_people({("none", 2): 3, ("optimal", 2): 3}))
+    with pytest.raises(StatisticsError, match=r"no people in the cells .*\[6, 12, 18, 24\] objects"):
+        score(table, PUBLISHED)
+
+
+def test_studies_are_drawn_from_the_same_cells(pool):
+    first, again = (list(draw(pool, PUBLISHED, seed=1, count=3)) for _ in range(2))
+    for study, same in zip(first, again, strict=True):
+        assert study.sizes() == SIZES
+        assert study.columns["ipl"].tolist() == same.columns["ipl"].tolist()
+    assert first[0].columns["ipl"].tolist() != first[1].columns["ipl"].tolist()
+    own = set(pool.groups("ipl", 18)["highlight"].tolist())
+    assert set(first[0].groups("ipl", 18)["highlight"].tolist()) <= own
+
+
+@pytest.mark.slow
+def test_effects_of_a_population_are_recovered():
+    """Means 0, 0, d at one number of objects: the noncentrality is known exactly; a large pool comes close to it."""
+    rng, shift = np.random.default_rng(2), 0.8
+    rows = made_up_people(dict.fromkeys(SIZES, 2000))
+    for row in rows:
+        row["ipl_locations"] = float(shift * (row["assistance"] == "optimal") + rng.normal())
+    test = next(t for t in PUBLISHED.tests if t.measure == "ipl" and t.objects == 6)
+    means = np.repeat([0.0, 0.0, shift], [40, 37, 42])
+    noncentrality = ((means - means.mean()) ** 2).sum()
+    found = population_eta_squared(table_of(rows), PUBLISHED, test)
+    assert found == pytest.approx(noncentrality / (noncentrality + 119), abs=0.01)
+
+
+@pytest.mark.slow
+def test_a_pool_is_judged_as_a_population(pool):
+    found = score(pool, PUBLISHED, seed=3)
+    assert found.pool
+    assert found == score(pool, PUBLISHED, seed=3)
+    rows = {
+        (r.kind, r.measure, r.what, r.objects): r for r in rows_of(found, INFERENCE, EFFECT_SIZE, DIRECTION)
+    }
+    null = rows[INFERENCE, "ipl", "objects", None]  # nothing depends on the number of objects
+    assert null.agrees
+    assert null.rate == pytest.approx(0.95, abs=0.06)
+    assert rows[INFERENCE, "deviations", "assistance", 6].rate == 1.0
+    assert all(0.0 <= r.rate <= 1.0 for r in rows.values())
+
+
+def test_the_score_command_writes_its_files(tmp_path, capsys):
+    write_tables(tmp_path, made_up_people())
+    assert main(["study", "score", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.startswith("Simulated. A study of 447 people")
+    found = json.loads((tmp_path / "analysis" / "score.json").read_text())
+    assert (found["origin"], len(found["rows"]), len(found["inconsistent"])) == ("Simulated", 46, 2)
+    page = (tmp_path / "analysis" / "score.html").read_text()
+    assert "http" not in page
+    assert page.count('<p class="origin">Simulated</p>') == 5
+    assert main(["study", "score", str(tmp_path)]) == 2
+    assert main(["study", "score", str(tmp_path), "--force", "--seed", "-1"]) == 2

@@ -1,0 +1,43 @@
+"""`mjsim gallery`: the pictures of the documentation."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.options import add_command, add_force, add_frame, film_config
+
+DESCRIPTION = """\
+Take a picture of each assistance condition from real trials, as OUT/<name>.png, draw the floor plan of a trial, as
+OUT/topdown.png, and make a contact sheet of the three conditions in four situations, as OUT/contact_sheet.png."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(commands, "gallery", run, description=DESCRIPTION)
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the pictures")
+    add_frame(parser, size=(960, 720), profile="quality")
+    add_force(parser)
+    parser.add_argument(
+        "--contact-sheet",
+        action="store_true",
+        help="make only the contact sheet, from frames of 640x480 in profile fast, as in a run",
+    )
+    parser.add_argument(
+        "--frames", action="store_true", help="also write the frames of the contact sheet, in full size"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Take the pictures."""
+    from experiments.cli.terminal import error_console
+    from tools.gallery import make_gallery
+
+    for path in make_gallery(
+        arguments.out,
+        film_config(arguments),
+        replace=arguments.force,
+        sheet_only=arguments.contact_sheet,
+        frames=arguments.frames,
+    ):
+        error_console().print(str(path), soft_wrap=True)
+    return 0
