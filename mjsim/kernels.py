@@ -1,23 +1,23 @@
 """Compilation of numeric kernels with numba, cached on disk where a folder is writable; for all four packages.
 
-It imports nothing of mjsim, and numba only once a kernel is declared.
+It imports numba only once a kernel is declared.
 """
 
 import functools
-import hashlib
 import os
 import re
 import shutil
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from platformdirs import user_cache_path
 
+from mjsim.sources import ROOT, digest_of
+
 F = TypeVar("F", bound=Callable[..., Any])
 
-ROOT = Path(__file__).parents[1]
 MARK = b"@kernel\n"
 UNUSED = 30 * 24 * 3600  # s after which machine code that no process has asked for is deleted
 
@@ -84,7 +84,7 @@ def cache_folder(source: Path) -> Path | None:
     """
     base = cache_base()
     try:
-        folder = base / f"mjsim-{source.stem}-{source_digest(_compiled_in(source) | {Path(__file__)})}"
+        folder = base / f"mjsim-{source.stem}-{digest_of(*sorted(_compiled_in(source) | {Path(__file__)}))}"
         if not folder.is_dir():
             _delete_unused(base)
             folder.mkdir(parents=True, exist_ok=True)
@@ -92,18 +92,6 @@ def cache_folder(source: Path) -> Path | None:
     except OSError:
         return None
     return folder
-
-
-def source_digest(paths: Iterable[Path]) -> str:
-    """16 hex digits over the names and contents of source files, in the order of their paths.
-
-    Raises:
-        OSError: One of them cannot be read.
-    """
-    digest = hashlib.sha256()
-    for path in sorted(paths):
-        digest.update(f"{path.name}\0".encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def _compiled_in(source: Path) -> set[Path]:

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from mjsim.errors import StateError
 from mjsim.health.monitor import HealthState
-from mjsim.kernels import source_digest
 from mjsim.observation import ObjectStatus
 from mjsim.person.carrying import CarryingState
 from mjsim.person.grips import GripState
 from mjsim.person.rig import RigState
+from mjsim.sources import digest_of
 
 CHECKPOINT_PERIOD = 10.0  # s at least from one checkpoint to the next
 
@@ -178,4 +178,4 @@ def _own_version() -> str:
 def _code_fingerprint() -> str:
     """16 hex digits over the source of this package, since a version may span many changes."""
     root = Path(__file__).parent
-    return source_digest(p for p in root.rglob("*.py") if p.relative_to(root).parts[0] not in _NO_PHYSICS)
+    return digest_of(*(place for place in sorted(root.iterdir()) if place.name not in _NO_PHYSICS))

@@ -1,6 +1,7 @@
 """Machine code of kernels on disk."""
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from experiments.trials.compile_notice import NOTICE
-from mjsim import kernels
+from mjsim import kernels, sources
 
 CALLEE = "from mjsim.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
 CALLER = (
@@ -24,7 +25,9 @@ def _project(root):
     for package in ("mjsim", "planner"):
         (root / package).mkdir()
         (root / package / "__init__.py").touch()
-    (root / "mjsim/kernels.py").write_bytes(Path(kernels.__file__).read_bytes())
+    for module in (kernels, sources):
+        path = Path(module.__file__)
+        shutil.copy(path, root / "mjsim" / path.name)
     (root / "planner/caller.py").write_text(CALLER, encoding="utf-8")
     _set(root, factor=1, offset=0)
 
