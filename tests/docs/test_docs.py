@@ -17,11 +17,14 @@ from example_house import write_example_house
 from experiments.cli.main import main
 from experiments.participants.distribution import Distributions
 from experiments.participants.guest import PARAMETERS
+from experiments.trials.person import PARAMETERS as PERSON
+from experiments.trials.person import check_person
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
 from hud.options import option_names
 from mjsim.model.catalogue import Catalogue
+from mjsim.person_parameters import RANGES
 from tools.data_dictionary import data_dictionary
 
 TESTS = Path(__file__).parents[1]
@@ -115,16 +118,28 @@ def test_the_participant_of_its_page_tidies_a_house_and_prefers_distant_objects(
     assert far["task_distance_m"] > near["task_distance_m"]
 
 
-def test_the_table_of_participants_lists_every_parameter_with_its_range():
-    for name, parameter in PARAMETERS.items():
-        (row,) = [line for line in page("participants.md").splitlines() if line.startswith(f"| `{name}` |")]
-        assert f"| {parameter.lowest:g} to {parameter.highest:g} | {parameter.unit} |" in row
+def short(number):
+    return f"{float(f'{number:.4g}'):g}"
 
 
-def test_the_example_of_a_cell_describes_behaviour():
-    behaviour = tomllib.loads(blocks("participants.md", "toml")[0])["cells"][0]["behaviour"]
-    flat = {f"{part}.{name}" for part, table in behaviour.items() for name in table}
-    assert Distributions.of(behaviour).as_dict().keys() == flat <= PARAMETERS.keys()
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [("participants.md", PARAMETERS), ("people.md", {name: PERSON[name] for name in RANGES})],
+)
+def test_the_table_of_a_page_lists_every_parameter_with_its_range(name, parameters):
+    for key, parameter in parameters.items():
+        (row,) = [line for line in page(name).splitlines() if line.startswith(f"| `{key}` |")]
+        bounds = f"{short(parameter.lowest)} to {short(parameter.highest)}"
+        assert f"| {bounds} | {parameter.unit} |" in row
+        assert not isinstance(parameter.usual, float) or f"| {short(parameter.usual)} | {bounds} |" in row
+
+
+def test_the_examples_of_the_pages_describe_behaviour_and_people():
+    behaviour = Distributions.of(tomllib.loads(blocks("participants.md", "toml")[0])["cells"][0]["behaviour"])
+    people = Distributions.of(tomllib.loads(blocks("people.md", "toml")[0]))
+    assert (len(behaviour), len(people)) == (2, 5)
+    assert behaviour.keys() <= PARAMETERS.keys()
+    check_person(people)
 
 
 @pytest.mark.slow

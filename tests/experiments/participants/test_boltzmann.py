@@ -56,10 +56,6 @@ def test_an_unprovable_regret_counts_as_its_bound():
     )
 
 
-def test_without_any_temperature_the_best_is_taken():
-    assert draw(choices([]), 0.0, np.random.default_rng(0)).visit.object == "object_0"
-
-
 def walked_by_drawing(geodesics, temperature, seed):
     """Length of a task of eight objects, done in an order drawn from its regrets."""
     task, rng, evaluator, length = (

@@ -24,12 +24,6 @@ def test_it_does_as_well_as_the_specialist_to_the_bit(house, assistance, user):
     assert played(house, assistance=assistance)[:2] == played(house, assistance=assistance, user=user)[:2]
 
 
-def test_it_follows_breadcrumbs_and_never_deviates(house):
-    _, events, *_ = played(house, assistance="optimal")
-    assert not any(event["deviated"] for event in events if event["event"] == "visit")
-    assert events[-1]["reason"] == "all delivered"
-
-
 def test_it_is_the_default_and_needs_nothing():
     assert TrialConfig(objects=6, assistance="none", seed=0).user == DEFAULT_PARTICIPANT == "follower"
     assert participant("follower") is not participant("searcher")

@@ -191,8 +191,8 @@ def test_unusual_folders_get_one_line(tmp_path, capsys):
     (tmp_path / "torn" / "trials.parquet").write_bytes(b"PAR1")
     study(tmp_path, [{"a": 1}])
     for folder in (tmp_path / "nowhere", tmp_path / "torn", tmp_path):
-        for command in ("analyze", "score"):
-            assert main(["study", command, str(folder)]) == 2
+        for command in ("study analyze", "study score", "compare"):
+            assert main([*command.split(), str(folder)]) == 2
             assert len(capsys.readouterr().err.splitlines()) == 1
 
 
