@@ -18,15 +18,6 @@ coordinates = st.floats(-8.0, 8.0).map(lambda v: round(v, 3))
 paths = st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=7).map(np.array)
 
 
-def test_a_straight_path_by_hand():
-    marks = breadcrumbs(np.array([[0.0, 0.0], [2.0, 0.0]]), 0.5)
-    xs = [m.position[0] for m in marks]
-    assert xs == pytest.approx([2.0 - 0.28 * k for k in range(5, -1, -1)])
-    assert [m.position[1] for m in marks] == [0.0] * 6
-    # 1.2 m at the person, resting on the floor (0.04 m) at the goal, a straight line between.
-    assert [m.position[2] for m in marks] == pytest.approx([1.2 - 1.16 * x / 2.0 for x in xs])
-
-
 @given(paths, st.sampled_from((0.0, 0.5)))
 def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(path, clearance):
     line = LineString(path)
@@ -48,14 +39,6 @@ def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(path,
     assert np.allclose(points[:, :2], along, atol=1e-6)
     slope = (1.2 - 0.04) / line.length
     assert np.allclose(points[:, 2], [1.2 - slope * s for s in expected], atol=1e-6)
-
-
-def test_breadcrumbs_keep_their_places_while_the_person_walks_along():
-    before = breadcrumbs(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0]]))
-    after = breadcrumbs(np.array([[0.4, 0.0], [3.0, 0.0], [3.0, 2.0]]))
-    assert len(after) < len(before)
-    kept = before[-len(after) :]
-    assert np.allclose([m.position[:2] for m in kept], [m.position[:2] for m in after])
 
 
 def test_a_person_at_the_goal_sees_one_breadcrumb_on_the_floor():
