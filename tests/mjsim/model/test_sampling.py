@@ -1,4 +1,4 @@
-"""Disorganized houses: the laws of PAPER section 4, determinism, and what happens when there is no room."""
+"""Disorganized houses: what tests/paper/test_section_4.py leaves open, and what happens when there is no room."""
 
 import hashlib
 import math
@@ -6,9 +6,8 @@ import subprocess
 import sys
 from collections import Counter
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
+from itertools import combinations
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,7 +17,6 @@ from small_worlds import episode_of
 from mjsim.errors import SamplingError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.sampling import sample_episode, sample_points
-from mjsim.model.scene import compose
 from mjsim.model.settling import settle
 
 LEVELS = (6, 12, 18, 24)
@@ -66,41 +64,9 @@ def episodes(catalogue, navmesh):
     }
 
 
-def test_levels_are_nested(episodes):
-    for seed in SEEDS:
-        for easier, harder in pairwise(LEVELS):
-            easy, hard = episodes[seed, easier], episodes[seed, harder]
-            assert len(easy.objects) == easier
-            for a, b in zip(easy.objects, hard.objects, strict=False):
-                assert (a.name, a.point, a.category) == (b.name, b.point, b.category)
-
-
-def test_categories_are_balanced_and_targeted(episodes, catalogue):
-    for (_, level), episode in episodes.items():
-        counts = Counter(o.category for o in episode.objects)
-        assert counts == dict.fromkeys(catalogue.categories, level // 6)
-        for o in episode.objects:
-            assert o.model in catalogue.categories[o.category].objects
-            assert episode.targets[o.name] == catalogue.categories[o.category].receptacle
-        assert set(episode.receptacles) == set(catalogue.receptacles)
-
-
-def test_points_keep_their_distance(episodes, house_model):
-    data = mujoco.MjData(house_model)
-    mujoco.mj_forward(house_model, data)
-    names = [house_model.site(i).name for i in range(house_model.nsite)]
-    bins = [tuple(data.site(n).xpos[:2]) for n in names if n.endswith("/volume")]
-    assert len(bins) == 6
-    for episode in episodes.values():
-        points = [o.point for o in episode.objects]
-        assert min(math.dist(a, b) for a, b in combinations(points, 2)) >= 1.0
-        assert min(math.dist(a, b) for a in points for b in bins) >= 1.0
-
-
-def test_points_are_navigable_and_the_start_is_near_the_centroid(episodes, navmesh):
+def test_the_start_is_near_the_centroid_and_away_from_objects(episodes, navmesh):
     exact = 0
     for episode in episodes.values():
-        assert all(navmesh.island_of(o.point) == 0 for o in episode.objects)
         rests = [o.position[:2] for o in episode.objects]
         centroid = [math.fsum(xy) / len(rests) for xy in zip(*rests, strict=True)]
         start = (episode.start.x, episode.start.y)
@@ -123,17 +89,6 @@ def test_objects_rest_near_their_points(episodes):
             assert math.isclose(math.hypot(*o.quaternion), 1.0, abs_tol=1e-12)
 
 
-def test_models_are_drawn_anew_at_each_level(episodes):
-    """Of the points that two levels share, about one in five gets the same model by chance."""
-    same = total = 0
-    for seed in SEEDS:
-        for easier, harder in combinations(LEVELS, 2):
-            pairs = zip(episodes[seed, easier].objects, episodes[seed, harder].objects, strict=False)
-            kept = [a.model == b.model for a, b in pairs]
-            same, total = same + sum(kept), total + len(kept)
-    assert 0 < same < 0.4 * total
-
-
 def test_no_model_repeats_before_its_category_is_used_up(episodes, catalogue):
     for episode in episodes.values():
         for (category, _), count in Counter((o.category, o.model) for o in episode.objects).items():
@@ -151,41 +106,15 @@ def test_seeds_and_blocks_differ(episodes):
 
 
 def test_same_seed_same_episode_in_another_process(episodes, tmp_path):
-    code = """
-import hashlib
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.footprint import footprint
-from mjsim.model.sampling import sample_episode
-from mjsim.model.house import compiled_house
-from planner.navmesh import NavMesh
-catalogue = Catalogue.load("apartment")
-plan = footprint(compiled_house(catalogue).model)
-navmesh = NavMesh.build(plan.obstacles, plan.bounds)
-episode = sample_episode(catalogue, navmesh, objects=18, seed=1)
-print(hashlib.sha256(episode.to_json().encode()).hexdigest())
-"""
+    code = (
+        "import hashlib; from experiments.house import House\n"
+        "episode = House.load().sample_episode(objects=18, seed=1)\n"
+        "print(hashlib.sha256(episode.to_json().encode()).hexdigest())"
+    )
     out = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
     ).stdout
     assert out.strip() == hashlib.sha256(episodes[1, 18].to_json().encode()).hexdigest()
-
-
-def test_composed_episode_is_at_rest(episodes, catalogue):
-    scene = compose(episodes[3, 24], catalogue)
-    data = mujoco.MjData(scene.model)
-    mujoco.mj_forward(scene.model, data)
-    touched = scene.index.geom_owner[data.contact.geom].ravel()
-    assert set(range(24)) <= set(touched.tolist())  # none floats
-    # Hold the servos, or the hands leave for the origin.
-    data.act[scene.model.actuator_actadr] = [
-        scene.model.qpos0[scene.model.jnt_qposadr[scene.model.actuator_trnid[i, 0]]]
-        * (scene.model.actuator_biasprm[i, 1] != 0)
-        for i in range(scene.model.nu)
-    ]
-    mujoco.mj_step(scene.model, data, nstep=250)
-    before, _ = scene.index.poses(scene.model.qpos0)
-    after, _ = scene.index.poses(data.qpos)
-    assert np.abs(after - before).max() < 0.003
 
 
 @pytest.mark.parametrize("objects", [1, 5, 7, 40])
@@ -194,6 +123,7 @@ def test_remainders_come_from_the_next_permutation(catalogue, navmesh, objects):
     counts = Counter(o.category for o in episode.objects)
     assert len(episode.objects) == objects
     assert max(counts.values()) - min(counts.get(c, 0) for c in catalogue.categories) <= 1
+    assert set(episode.receptacles) == set(catalogue.receptacles)
 
 
 def test_smaller_pools_are_prefixes(small_catalogue):
@@ -207,9 +137,8 @@ def test_smaller_pools_are_prefixes(small_catalogue):
     [
         ({"objects": 0}, "objects is 0.*1 to 40"),
         ({"objects": 41}, "objects is 41.*1 to 40"),
-        ({"objects": -6}, "-6"),
         ({"objects": 9, "points": 8}, "objects is 9.*1 to 8"),
-        ({"objects": 1, "points": 0}, "points is 0"),
+        ({"points": 0}, "points is 0"),
         ({"seed": -1}, "seed is -1"),
     ],
 )

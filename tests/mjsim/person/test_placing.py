@@ -10,7 +10,6 @@ from small_worlds import do, scene_of, world_of
 from mjsim.actions import IDLE, EventKind, Move, Pick, Place
 from mjsim.model.clearance import ClearanceField, clearance_at
 from mjsim.model.house import compiled_house
-from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.observation import ObjectStatus
 from mjsim.person.hand_path import ACROSS_FIRST, UP_FIRST, minimum_jerk, point_between
 from mjsim.person.slots import object_corners
@@ -139,20 +138,6 @@ def test_corners_enclose_every_vertex(small_catalogue):
         corners = object_corners(scene.model, scene.index.geoms(name))
         assert corners.min(axis=0) == pytest.approx(low, abs=1e-6)
         assert corners.max(axis=0) == pytest.approx(high, abs=1e-6)
-
-
-def test_distance_to_a_receptacle_is_that_to_its_outline():
-    turn = 0.5
-    c, s = math.cos(turn), math.sin(turn)
-    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    box = ReceptacleGeometry(
-        "box", np.array([2.0, 1.0, 0.5]), np.array([0.4, 0.2, 0.3]), rotation, np.zeros(2)
-    )
-    grid = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 161), np.linspace(-0.2, 0.2, 81)), -1).reshape(-1, 2)
-    outline = grid @ rotation[:2, :2].T + (2.0, 1.0)
-    for point in np.array([(2.0, 1.0), (3.0, 1.0), (1.2, 2.2), (2.1, 0.1)]):
-        expected = np.linalg.norm(outline - point, axis=1).min()
-        assert box.distance(point) == pytest.approx(expected, abs=0.004)
 
 
 def test_clearance_is_the_distance_to_the_walls(small_catalogue):
