@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 
+from planner.exact.solver import ExactSolver
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 from planner.plan import VisitKind
@@ -17,6 +18,8 @@ WALL = [
     np.array([(3.9, 0), (4.1, 0), (4.1, 4), (3.9, 4)]),
     np.array([(3.9, 5), (4.1, 5), (4.1, 8), (3.9, 8)]),
 ]
+# An exact planner without a table, and with a small budget.
+SEARCH = ExactSolver(table_bytes=0, passes=((100, 3_000), (1_000, 30_000)))
 BINS = [(1.0, 7.0), (7.0, 7.0), (7.0, 1.0)]
 
 

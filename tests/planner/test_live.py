@@ -6,7 +6,7 @@ import threading
 
 import planning_cases
 import pytest
-from planning_cases import Task, asked, planner_of, two_rooms
+from planning_cases import SEARCH, Task, asked, planner_of, two_rooms
 
 from experiments.cli.main import main
 from experiments.record import records
@@ -17,7 +17,7 @@ from experiments.trials.setup import prepare_session, prepared_planner
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from planner.checker import check
-from planner.errors import ProblemError, UnreachableError
+from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.exact.warm_start import NOTHING_KNOWN
 from planner.greedy_solver import nearest_first
@@ -25,12 +25,10 @@ from planner.plan import Plan, Status, VisitKind
 from planner.regret import RegretEvaluator
 from planner.route import TaskState, remaining
 from planner.service import Mode, Planner
-from planner.solver import SolveLimit, solver
+from planner.solver import solver
 from planner.solver_source import TIE, SolverSource
 from planner.task_problems import TaskProblems
 from planner.tour import possible_next, tour_length
-
-SEARCH = ExactSolver(table_bytes=0, passes=((100, 3_000), (1_000, 30_000)))
 
 
 @pytest.fixture(scope="module")
@@ -43,18 +41,19 @@ def live(geodesics, solver, **options):
 
 
 class Script:
-    """A solver that hands out prepared orders of visits, the later ones only when told to."""
+    """A solver that hands out prepared orders of visits, the later ones only when told to, and notes who waits."""
 
     name = "script"
 
     def __init__(self, *orders, bound=0.0, fail=None):
         self.orders, self.bound, self.fail = orders, bound, fail
-        self.go = threading.Event()
+        self.go, self.waiting = threading.Event(), []
 
     def improve(self, problem, *, seed=0, limit=None):  # noqa: ARG002 - the interface of solvers
         for k, order in enumerate(self.orders):
             if k:
-                self.go.wait(10)
+                self.waiting.append(threading.get_ident())
+                assert self.go.wait(60)
             visits = order(problem)
             cost = tour_length(problem, visits)
             optimal = cost <= self.bound
@@ -88,24 +87,6 @@ def test_from_any_state_the_shown_route_ends_up_optimal(geodesics, seed):
             if guide.route.next is not None:
                 task.do(*guide.route.next)
         assert guide.replans >= 4
-
-
-def test_a_prepared_route_is_followed_to_its_end_without_a_change_of_mind(geodesics):
-    task = Task(geodesics, 8, 3)
-    with live(geodesics, SEARCH) as guide:
-        guide.prepare(task.state)
-        planned = asked(guide, task.state)
-        assert planned.plan.status is Status.OPTIMAL
-        expected, walked = planned.visits, 0.0
-        for stop in expected:
-            assert guide.route.next == stop
-            walked += geodesics.shortest_path(task.position, task.place(stop)).geodesic_distance
-            task.do(*stop)
-            asked(guide, task.state)
-            guide.wait()
-            assert guide.improve(task.state) is None
-        assert guide.replans == 0
-        assert walked == pytest.approx(planned.plan.cost, abs=1e-6)
 
 
 @pytest.fixture
@@ -156,7 +137,7 @@ def test_a_proof_that_begins_otherwise_than_what_was_done_is_asked_for_anew(geod
         left = TaskState((1.0, 2.0), {"right": (3.0, 2.0)}, ("left",), mirrored.deliveries)
         asked(guide, left)
         assert guide.replans == 0
-        script.orders = (lambda problem: nearest_first(problem),)
+        script.orders = (nearest_first,)
         script.go.set()
         guide.wait()
         assert guide.improve(left) is None  # it said: first the right one
@@ -173,28 +154,6 @@ def test_what_a_proof_dies_of_is_told(geodesics, mirrored):
         guide.wait()
         with pytest.raises(ProblemError, match="no such thing"):
             guide.improve(mirrored)
-
-
-def test_objects_out_of_reach_are_listed_by_name_and_the_guide_goes_on(geodesics):
-    task = Task(geodesics, 4, 0)
-    with live(geodesics, solver("exact")) as guide:
-        guide.prepare(task.state)
-        home, bin_ = task.loose["object_01"], task.deliveries["object_02"]
-        task.loose["object_01"] = (20.0, 20.0)
-        task.deliveries["object_02"] = (1.0, -5.0)
-        with pytest.raises(UnreachableError) as caught:
-            asked(guide, task.state)
-        assert set(caught.value.names) == {"object_01", "object_02"}
-        task.loose["object_01"], task.deliveries["object_02"] = home, bin_
-        assert len(asked(guide, task.state).visits) == 8
-
-
-@pytest.mark.parametrize("name", ["ortools", "greedy"])
-def test_other_solvers_can_guide_live_too(geodesics, name):
-    task = Task(geodesics, 4, 1)
-    with live(geodesics, solver(name), limit=SolveLimit(work=20)) as guide:
-        guide.prepare(task.state, seconds=30)
-        check(TaskProblems(geodesics).problem(task.state), guide.route.plan)
 
 
 def test_what_is_known_of_some_objects_serves_a_problem_with_others(geodesics):
@@ -214,39 +173,23 @@ def test_what_is_known_of_some_objects_serves_a_problem_with_others(geodesics):
     assert found.cost == pytest.approx(solver("exact").solve(other).cost, abs=1e-3)
 
 
-class Stuck:
-    """A solver that hands out a first plan and then gets stuck, and notes who waits for it."""
-
-    name = "stuck"
-
-    def __init__(self):
-        self.free = threading.Event()
-        self.waiting = []
-
-    def solve(self, *_, **__):
-        raise AssertionError("nobody may ask for a finished plan")
-
-    def improve(self, problem, *, seed=0, limit=None):  # noqa: ARG002 - the interface of solvers
-        held = [problem.place(k) for k in range(len(problem.shipments), len(problem.names))]
-        visits = held + one_after_another(*range(len(problem.shipments)))(problem)
-        cost = tour_length(problem, visits)
-        yield Plan(tuple(visits), cost, 0.0, Status.FEASIBLE, 0.0)
-        self.waiting.append(threading.get_ident())
-        assert self.free.wait(60)
-
-
 def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
-    log, planner = EventLog(), Stuck()
+    def in_turn(problem):
+        n = len(problem.shipments)
+        held = [problem.place(k) for k in range(n, len(problem.names))]
+        return held + one_after_another(*range(n))(problem)
+
+    log, planner = EventLog(), Script(in_turn, in_turn)
     config = TrialConfig(objects=6, assistance="highlight", seed=3, live=True, regret=False)
     scene = compose(house.sample_episode(objects=6, seed=3), house.catalogue)
-    planner.free.set()  # the familiarisation may wait
+    planner.go.set()  # the familiarisation may wait
     monkeypatch.setattr(setup, "solver", lambda _: planner)
     with contextlib.closing(prepared_planner(config, house, scene.episode)) as guide:
         session, _ = prepare_session(config, house, scene, log, planner=guide)
-        planner.free.clear()
+        planner.go.clear()
         assert session.run() == "all delivered"
         assert guide.replans >= 2
-        planner.free.set()
+        planner.go.set()
         guide.wait()
         assert len(planner.waiting) == guide.replans + 1  # the first one for the familiarisation
         assert threading.get_ident() not in planner.waiting

@@ -4,11 +4,11 @@ import contextlib
 import itertools
 
 import pytest
-from planning_cases import BINS, Task, asked, planner_of, two_rooms
+from planning_cases import BINS, SEARCH, Task, asked, planner_of, two_rooms
 
 from planner.errors import PlannerError, ProblemError, UnreachableError
 from planner.exact.solver import ExactSolver
-from planner.plan import VisitKind
+from planner.plan import Status, VisitKind
 from planner.route import TaskState
 from planner.service import Mode
 from planner.solver import SolveLimit, solver
@@ -30,21 +30,25 @@ def length(geodesics, task, visits):
     return sum(geodesics.shortest_path(a, b).geodesic_distance for a, b in itertools.pairwise(stops))
 
 
-def test_a_followed_plan_is_walked_to_its_end_without_replanning(geodesics):
-    task, guide = Task(geodesics, 5), guided(geodesics)
-    route = asked(guide, task.state)
-    planned, walked = route, 0.0
-    for expected in planned.visits:
-        assert route.next == expected
-        walked += geodesics.shortest_path(task.position, task.place(expected)).geodesic_distance
-        task.do(*expected)
-        route = asked(guide, task.state)
-        left = TaskProblems(geodesics).length(task.state, route.visits)
-        assert left == pytest.approx(planned.plan.cost - walked, abs=1e-6)
-    assert route.next is None
-    assert guide.replans == 0
-    assert not guide.pending and guide.improve(task.state) is None
-    assert walked == pytest.approx(planned.plan.cost, abs=1e-6)
+@pytest.mark.parametrize("mode", Mode)
+def test_a_followed_plan_is_walked_to_its_end_without_a_change_of_mind(geodesics, mode):
+    task, walked = Task(geodesics, 8, 3), 0.0
+    with contextlib.closing(planner_of(geodesics, SEARCH, mode)) as guide:
+        guide.prepare(task.state)
+        planned = asked(guide, task.state)
+        assert planned.plan.status is Status.OPTIMAL
+        for expected in planned.visits:
+            assert guide.next == expected
+            walked += geodesics.shortest_path(task.position, task.place(expected)).geodesic_distance
+            task.do(*expected)
+            route = asked(guide, task.state)
+            guide.wait()
+            assert guide.improve(task.state) is None
+            left = TaskProblems(geodesics).length(task.state, route.visits)
+            assert left == pytest.approx(planned.plan.cost - walked, abs=1e-6)
+        assert guide.next is None
+        assert guide.replans == 0
+        assert walked == pytest.approx(planned.plan.cost, abs=1e-6)
 
 
 def test_two_visits_between_updates_are_still_the_plan(geodesics):
@@ -159,14 +163,18 @@ def test_a_plan_for_another_start_is_not_followed(geodesics):
     assert guide.replans == 0
 
 
-def test_a_task_that_cannot_be_done_is_reported_at_once(geodesics):
-    task = Task(geodesics, 3)
-    task.loose["object_01"] = (20.0, 20.0)
-    with (
-        contextlib.closing(planner_of(geodesics, solver("exact"), Mode.THREAD)) as guide,
-        pytest.raises(UnreachableError, match="object_01"),
-    ):
-        guide.ask(task.state, then=lambda *_: pytest.fail("there is no answer"))
+@pytest.mark.parametrize("mode", Mode)
+def test_objects_out_of_reach_are_listed_by_name_at_once_and_planning_goes_on(geodesics, mode):
+    task = Task(geodesics, 4)
+    with contextlib.closing(planner_of(geodesics, solver("exact"), mode)) as guide:
+        guide.prepare(task.state)
+        home, bin_ = task.loose["object_01"], task.deliveries["object_02"]
+        task.loose["object_01"], task.deliveries["object_02"] = (20.0, 20.0), (1.0, -5.0)
+        with pytest.raises(UnreachableError) as caught:
+            guide.ask(task.state, then=lambda *_: pytest.fail("there is no answer"))
+        assert set(caught.value.names) == {"object_01", "object_02"}
+        task.loose["object_01"], task.deliveries["object_02"] = home, bin_
+        assert len(asked(guide, task.state).visits) == 8
 
 
 def test_a_planner_that_fails_in_a_thread_fails_the_next_caller_that_needs_it(geodesics):
