@@ -15,6 +15,7 @@ from mjsim.observation import ObjectStatus
 from mjsim.render import CameraPose, Renderer
 
 CONDITIONS = ("none", "highlight", "optimal")
+UPDATED = "The plan has been updated."
 sizes = pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 
 
@@ -36,9 +37,10 @@ def highlighted(house):
     return play(house, "highlight")
 
 
-def tiles(frame, state, compositor, panel):
-    """The pictures in a list's rows, in order, each (s, s, 3), and the pictures' keys that they should be."""
-    height, width = frame.shape[:2]
+def tiles(state, pictures, size, panel):
+    """The entries of a list, and the pictures in its rows of a frame, in order, each (s, s, 3)."""
+    compositor, (width, height) = Compositor(pictures), size
+    frame = compositor.compose(np.full((height, width, 3), 90, np.uint8), state)
     layout = compositor.layout(state, width, height)
     rect, unit = layout.panels[panel], compositor._stencils.unit
 
@@ -77,26 +79,17 @@ def test_all_conditions_show_the_bins_with_picture_and_room(starts, house, pictu
     assert [(b.label, b.place) for b in state.bins] == [
         (r.label, house.rooms.label(r.room)) for r in catalogue.receptacles.values()
     ]
-    compositor = Compositor(pictures)
-    frame = compositor.compose(np.full((size[1], size[0], 3), 90, np.uint8), state)
-    found = [
-        (b.picture, likest(tile, pictures, "receptacle:"))
-        for b, tile in tiles(frame, state, compositor, "bins")
-    ]
+    found = list(tiles(state, pictures, size, "bins"))
     assert len(found) == 6
-    assert all(expected == shown for expected, shown in found)
+    assert all(likest(tile, pictures, "receptacle:") == entry.picture for entry, tile in found)
 
 
 @sizes
 @pytest.mark.parametrize("assistance", CONDITIONS)
 def test_the_rows_of_the_list_stand_in_their_order_with_their_pictures(starts, pictures, size, assistance):
-    _, _, state = starts[assistance]
-    compositor = Compositor(pictures)
-    frame = compositor.compose(np.full((size[1], size[0], 3), 90, np.uint8), state)
-    rows = list(tiles(frame, state, compositor, "checklist"))
+    rows = list(tiles(starts[assistance][2], pictures, size, "checklist"))
     assert len(rows) >= 6
-    for item, tile in rows:
-        assert likest(tile, pictures, "object:") == item.picture
+    assert all(likest(tile, pictures, "object:") == item.picture for item, tile in rows)
 
 
 def test_none_and_highlight_list_in_the_participants_random_order(house):
@@ -227,9 +220,15 @@ def test_replanning_is_announced_where_the_plan_is_shown_and_only_there(house, a
     played = play(house, assistance, user="boltzmann:30", objects=4)
     assert len(played.of("plan")) > 1
     texts = {state.message.text for _, state in played.shown if state.message is not None}
-    assert ("The plan has been updated." in texts) == told
+    assert (UPDATED in texts) == told
 
 
 def test_under_optimal_replanning_is_announced(own_way):
-    texts = {state.message.text for _, state in own_way.shown if state.message is not None}
-    assert "The plan has been updated." in texts
+    """For 2 s, after what was done has been told."""
+    replans = [event["t"] for event in own_way.of("plan")][1:]
+    assert len(replans) >= 3
+    told = [(o.time, s.message.text) for o, s in own_way.shown if s.message and s.message.opacity == 1.0]
+    for t in replans:
+        texts = [text for time, text in told if t <= time < t + 6.0]
+        assert texts[0].startswith("You p")  # picked up, put
+        assert texts.count(UPDATED) >= 2.0 / 0.04 - 1 or t > own_way.shown[-1][0].time - 4.0

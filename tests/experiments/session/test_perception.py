@@ -1,19 +1,16 @@
-"""What a participant may perceive, and what the message bar tells it of the plan."""
+"""What a participant may perceive."""
 
 import dataclasses
 
 import numpy as np
 import pytest
-from sessions import Recorder, opened, play
+from sessions import Recorder, opened
 
 from experiments.session.session import INTERRUPTED
-from hud.messages import TEXTS
 from mjsim.actions import WAIT
 from mjsim.model.sight import visible_objects
 from mjsim.observation import ObjectStatus
 from mjsim.render import Renderer
-
-UPDATED = TEXTS["replanned"][1]
 
 
 class Spy:
@@ -101,30 +98,3 @@ def test_flagpoles_are_those_of_the_picture(house, monkeypatch, assistance):
     assert 0 < len(drawn) < len(poles), "some are behind the person"
     assert set(percept.flagpoles) == drawn
     assert {name: tuple(place) for name, place in percept.flagpoles.items()} == {n: poles[n] for n in drawn}
-
-
-def test_no_flagpoles_and_no_path_where_none_are_shown(house, monkeypatch):
-    percept, *_ = percepts(house, "none", monkeypatch)
-    assert (dict(percept.flagpoles), percept.guidance, percept.hud().markers) == ({}, None, ())
-
-
-def messages(house, assistance):
-    """What the message bar shows at every control step of a trial with many deviations, and its replans, s."""
-    played = play(house, assistance, user="boltzmann:30")
-    replans = [event["t"] for event in played.of("plan")][1:]
-    return [(o.time, state.message) for o, state in played.shown], replans
-
-
-def test_who_sees_the_plan_is_told_that_it_has_changed(house):
-    shown, replans = messages(house, "optimal")
-    assert len(replans) >= 3
-    for t in replans:
-        texts = [m.text for time, m in shown if t <= time < t + 6.0 and m is not None and m.opacity == 1.0]
-        assert texts[0].startswith("You p")  # picked up, put: what was done is told first
-        assert texts.count(UPDATED) >= 2.0 / 0.04 - 1 or t > shown[-1][0] - 4.0
-
-
-def test_who_sees_no_plan_is_not_told_of_any(house):
-    shown, replans = messages(house, "highlight")
-    assert len(replans) >= 3
-    assert all(message is None or message.text != UPDATED for _, message in shown)
