@@ -133,7 +133,12 @@ def test_only_rows_at_6_objects_are_looked_at():
 # Free parameters
 
 
-def test_the_committed_parameters_describe_guests_within_the_pool():
+@pytest.fixture(scope="module")
+def pool_trials():
+    return read_study(study_path("pool")).trials
+
+
+def test_the_committed_parameters_describe_guests_within_the_pool(pool_trials):
     free, rng = read_free_parameters(), np.random.default_rng(0)
     assert set(free.inputs()) <= set(PARAMETERS)
     shares = stratified_shares(64, len(free.inputs()), rng)
@@ -141,8 +146,7 @@ def test_the_committed_parameters_describe_guests_within_the_pool():
         people = free.people(draw, shares)
         for name, column in zip(free.inputs(), people.T, strict=True):
             assert PARAMETERS[name].lowest <= column.min() <= column.max() <= PARAMETERS[name].highest
-    pool = {name for trial in read_study(study_path("pool")).trials[:1] for name in trial.behaviour}
-    assert set(free.inputs()) == pool
+    assert set(free.inputs()) == set(pool_trials[0].behaviour)
 
 
 def test_people_are_spread_over_each_distribution_and_inputs_are_not_tied():
@@ -260,6 +264,7 @@ def test_controls_change_what_they_name_and_leave_the_rest_of_the_population():
     assert all(len(trials) == 24 for name, trials in controls.items() if name != "nearest")
 
 
-def test_pool_and_study_share_nobody():
-    seeds = [{t.person_seed for t in read_study(study_path(name)).trials} for name in ("paper", "pool")]
-    assert not seeds[0] & seeds[1]
+def test_pool_and_study_are_of_one_house_and_share_nobody(pool_trials):
+    paper = read_study(study_path("paper")).trials
+    assert {t.house_seed for t in pool_trials} == {t.house_seed for t in paper} == {57}
+    assert not {t.person_seed for t in pool_trials} & {t.person_seed for t in paper}

@@ -57,8 +57,6 @@ def test_a_study_is_judged_by_its_own_tests(people):
     found = score(people, PUBLISHED)
     assert not found.pool
     assert found.as_published
-    assert len(rows_of(found, EFFECT_SIZE, INFERENCE)) == 20
-    assert (len(rows_of(found, DIRECTION)), len(rows_of(found, VARIANCE))) == (12, 4)
     six = next(r for r in found.rows if r.kind == INFERENCE and r.measure == "ipl" and r.objects == 6)
     test = stats.f_oneway(*people.groups("ipl", 6).values())
     assert six.ours.startswith(f"F(2,116) = {test.statistic:.2f}")
@@ -105,11 +103,7 @@ def test_people_who_are_all_alike_agree_with_nothing_but_what_is_not_there(peopl
 
 
 def test_missing_cells_and_measures_say_so():
-    rows = [
-        r
-        for r in made_up_people()
-        if (r["objects"] != 6 and r["objects"] != 24) or r["assistance"] != "optimal"
-    ]
+    rows = [r for r in made_up_people() if r["objects"] not in (6, 24) or r["assistance"] != "optimal"]
     for row in rows:
         del row["ipl_locations"]
     found = {(r.kind, r.measure, r.what, r.objects): r for r in score(table_of(rows), PUBLISHED).rows}

@@ -1,11 +1,8 @@
-"""The house of the study: the most typical one by its tours, in every file that has to have the same."""
-
-import tomllib
+"""The house of the study: the most typical one by its tours."""
 
 import numpy as np
 import pytest
 
-from experiments.study.designs import FOLDER
 from studies.examples.typical_house import OBJECTS, rms_z_scores, tour_lengths
 
 
@@ -21,10 +18,3 @@ def test_the_mean_house_is_the_most_typical_and_units_do_not_matter():
 def test_more_objects_make_longer_tours():
     lengths = tour_lengths(2)
     assert lengths.shape == (2, 4) and np.all(np.diff(lengths, axis=1) > 0)
-
-
-def test_the_pool_is_of_the_same_house_as_the_study():
-    files = [
-        tomllib.loads((FOLDER / name).read_text(encoding="utf-8")) for name in ("paper.toml", "pool.toml")
-    ]
-    assert files[0]["all_cells"]["house_seeds"] == files[1]["all_cells"]["house_seeds"] == 57
