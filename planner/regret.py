@@ -230,8 +230,9 @@ def _around_best(
     table = bound.table
     relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
     least = {visit: cost - bound.prices for visit, cost in relaxed.items()}
+    dearest = (2 * n + len(problem.onboard)) * int(metric.max())  # no tour is longer
     while True:
-        longest = best + math.floor(radius / unit)
+        longest = best + math.floor(min(radius / unit, dearest))
         costs = costs_by_pass(bound, list(possible_next(problem)), longest, MAX_STATES, deadline)
         if costs is not None:
             return _ranked(problem, costs, unit, longest, least)
