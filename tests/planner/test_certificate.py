@@ -16,6 +16,7 @@ from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
 from planner.solver import SOLVERS, SolveLimit, solver
+from planner.verifier import verify_optimal
 
 seeds = st.integers(0, 2**32 - 1)
 SEARCH = ExactSolver(table_bytes=0)
@@ -64,23 +65,39 @@ def test_few_objects_are_solved_by_the_checker_itself(seed, n, onboard, capacity
             assert plan.cost == pytest.approx(optimum, rel=1e-9)
 
 
-def test_a_proof_that_yields_less_than_it_claims_is_refused():
+@pytest.mark.parametrize("judge", [check, verify_optimal])
+@pytest.mark.parametrize("planner", [solver("exact"), SEARCH, solver("greedy")])
+def test_a_proof_that_yields_less_than_it_claims_is_refused(planner, judge):
     problem = random_problem(3, 10)
-    table, searched = solver("exact").solve(problem), SEARCH.solve(problem)
-    greedy = solver("greedy").solve(problem)
-    for plan in (table, searched, greedy):
-        check(problem, plan)
-        with pytest.raises(ProblemError, match="claims"):
-            check(problem, claiming(plan, root=plan.certificate.root + round(0.01 / plan.certificate.unit)))
+    plan = planner.solve(problem)
+    judge(problem, plan)
     with pytest.raises(ProblemError, match="claims"):
-        check(problem, claiming(searched, multipliers=(0,) * 10, groups=(tuple(range(10)),)))
-    with pytest.raises(ProblemError, match="does not fit"):
-        check(problem, claiming(searched, multipliers=(0,) * 9))
-    with pytest.raises(ProblemError, match="does not fit"):
-        check(problem, claiming(searched, groups=(tuple(range(9)), (10,))))
-    raised = dataclasses.replace(greedy, lower_bound=greedy.cost)
-    with pytest.raises(ProblemError, match="lower bound claims"):
-        check(problem, raised)
+        judge(problem, claiming(plan, root=plan.certificate.root + round(0.01 / plan.certificate.unit)))
+    if planner.name == "greedy":
+        with pytest.raises(ProblemError, match="lower bound claims"):
+            judge(problem, dataclasses.replace(plan, lower_bound=plan.cost))
+
+
+ALL = tuple(range(10))
+
+
+@pytest.mark.parametrize("judge", [check, verify_optimal])
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"multipliers": (0,) * 10, "groups": (ALL,)}, "claims"),
+        ({"multipliers": (0,) * 9}, "does not fit"),
+        ({"groups": (ALL[:9], (10,))}, "does not fit"),
+        ({"groups": (ALL[1:],)}, "does not fit"),
+        ({"groups": (ALL, (0,))}, "does not fit"),
+        ({"groups": (ALL, ())}, "does not fit"),
+        ({"unit": 1e9}, "too large"),
+    ],
+)
+def test_a_relaxation_that_fits_badly_is_refused(changes, fault, judge):
+    problem = random_problem(3, 10)
+    with pytest.raises(ProblemError, match=fault):
+        judge(problem, claiming(SEARCH.solve(problem), **changes))
 
 
 def test_a_false_bound_is_found_out_without_a_certificate():
