@@ -1,6 +1,10 @@
 """Episodes of the small house of conftest.py, and actions that are carried out to their end."""
 
-from mjsim.actions import WAIT
+import math
+
+import numpy as np
+
+from mjsim.actions import WAIT, Move
 from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import compose
@@ -55,3 +59,21 @@ def finish(world):
             return events
         events += world.step(WAIT).events
     raise AssertionError("the motion does not end")
+
+
+def walk_to(world, x, y, *, heading=None, within=0.03):
+    """Events of a walk straight to a point, turning into the way, then to a heading."""
+    events = []
+    for _ in range(500):
+        o = world.observation()
+        offset = np.array([x, y]) - o.position
+        distance = float(np.hypot(*offset))
+        wanted = math.atan2(offset[1], offset[0]) if distance > 0.3 else heading
+        error = 0.0 if wanted is None else math.remainder(wanted - o.heading, math.tau)
+        if distance < within and abs(error) < 0.05:
+            return events
+        speed = min(1.4, 2.0 * distance) / max(distance, 1e-9)
+        c, s = math.cos(o.heading), math.sin(o.heading)
+        forward, left = c * offset[0] + s * offset[1], c * offset[1] - s * offset[0]
+        events += world.step(Move(forward * speed, left * speed, 4.0 * error)).events
+    raise AssertionError(f"did not arrive at {x}, {y}: {world.observation().position}")

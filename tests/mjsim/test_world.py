@@ -1,8 +1,6 @@
 """The world: rules, determinism, walking, carrying."""
 
 import math
-import subprocess
-import sys
 from functools import partial
 
 import mujoco
@@ -10,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from small_worlds import do, finish, scene_of, world_of
+from small_worlds import do, finish, scene_of, walk_to, world_of
 
 from mjsim.actions import IDLE, EventKind, Move, Pick, Place, Refusal
 from mjsim.errors import ActionError, AssetError, PhysicsError
@@ -33,48 +31,6 @@ def make(small_catalogue):
 
 def run(world, actions):
     return [event for action in actions for event in world.step(action).events]
-
-
-def walk_to(world, x, y, *, heading=None):
-    """Walk straight to a point, turning into the way, then to a heading."""
-    events = []
-    for _ in range(500):
-        o = world.observation()
-        offset = np.array([x, y]) - o.position
-        distance = float(np.hypot(*offset))
-        wanted = math.atan2(offset[1], offset[0]) if distance > 0.3 else heading
-        error = 0.0 if wanted is None else math.remainder(wanted - o.heading, math.tau)
-        if distance < 0.03 and abs(error) < 0.05:
-            return events
-        speed = min(1.4, 2.0 * distance) / max(distance, 1e-9)
-        c, s = math.cos(o.heading), math.sin(o.heading)
-        forward, left = c * offset[0] + s * offset[1], c * offset[1] - s * offset[0]
-        events += world.step(Move(forward * speed, left * speed, 4.0 * error)).events
-    raise AssertionError(f"did not arrive at {x}, {y}: {world.observation().position}")
-
-
-SCRIPT = [
-    *[Move(0.8, 0.2, 0.5)] * 20, *[Move(look=-0.5)] * 5, *[Move(-0.5, 0.0, -0.8)] * 15, Pick(),
-    *[Move(1.0, 0.0, 0.3)] * 60, Place(), Pick(), *[Move(1.0, 0.0, 1.0)] * 60,
-]  # fmt: skip
-
-
-def digest(world):
-    run(world, SCRIPT)
-    return world.state_hash()
-
-
-@pytest.mark.slow
-def test_another_process_finds_the_same_bits(small_catalogue, small_house):
-    start = (1.0, 1.0, 0.0), ("cube", 1.7, 1.2), ("ball", 1.2, 1.9)
-    program = (
-        f"import runpy, sys; sys.path[:0] = {sys.path!r}; t = runpy.run_path({__file__!r})\n"
-        "from mjsim.model.catalogue import Catalogue\n"
-        f"catalogue = Catalogue.load({str(small_house / 'catalogue.toml')!r})\n"
-        f"print(t['digest'](t['World'](t['scene_of'](catalogue, *{start!r}))))\n"
-    )
-    other = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert int(other.stdout) == digest(World(scene_of(small_catalogue, *start)))
 
 
 def carrying_two(make):
@@ -223,23 +179,16 @@ def test_a_pulled_object_slips_out_of_the_hand(make):
     assert o.object_positions[0, 2] < 0.2
 
 
-def test_walking_follows_the_commands(make):
+def test_the_person_walks_and_looks_where_it_is_told(make):
+    """How fast, tests of the person's numbers say."""
     world = make((0.8, 2.0, 0.5))
-    speeds = []
-    for _ in range(25):
-        speeds.append(float(np.hypot(*world.step(Move(forward=9.0)).observation.velocity)))
-    rises = np.diff([0.0, *speeds]) / world.control_timestep
-    assert max(rises) <= 3.2  # 3 m/s^2 commanded; the servo lags and catches up
-    assert speeds[-1] == pytest.approx(1.4, abs=0.01)
+    run(world, [Move(forward=9.0)] * 25)
     o = world.observation()
     assert math.atan2(o.velocity[1], o.velocity[0]) == pytest.approx(0.5, abs=1e-3)
-    run(world, [IDLE] * 25)
-    before = world.observation().heading
-    run(world, [Move(turn=9.0)] * 50)
-    assert world.observation().heading - before == pytest.approx(2.5 * 2.0, abs=0.3)
     run(world, [Move(look=1.0)] * 100)
-    assert world.observation().pitch == pytest.approx(avatar.PITCH_RANGE[1], abs=0.01)
-    assert world.observation().eye == pytest.approx(world.data.cam(avatar.EYE).xpos, abs=0.02)
+    o = world.observation()
+    assert o.pitch == pytest.approx(avatar.PITCH_RANGE[1], abs=0.01)
+    assert o.eye == pytest.approx(world.data.cam(avatar.EYE).xpos, abs=0.02)
 
 
 @pytest.mark.parametrize("heading", np.linspace(-math.pi, math.pi, 9)[:-1])
@@ -321,6 +270,8 @@ def test_unusable_arguments_are_named(make, small_catalogue):
         world.step("jump")
     with pytest.raises(PhysicsError, match=r"0\.03 s is not a whole multiple"):
         World(world.scene, WorldOptions(control_timestep=0.03))
+    with pytest.raises(ActionError, match="no fidelity 'windows'; choose one of full, event"):
+        WorldOptions(fidelity="windows")
     with pytest.raises(ActionError, match=r"WorldOptions\.settle_time must be a positive number, got 0"):
         WorldOptions(settle_time=0)
     bare = compose(world.scene.episode, small_catalogue, avatar=False)

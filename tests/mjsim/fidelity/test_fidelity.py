@@ -10,16 +10,15 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_worlds import do, scene_of, world_of
+from small_worlds import do, scene_of, walk_to, world_of
 
 from mjsim.actions import WAIT, EventKind, FollowPath, Move, Pick, Place, Stop, Wait
-from mjsim.errors import ActionError, PhysicsError, StateError
+from mjsim.errors import StateError
 from mjsim.fidelity import kinematics
 from mjsim.fidelity import trunk_contact as trunk
 from mjsim.fidelity.body_state import X, Y, standing
 from mjsim.fidelity.kinematics import Gait
 from mjsim.fidelity.trunk_contact import Floor
-from mjsim.health.monitor import HealthMonitor
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.sight import visible_objects
@@ -67,28 +66,9 @@ def walk(world, moves):
     return States.of(seen, hashes, health)
 
 
-def walk_to(world, x, y, *, within=0.03):
-    """Walk straight to a point and look ahead."""
-    for _ in range(400):
-        o = world.observation()
-        offset = np.array([x, y]) - o.position
-        distance = float(np.hypot(*offset))
-        if distance < within:
-            return
-        error = math.remainder(math.atan2(offset[1], offset[0]) - o.heading, math.tau)
-        speed = min(1.4, 2.0 * distance + 0.05) * max(0.0, math.cos(error))
-        world.step(Move(speed, 0.0, 4.0 * error if distance > 0.1 else 0.0))
-    raise AssertionError(f"did not arrive at {x}, {y}: {world.observation().position}")
-
-
 def face(world, x, y):
-    for _ in range(100):
-        o = world.observation()
-        error = math.remainder(math.atan2(y - o.position[1], x - o.position[0]) - o.heading, math.tau)
-        if abs(error) < 0.05:
-            return
-        world.step(Move(turn=4.0 * error))
-    raise AssertionError("does not turn")
+    here = world.observation().position
+    walk_to(world, *here, heading=math.atan2(y - here[1], x - here[0]), within=0.1)
 
 
 def fetch(world, name):
@@ -156,23 +136,6 @@ def test_a_path_in_one_call_is_walked_as_step_by_step(house, fidelity):
 
 
 @tiers
-def test_a_path_in_single_steps_is_the_same(house, fidelity):
-    at_once, singly = world_of(house, fidelity), world_of(house, fidelity)
-    o = at_once.observation()
-    goal = o.object_positions[1, :2]
-    path = FollowPath(np.array([o.position, goal]), goal, 0.5, Pick("o1"))
-    while (step := at_once.step(path)).result is None:
-        pass
-    while (last := singly.step(path, 1)).result is None:
-        pass
-    assert step.stopped is last.stopped is Stop.ARRIVED
-    assert step.result == last.result
-    assert at_once.busy
-    assert same(step.observation, last.observation)
-    assert at_once.state_hash() == singly.state_hash()
-
-
-@tiers
 def test_a_walk_stops_when_it_is_due_off_its_path_or_blocked(house, fidelity):
     world = settled(house, fidelity)
     o = world.observation()
@@ -181,6 +144,7 @@ def test_a_walk_stops_when_it_is_due_off_its_path_or_blocked(house, fidelity):
     assert (world.step(path, 5).stopped, world.observation().time) == (Stop.DUE, pytest.approx(o.time + 0.2))
     due = world.step(dataclasses.replace(path, until=o.time + 0.32))
     assert (due.stopped, due.observation.time) == (Stop.DUE, pytest.approx(o.time + 0.32))
+    assert world.step(dataclasses.replace(path, stop_distance=9.0)).stopped is Stop.ARRIVED
     aside = dataclasses.replace(path, points=ahead + np.array([0.0, 0.5]))
     off = world.step(aside)
     assert (off.stopped, len(off.steps)) == (Stop.CHANGED, 1)
@@ -209,28 +173,6 @@ def test_waiting_in_one_call_is_idling_step_by_step(house, fidelity):
     while at_once.observation().time < time + 1.0 - 1e-6:
         check_steps(at_once, singly, Wait(time + 1.0))
     assert at_once.observation().time == pytest.approx(time + 1.0)
-
-
-def test_a_failure_of_the_physics_names_the_steps_until_then(house, monkeypatch):
-    check = HealthMonitor.check
-
-    def fails_late(monitor, held):
-        if monitor._rig.data.time > 2.9:
-            raise PhysicsError("on purpose")
-        return check(monitor, held)
-
-    monkeypatch.setattr(HealthMonitor, "check", fails_late)
-    world = settled(house, "full")
-    path = np.array([(1.0, 2.0), (2.2, 2.0)])
-    with pytest.raises(PhysicsError, match="on purpose") as failed:
-        world.step(FollowPath(path, path[-1], 0.1, shown=True))
-    steps = failed.value.steps
-    assert len(steps.actions) == len(steps) == len(steps.passed.time) + 1 == 13
-
-
-def test_an_unknown_fidelity_is_refused():
-    with pytest.raises(ActionError, match="no fidelity 'windows'; choose one of full, event"):
-        WorldOptions(fidelity="windows")
 
 
 @given(turns=st.lists(st.floats(-0.8, 0.8), min_size=6, max_size=6), left=st.floats(-0.2, 0.2))
