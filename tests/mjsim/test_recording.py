@@ -46,45 +46,42 @@ def test_a_busy_world_has_no_state(world):
     world.state()
 
 
-@pytest.mark.parametrize("size", [0, 7])
-def test_a_state_of_another_scene_is_refused(world, size):
-    with pytest.raises(StateError, match=f"a state of {size} numbers"):
-        world.restore(WorldState(np.zeros(size), world.state().details))
-
-
-def test_a_state_that_is_not_finite_is_refused(world):
-    world.reset()
-    state = world.state()
-    state.physics[3] = np.nan
-    with pytest.raises(StateError, match="1 of them not finite"):
-        world.restore(state)
-
-
 @pytest.mark.parametrize("details", ["{}", "[]", "{", '{"health": {"altitude": 3}}'])
 def test_details_of_something_else_are_refused(details):
     with pytest.raises(StateError, match="details do not fit"):
         WorldState.from_json(np.zeros(1), details)
 
 
-def test_details_of_another_shape_are_refused(world):
-    world.reset()
-    state = world.state()
-    rig = dataclasses.replace(state.details.person.rig, motion=np.zeros(3))
-    changes = {"rig": rig}, {"grips": ((99, 0), None)}
-    for change in changes:
-        person = dataclasses.replace(state.details.person, **change)
-        with pytest.raises(StateError, match="details do not fit"):
-            world.restore(WorldState(state.physics, dataclasses.replace(state.details, person=person)))
-    world.reset()
+def with_details(state, person=(), **changes):
+    person = dataclasses.replace(state.details.person, **dict(person))
+    return WorldState(state.physics, dataclasses.replace(state.details, person=person, **changes))
 
 
-def test_a_state_of_other_objects_is_refused(world):
+def with_a_hole(state):
+    state.physics[3] = np.nan
+    return state
+
+
+DAMAGES = {
+    "no numbers": (lambda s: WorldState(np.zeros(0), s.details), "a state of 0 numbers"),
+    "another scene": (lambda s: WorldState(np.zeros(7), s.details), "a state of 7 numbers"),
+    "not finite": (with_a_hole, "1 of them not finite"),
+    "another rig": (
+        lambda s: with_details(s, {"rig": dataclasses.replace(s.details.person.rig, motion=np.zeros(3))}),
+        "details do not fit",
+    ),
+    "another grip": (lambda s: with_details(s, {"grips": ((99, 0), None)}), "details do not fit"),
+    "an object less": (lambda s: with_details(s, status=s.details.status[1:]), "same episode"),
+    "another object": (lambda s: with_details(s, hands=("nobody's", None)), "same episode"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_state_that_does_not_fit_is_refused(world, damage):
+    make, message = DAMAGES[damage]
     world.reset()
-    state = world.state()
-    for changes in ({"status": state.details.status[1:]}, {"hands": ("nobody's", None)}):
-        details = dataclasses.replace(state.details, **changes)
-        with pytest.raises(StateError, match="same episode"):
-            world.restore(WorldState(state.physics, details))
+    with pytest.raises(StateError, match=message):
+        world.restore(make(world.state()))
     world.reset()
 
 

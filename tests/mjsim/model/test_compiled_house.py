@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from experiments.cli.main import main
 from experiments.house import House
 from mjsim.actions import Move, Pick
 from mjsim.errors import AssetError
@@ -129,19 +128,9 @@ def test_included_files_meshes_and_textures_count_as_content(tmp_path):
     assert len(hashes) == 4
 
 
-def test_a_scene_without_visuals_moves_the_same(catalogue, episode):
-    raised = replace(episode, objects=tuple(replace(o, position=(*o.point, 0.02)) for o in episode.objects))
-    ends = []
-    for visuals in (True, False):
-        scene = compose(raised, catalogue, avatar=False, visuals=visuals)
-        data = mujoco.MjData(scene.model)
-        mujoco.mj_step(scene.model, data, nstep=250)
-        ends.append((data.qpos.tobytes(), data.qvel.tobytes()))
-    assert ends[0] == ends[1]
-
-
 def test_states_fit_a_scene_with_and_without_visuals_and_who_looks_sees_the_same(catalogue, episode):
-    worlds = [World(compose(episode, catalogue, visuals=visuals)) for visuals in (True, False)]
+    falling = replace(episode, objects=tuple(replace(o, position=(*o.point, 0.05)) for o in episode.objects))
+    worlds = [World(compose(falling, catalogue, visuals=visuals)) for visuals in (True, False)]
     whole, lean = worlds[0].scene, worlds[1].scene
     assert lean.model.ngeom < whole.model.ngeom and lean.model.nbody == whole.model.nbody
     assert lean.counterpart(visuals=True).model.ngeom == whole.model.ngeom
@@ -171,14 +160,6 @@ def test_a_house_that_does_not_compile_says_which_and_why(fresh_house, name):
     with pytest.raises(AssetError, match=rf"{name}.*does not compile: .*flat.*correct") as caught:
         House.load(str(fresh_house))
     assert "\n" not in str(caught.value)
-
-
-def test_a_house_that_does_not_compile_ends_a_run_with_a_message(fresh_house, capsys):
-    broken = fresh_house.with_name("house.xml")
-    broken.write_text(broken.read_text().replace("</worldbody>", '<geom size="0"/></worldbody>'))
-    out = str(fresh_house.with_name("run"))
-    assert main(["run", "--house", str(fresh_house), "--objects", "2", "--no-video", "--out", out]) == 2
-    assert "does not compile" in capsys.readouterr().err
 
 
 def test_a_failed_reading_is_not_kept(fresh_house):

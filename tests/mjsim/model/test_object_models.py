@@ -79,16 +79,6 @@ def test_a_toppled_object_that_gets_a_push_stops(key, axis):
     assert np.linalg.norm(data.qpos[:2] - start) < 0.6
 
 
-def test_the_same_object_fits_twice_into_a_scene_from_another_folder(tmp_path, key):
-    (tmp_path / "house.xml").write_text(FLOOR, encoding="utf-8")
-    spec = mujoco.MjSpec.from_file(str(tmp_path / "house.xml"))
-    for name in ("first", "second"):
-        loose(spec, CATALOGUE.objects[key].path, name)
-    model = spec.compile()
-    assert model.nbody == 3
-    assert model.body("first/object").mass == model.body("second/object").mass
-
-
 def filled(bin_key, objects):
     """Set objects down slot by slot; yield position and speed of each at the end, in the volume's frame."""
     spec = mujoco.MjSpec.from_string(FLOOR)
