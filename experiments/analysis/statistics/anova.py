@@ -39,7 +39,7 @@ def people_in(groups: Mapping[str, Values]) -> int:
 def one_way(groups: Mapping[str, Values]) -> FTest:
     """Fisher's analysis of variance of one factor."""
     check_groups(groups)
-    return _anova(groups, "equal")
+    return _fisher(groups)
 
 
 def welch(groups: Mapping[str, Values]) -> FTest:
@@ -51,7 +51,10 @@ def welch(groups: Mapping[str, Values]) -> FTest:
     constant = [name for name, values in groups.items() if not varies(values)]
     if constant:
         raise StatisticsError(f"the values of {constant[0]} do not vary")
-    return _anova(groups, "unequal")
+    from statsmodels.stats.oneway import anova_oneway
+
+    found = anova_oneway(list(groups.values()), use_var="unequal")
+    return FTest(float(found.statistic), len(groups) - 1, float(found.df[1]), people_in(groups))
 
 
 def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
@@ -63,14 +66,17 @@ def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
     distances = {name: np.abs(values - np.median(values)) for name, values in groups.items()}
     if not any(varies(values) for values in distances.values()):
         raise StatisticsError("the distances from the median do not vary within any group")
-    return _anova(distances, "equal")
+    return _fisher(distances)
 
 
-def _anova(groups: Mapping[str, Values], variances: str) -> FTest:
-    from statsmodels.stats.oneway import anova_oneway
-
-    found = anova_oneway(list(groups.values()), use_var=variances)
-    return FTest(float(found.statistic), len(groups) - 1, float(found.df[1]), people_in(groups))
+def _fisher(groups: Mapping[str, Values]) -> FTest:
+    """statsmodels has no number for a group of one person."""
+    members, people = list(groups.values()), people_in(groups)
+    grand = np.concatenate(members).mean()
+    between = sum(len(v) * float(v.mean() - grand) ** 2 for v in members)
+    within = sum(float(((v - v.mean()) ** 2).sum()) for v in members)
+    df1, df2 = len(groups) - 1, people - len(groups)
+    return FTest(between / df1 / (within / df2), df1, float(df2), people)
 
 
 def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2) -> dict[str, FTest]:
