@@ -49,27 +49,20 @@ class Clumsy:
 class Photographer:
     """A viewer that draws what is shown right after each refusal, with and without the message."""
 
-    def __init__(self, scene, house, sizes):
-        self._renderers = [FirstPersonRenderer(scene, house, FilmConfig(*size, "draft")) for size in sizes]
-        self._sizes = sizes
+    def __init__(self, scene, house):
+        self._renderer = FirstPersonRenderer(scene, house, FilmConfig(*SIZES[0], "draft"))
+        self.close = self._renderer.close
         self.user = None
-        self.pictures: dict[Refusal, list] = {}
+        self.pictures: dict[Refusal, tuple] = {}
 
     def camera(self, world):  # noqa: ARG002 - a viewer
         return None  # no pointer
 
     def show(self, world, observation, hud_state):  # noqa: ARG002 - a viewer
-        new = [refusal for refusal in self.user.tried if refusal not in self.pictures]
-        for refusal in new:
-            bare = dataclasses.replace(hud_state, message=None)
-            self.pictures[refusal] = [
-                (size, renderer.frame(world.data, hud_state), renderer.frame(world.data, bare), hud_state)
-                for size, renderer in zip(self._sizes, self._renderers, strict=True)
-            ]
-
-    def close(self):
-        for renderer in self._renderers:
-            renderer.close()
+        states = hud_state, dataclasses.replace(hud_state, message=None)
+        for refusal in self.user.tried.keys() - self.pictures.keys():
+            frames = [self._renderer.frame(world.data, state) for state in states]
+            self.pictures[refusal] = hud_state, *frames
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +70,7 @@ def refused(house, pictures):  # noqa: ARG001 - drawn once
     """A session in which everything infeasible was tried, with a picture of each refusal."""
     config = TrialConfig(objects=6, assistance="none", seed=3, fidelity="event", regret=False)
     scene = compose(trial_episode(config, house), house.catalogue)
-    photographer, user, log = Photographer(scene, house, SIZES[:1]), Clumsy(house), EventLog()
+    photographer, user, log = Photographer(scene, house), Clumsy(house), EventLog()
     session, world = prepare_session(config, house, scene, log, photographer, user=user)
     user.world, photographer.user = world, user
     session.run()
@@ -97,28 +90,27 @@ def test_every_refusal_is_caused_in_a_session(refused):
 @pytest.mark.parametrize("refusal", list(Refusal), ids=lambda refusal: refusal.value)
 def test_the_message_bar_says_why_an_attempt_is_infeasible(refused, refusal, house, pictures):
     """Its pixels are those of this refusal's text over the same frame; without it, and for others, they differ."""
-    tried, frames, _ = refused
+    tried, pictured, _ = refused
     result, compositor = tried[refusal], Compositor(pictures)
-    for size, frame, without, state in frames[refusal]:
-        rect = compositor.layout(state, *size).panels["message"]
-        bar = slice(rect.y, rect.bottom), slice(rect.x, rect.right)
-        labels = _labels(house, result)
-        said = message(refusal.value, **labels)
-        expected = compositor.compose(without, dataclasses.replace(state, message=said))
-        assert (frame[bar] == expected[bar]).all(), (state.message, said)
-        assert (frame[bar] != without[bar]).any()
-        for other in Refusal:
-            if other is not refusal:
-                words = dataclasses.replace(state, message=message(other.value, **labels))
-                assert (compositor.compose(without, words)[bar] != frame[bar]).any(), other
+    state, frame, without = pictured[refusal]
+    rect = compositor.layout(state, *SIZES[0]).panels["message"]
+    bar = slice(rect.y, rect.bottom), slice(rect.x, rect.right)
+    labels = _labels(house, result)
+
+    def saying(other):
+        words = dataclasses.replace(state, message=message(other.value, **labels))
+        return compositor.compose(without, words)[bar]
+
+    assert (frame[bar] != without[bar]).any()
+    for other in Refusal:
+        assert (saying(other) == frame[bar]).all() == (other is refusal), (state.message, other)
 
 
 def _labels(house, result):
     """What a message about a refusal names, from the catalogue."""
     if result.object is None or result.object == UNKNOWN:
         return {}
-    episode = house.sample_episode(objects=6, seed=3)
-    placed = {o.name: o for o in episode.objects}[result.object]
+    (placed,) = [o for o in house.sample_episode(objects=6, seed=3).objects if o.name == result.object]
     target = house.catalogue.categories[placed.category].receptacle
     return {
         "object": house.catalogue.objects[placed.model].label,

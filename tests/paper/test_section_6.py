@@ -6,15 +6,15 @@ import pytest
 from experiments.record.metrics import compute_metrics
 
 
+def metrics_of(played):
+    return compute_metrics(played.events, played.session.record.record().trajectory["position"])
+
+
 @pytest.fixture(params=["followed", "own_way"])
 def measured(request):
     played = request.getfixturevalue(request.param)
     positions = np.array([observation.position for observation, _ in played.shown])
-    return (
-        played,
-        positions,
-        compute_metrics(played.events, played.session.record.record().trajectory["position"]),
-    )
+    return played, positions, metrics_of(played)
 
 
 def test_task_distance_is_what_was_walked(measured):
@@ -56,21 +56,7 @@ def test_inverse_path_length_is_the_distance_between_locations_over_what_was_wal
     assert metrics.ipl_locations == pytest.approx(total / walked, rel=0.05)
 
 
-def test_completion_time_is_over_the_own_fly_through(own_way):
-    events = [
-        own_way.events[0],
-        {"t": 0.0, "event": "phase_ended", "phase": "flythrough", "duration_s": 50.0},
-        *own_way.events[1:],
-    ]
-    metrics = compute_metrics(events, own_way.session.record.record().trajectory["position"])
-    assert metrics.completion_over_familiarisation == own_way.events[-1]["t"] / 50.0
-    assert metrics.completion_time_s == own_way.events[-1]["t"]
-
-
 def test_deviations_rise_and_path_efficiency_falls_for_who_goes_an_own_way(followed, own_way):
-    one, other = (
-        compute_metrics(played.events, played.session.record.record().trajectory["position"])
-        for played in (followed, own_way)
-    )
+    one, other = metrics_of(followed), metrics_of(own_way)
     assert one.nd_strict_2n < other.nd_strict_2n
     assert one.ipl_locations > other.ipl_locations or one.task_distance_m < other.task_distance_m
