@@ -42,39 +42,30 @@ def walker(open_floor):
     return core_of(open_floor, actions="discrete", time_limit=600.0)
 
 
-def test_a_stride_is_a_quarter_of_a_metre(walker):
-    walker.reset(0)
-    for _ in range(4):
-        before = walker.state
-        after = walker.step(MOVES.index("forward")).steps[-1].observation
+@pytest.mark.parametrize(
+    ("actions", "stride", "angle"),
+    [("discrete", 0.25, 10), (Discrete(stride=0.5, angle=math.radians(30)), 0.5, 30)],
+)
+def test_strides_and_turns_are_as_long_as_asked(open_floor, actions, stride, angle):
+    core = core_of(open_floor, actions=actions, time_limit=600.0)
+    core.reset(0)
+    for _ in range(2):
+        before = core.state
+        after = core.step(MOVES.index("forward")).steps[-1].observation
         walked = after.position - before.position
         ahead = np.array([math.cos(before.heading), math.sin(before.heading)])
-        assert walked @ ahead == pytest.approx(0.25, abs=0.005)
+        assert walked @ ahead == pytest.approx(stride, abs=0.005)
         assert abs(walked @ np.array([-ahead[1], ahead[0]])) < 0.002
         assert np.linalg.norm(after.velocity) < 0.02
-
-
-@pytest.mark.parametrize(("move", "sign"), [("turn_left", 1), ("turn_right", -1)])
-def test_a_turn_is_ten_degrees(walker, move, sign):
-    walker.reset(0)
-    start = walker.state
-    for _ in range(36):
-        before = walker.state
-        walker.step(MOVES.index(move))
-        turned = math.degrees(walker.state.heading - before.heading)
-        assert turned == pytest.approx(10 * sign, abs=0.2)
-    assert math.degrees(walker.state.heading - start.heading) == pytest.approx(360 * sign, abs=2.0)
-    np.testing.assert_allclose(walker.state.position, start.position, atol=0.01)
-
-
-def test_strides_and_turns_are_options(open_floor):
-    core = core_of(open_floor, actions=Discrete(stride=0.5, angle=math.radians(30)))
-    core.reset(0)
-    start = core.state
-    core.step(0)
-    assert np.linalg.norm(core.state.position - start.position) == pytest.approx(0.5, abs=0.005)
-    core.step(1)
-    assert math.degrees(core.state.heading - start.heading) == pytest.approx(30, abs=0.3)
+    for move, sign in (("turn_left", 1), ("turn_right", -1)):
+        start = core.state
+        for _ in range(36):
+            before = core.state.heading
+            core.step(MOVES.index(move))
+            assert math.degrees(core.state.heading - before) == pytest.approx(sign * angle, abs=0.2)
+        turned = math.degrees(core.state.heading - start.heading)
+        assert turned == pytest.approx(36 * sign * angle, abs=2.0)
+        np.testing.assert_allclose(core.state.position, start.position, atol=0.01)
 
 
 def test_a_blocked_stride_ends(small_catalogue):
@@ -102,29 +93,22 @@ def test_a_discrete_attempt_lasts_until_the_hands_are_done(small_catalogue):
     assert core.state.carried == ("o0",)
 
 
-def drive(control, action, core):
-    """What the world is asked for."""
-    steps = control.steps(np.array(action), core.state, core.world)
-    asked = [next(steps)]
-    while True:
-        try:
-            asked.append(steps.send(None))
-        except StopIteration:
-            return asked
+WALK = Move(forward=1.4)
 
 
-def test_continuous_actions_are_shares_of_the_limits(walker):
+@pytest.mark.parametrize(
+    ("repeat", "action", "asked"),
+    [
+        (1, [0.5, -0.25, 1.0, 0.4], [Move(forward=0.7, left=-0.35, turn=2.5)]),
+        (1, [9.0, 0.0, -9.0, -0.4], [Move(forward=1.4, turn=-2.5)]),
+        (3, [1.0, 0.0, 0.0, 0.6], [Pick(), WALK, WALK]),
+        (2, [1.0, 0.0, 0.0, -0.6], [Place(), WALK]),
+        (1, [0.0, 0.0, 0.0, 0.0], [IDLE]),
+    ],
+)
+def test_continuous_actions_are_shares_of_the_limits_and_attempt_once(walker, repeat, action, asked):
     walker.reset(0)
-    assert drive(Continuous(), [0.5, -0.25, 1.0, 0.4], walker) == [Move(forward=0.7, left=-0.35, turn=2.5)]
-    assert drive(Continuous(), [9.0, 0.0, -9.0, -0.4], walker) == [Move(forward=1.4, turn=-2.5)]
-
-
-def test_the_trigger_attempts_once(walker):
-    walker.reset(0)
-    walk = Move(forward=1.4)
-    assert drive(Continuous(3), [1.0, 0.0, 0.0, 0.6], walker) == [Pick(), walk, walk]
-    assert drive(Continuous(2), [1.0, 0.0, 0.0, -0.6], walker) == [Place(), walk]
-    assert drive(Continuous(), [0.0, 0.0, 0.0, 0.0], walker) == [IDLE]
+    assert list(Continuous(repeat).steps(np.array(action), walker.state, walker.world)) == asked
 
 
 @pytest.mark.parametrize("action", [5, -1, 1.0, "pick", None, [0, 1]])

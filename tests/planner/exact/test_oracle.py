@@ -1,4 +1,4 @@
-"""The exact planner against a plain table of all states, on thousands of small problems with many ties."""
+"""The exact planner against a plain table of all states, on small problems with many ties."""
 
 import numba
 import numpy as np
@@ -86,24 +86,10 @@ def assert_optimal(problem, planner, length):
     return plan
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("capacity", [1, 2])
-def test_a_thousand_problems_of_each_capacity_are_solved_to_the_optimum(capacity):
-    rng = np.random.default_rng(capacity)
-    for k in range(1000):
-        problem = grid_problem(rng, 6, capacity)
-        length = expected(problem)
-        plan = assert_optimal(problem, TABLE, length)
-        if k % 2:
-            assert_optimal(problem, SEARCH, length)
-        if k % 20 == 0:
-            check(problem, plan)
-
-
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=500, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), capacity=st.integers(1, 2))
 def test_any_problem_is_solved_to_the_optimum(seed, capacity):
-    problem = grid_problem(np.random.default_rng(seed), 5, capacity)
+    problem = grid_problem(np.random.default_rng(seed), 6, capacity)
     length = expected(problem)
     for planner in (TABLE, SEARCH):
         check(problem, assert_optimal(problem, planner, length))
