@@ -1,7 +1,8 @@
-"""Episodes of the small house of conftest.py, and actions that are carried out to their end."""
+"""Episodes of the small house of conftest.py, actions carried out to their end, and objects on a bare floor."""
 
 import math
 
+import mujoco
 import numpy as np
 
 from mjsim.actions import WAIT, Move
@@ -12,6 +13,8 @@ from mjsim.options import WorldOptions
 from mjsim.world import World
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+FLOOR = """<mujoco><option timestep="0.004" integrator="implicitfast" cone="elliptic" impratio="10"/>
+<worldbody><geom name="ground" type="plane" size="5 5 1"/></worldbody></mujoco>"""
 
 
 def episode_of(catalogue, start, *placed, names="o{i}", height=0.0, seed=0):
@@ -77,3 +80,20 @@ def walk_to(world, x, y, *, heading=None, within=0.03):
         forward, left = c * offset[0] + s * offset[1], c * offset[1] - s * offset[0]
         events += world.step(Move(forward * speed, left * speed, 4.0 * error)).events
     raise AssertionError(f"did not arrive at {x}, {y}: {world.observation().position}")
+
+
+def loose(spec, path, name, height=0.0):
+    """Attach the object of a file with a free joint, the way a scene does."""
+    child = mujoco.MjSpec.from_file(str(path))
+    body = spec.worldbody.add_frame(pos=[0, 0, height]).attach_body(child.body("object"), f"{name}/", "")
+    body.add_freejoint(name=f"{name}/free")
+
+
+def dropped(path, height):
+    """State of the object of a file, `it`, 3 s after it was dropped onto a floor."""
+    spec = mujoco.MjSpec.from_string(FLOOR)
+    loose(spec, path, "it", height)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 750)
+    return data

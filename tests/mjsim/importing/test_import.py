@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mesh_files import MESHES, Y_UP, MeshFile, picture, plain
 from scipy.spatial import Delaunay
+from small_worlds import dropped
 
 from benchmarks.support.placement_sessions import arrange, run_episode
 from experiments.cli import main as cli
@@ -31,8 +32,6 @@ from mjsim.model.validation.object_rules import check_object
 from mjsim.options import WorldOptions
 
 MAKE = trimesh.creation
-FLOOR = """<mujoco><option timestep="0.004" integrator="implicitfast" cone="elliptic" impratio="10"/>
-<worldbody><geom name="ground" type="plane" size="5 5 1"/></worldbody></mujoco>"""
 
 
 @pytest.fixture(scope="module")
@@ -79,13 +78,7 @@ def test_an_imported_object_keeps_the_conventions_of_ours(imported, key):
 
 @pytest.mark.slow
 def test_an_imported_object_rests_where_it_is_put(imported, key):
-    spec = mujoco.MjSpec.from_string(FLOOR)
-    child = mujoco.MjSpec.from_file(str(imported[0].catalogue.objects[key].path))
-    body = spec.worldbody.add_frame(pos=[0, 0, 0.02]).attach_body(child.body("object"), "it/", "")
-    body.add_freejoint()
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, 750)  # 3 s
+    data = dropped(imported[0].catalogue.objects[key].path, 0.02)
     assert data.body("it/object").xmat[8] > 0.98
     assert np.linalg.norm(data.qpos[:2]) < 0.02
     assert np.linalg.norm(data.qvel[:3]) < 0.02
@@ -286,15 +279,25 @@ def test_triangles_of_an_atlas_do_not_overlap(seed, count):
 def test_the_same_file_gives_the_same_bytes(tmp_path, name):
     mesh = MESHES[name]
     path = mesh.write(tmp_path, name)
-    contents = []
+    made = []
     for folder in (tmp_path / "a", tmp_path / "b"):
         add_mesh(path, HouseExtension(folder), Entry.named(name, mesh.category), mesh.options)
-        contents.append({p.relative_to(folder): p.read_bytes() for p in sorted(folder.rglob("*.*"))})
-    assert contents[0] == contents[1]
+        made.append({path.relative_to(folder): content for path, content in contents(folder).items()})
+    assert made[0] == made[1]
 
 
-def brick(tmp_path, name="brick"):
-    return MESHES["brick"].write(tmp_path, name)
+def brick(tmp_path):
+    return MESHES["brick"].write(tmp_path, "brick")
+
+
+def add(tmp_path, own, label="brick", category="toys", *, force=False, **options):
+    """Import a brick into a house extension; the decisions."""
+    extension, entry = HouseExtension(own), Entry.named(label, category)
+    return add_mesh(brick(tmp_path), extension, entry, ImportOptions(**options), force=force)
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def run(*words):
@@ -306,24 +309,17 @@ def test_the_command_imports_reports_and_never_overwrites(tmp_path, capsys):
     assert run(*words) == 0
     out = capsys.readouterr().out
     assert "guessed from the size" in out and "catalogue.toml" in out
-    files = {p: p.read_bytes() for p in (tmp_path / "own").rglob("*.*")}
-    assert {p.name for p in files} == {
-        "catalogue.toml",
-        "look.obj",
-        "object.xml",
-        "part_0.obj",
-        "preview.png",
-        "report.json",
-    }
+    files = contents(tmp_path / "own")
+    names = ["catalogue.toml", "look.obj", "object.xml", "part_0.obj", "preview.png", "report.json"]
+    assert sorted(path.name for path in files) == names
     assert run(*words) == 2
     assert "--force" in capsys.readouterr().err
-    assert {p: p.read_bytes() for p in (tmp_path / "own").rglob("*.*")} == files
+    assert contents(tmp_path / "own") == files
     assert run(*words, "--force", "--mass", "0.5") == 0
     catalogue = Catalogue.load(str(tmp_path / "own" / "catalogue.toml"))
     assert "brick" in catalogue.categories["toys"].objects
-    assert mujoco.MjModel.from_xml_path(str(catalogue.objects["brick"].path)).body_mass[1] == pytest.approx(
-        0.5
-    )
+    model = mujoco.MjModel.from_xml_path(str(catalogue.objects["brick"].path))
+    assert model.body_mass[1] == pytest.approx(0.5)
     assert (tmp_path / "own" / "catalogue.toml").read_text(encoding="utf-8").count("[objects.brick]") == 1
 
 
@@ -351,41 +347,41 @@ def test_bad_options_are_one_line_and_leave_nothing(tmp_path, capsys, words, mes
 
 @pytest.mark.parametrize("force", [False, True])
 def test_a_failure_while_installing_leaves_all_as_it_was(tmp_path, monkeypatch, force):
-    own, entry, options = tmp_path / "own", Entry.named("brick", "toys"), ImportOptions()
-    add_mesh(brick(tmp_path), HouseExtension(own), Entry.named("first", "toys"), options)
+    own = tmp_path / "own"
+    add(tmp_path, own, "first")
     if force:
-        add_mesh(brick(tmp_path), HouseExtension(own), entry, options)
-    before = {p: p.read_bytes() for p in own.rglob("*") if p.is_file()}
+        add(tmp_path, own)
+    before, extension = contents(own), HouseExtension(own)
 
     def fail(*_):
         raise OSError("disk full")
 
-    extension = HouseExtension(own)
     monkeypatch.setattr("mjsim.importing.house_extension.Catalogue.load", fail)
     with pytest.raises(OSError, match="disk full"):
-        add_mesh(brick(tmp_path), extension, entry, ImportOptions(mass=0.4), force=force)
-    assert {p: p.read_bytes() for p in own.rglob("*") if p.is_file()} == before
+        add_mesh(
+            brick(tmp_path), extension, Entry.named("brick", "toys"), ImportOptions(mass=0.4), force=force
+        )
+    assert contents(own) == before
 
 
 def test_an_import_that_was_killed_before_the_catalogue_named_it_is_done_again(tmp_path):
-    own, entry = tmp_path / "own", Entry.named("brick", "toys")
-    file, extension = brick(tmp_path), HouseExtension(own)
+    own = tmp_path / "own"
     child = os.fork()
     if child == 0:
         house_extension.write_text_atomically = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
         try:
-            add_mesh(file, extension, entry, ImportOptions())
+            add(tmp_path, own)
         finally:
             os._exit(1)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
     assert (own / "brick").is_dir() and not (own / "catalogue.toml").exists()
-    add_mesh(file, extension, entry, ImportOptions())
+    add(tmp_path, own)
     assert "brick" in Catalogue.load(str(own / "catalogue.toml")).objects
     remove_leftovers(own, max_age=0)
     assert sorted(path.name for path in own.iterdir()) == ["brick", "catalogue.toml"]
     assert not [path for path in (own / "brick").iterdir() if path.name.startswith(".")]
     with pytest.raises(AssetError, match="already there"):
-        add_mesh(file, extension, entry, ImportOptions())
+        add(tmp_path, own)
 
 
 def test_a_folder_that_was_not_imported_is_not_replaced(tmp_path):
@@ -393,9 +389,7 @@ def test_a_folder_that_was_not_imported_is_not_replaced(tmp_path):
     (own / "brick").mkdir(parents=True)
     (own / "brick" / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(AssetError, match="is not an imported object"):
-        add_mesh(
-            brick(tmp_path), HouseExtension(own), Entry.named("brick", "toys"), ImportOptions(), force=True
-        )
+        add(tmp_path, own, force=True)
     assert (own / "brick" / "notes.txt").read_text(encoding="utf-8") == "mine"
 
 
@@ -404,14 +398,9 @@ def test_without_opengl_an_object_is_imported_without_its_picture(tmp_path, monk
         raise RenderError("no OpenGL")
 
     monkeypatch.setattr("mjsim.importing.mesh_import.write_preview", fail)
-    found = add_mesh(
-        brick(tmp_path), HouseExtension(tmp_path / "own"), Entry.named("brick", "toys"), ImportOptions()
-    )
-    assert report(found, "preview") == "none: no OpenGL"
-    assert (
-        json.loads((tmp_path / "own/brick/report.json").read_text(encoding="utf-8"))[-1]["reason"]
-        == "no OpenGL"
-    )
+    assert report(add(tmp_path, tmp_path / "own"), "preview") == "none: no OpenGL"
+    written = json.loads((tmp_path / "own/brick/report.json").read_text(encoding="utf-8"))
+    assert written[-1]["reason"] == "no OpenGL"
 
 
 def test_without_the_extra_the_command_says_what_to_install(tmp_path, monkeypatch, capsys):
@@ -422,9 +411,7 @@ def test_without_the_extra_the_command_says_what_to_install(tmp_path, monkeypatc
 
 
 def test_a_catalogue_extends_one_that_extends_another(tmp_path):
-    add_mesh(
-        brick(tmp_path), HouseExtension(tmp_path / "a"), Entry.named("Red brick", "toys"), ImportOptions()
-    )
+    add(tmp_path, tmp_path / "a", "Red brick")
     second = HouseExtension(tmp_path / "b", str(tmp_path / "a" / "catalogue.toml"))
     found = add_mesh(brick(tmp_path), second, Entry.named("Green brick", "books"), ImportOptions())
     assert report(found, "file").startswith("brick.stl")

@@ -4,6 +4,7 @@ import cv2
 import mujoco
 import numpy as np
 import pytest
+from small_worlds import FLOOR, dropped, loose
 
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
@@ -12,8 +13,6 @@ from mjsim.model.validation.receptacle_rules import check_receptacle
 from tools.authoring.objects import build_meshes
 
 CATALOGUE = Catalogue.load()
-FLOOR = """<mujoco><option timestep="0.004" integrator="implicitfast" cone="elliptic" impratio="10"/>
-<worldbody><geom name="ground" type="plane" size="5 5 1"/></worldbody></mujoco>"""
 SLOTS = [(-0.5, 0.5), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)]
 
 
@@ -34,13 +33,6 @@ def test_every_model_keeps_the_conventions():
     assert objects + bins == []
 
 
-def loose(spec, path, name, height=0.0):
-    """Attach the object of a file with a free joint, the way a scene does."""
-    child = mujoco.MjSpec.from_file(str(path))
-    body = spec.worldbody.add_frame(pos=[0, 0, height]).attach_body(child.body("object"), f"{name}/", "")
-    body.add_freejoint(name=f"{name}/free")
-
-
 def test_meshes_stay_cheap_to_draw_and_collide_in_few_parts():
     for item in CATALOGUE.objects.values():
         model = mujoco.MjModel.from_xml_path(str(item.path))
@@ -49,13 +41,9 @@ def test_meshes_stay_cheap_to_draw_and_collide_in_few_parts():
 
 
 def test_a_dropped_object_comes_to_rest_upright_and_stays(key):
-    spec = mujoco.MjSpec.from_string(FLOOR)
-    loose(spec, CATALOGUE.objects[key].path, "it", height=0.05)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, 750)  # 3 s
+    data = dropped(CATALOGUE.objects[key].path, 0.05)
     for _ in range(250):
-        mujoco.mj_step(model, data)
+        mujoco.mj_step(data.model, data)
         assert np.linalg.norm(data.qvel[:3]) < 0.02
     assert data.body("it/object").xmat[8] > 0.99  # the body's z axis is still vertical
     assert np.linalg.norm(data.qpos[:2]) < 0.02
