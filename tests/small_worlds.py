@@ -48,9 +48,10 @@ def edited(catalogue, name, old, new):
 
 def do(world, action):
     """Events of a pick or a place from its start to its end."""
+    answer = world.answer(action)
+    assert answer.applied, answer
     step = world.step(action)
-    assert step.result is not None
-    assert step.result.applied, step.result
+    assert step.result == answer
     return [*step.events, *finish(world)]
 
 

@@ -92,8 +92,9 @@ def delivered(make):
 def test_a_refusal_changes_nothing(make, fidelity, situation, action, refusal, object_name, receptacle):
     make = partial(make, fidelity=fidelity)
     asked, idle = situation(make), situation(make)
+    answer = asked.answer(action)
     step = asked.step(action)
-    assert step.result is not None
+    assert step.result == answer
     assert (step.result.refusal, step.result.object, step.result.receptacle) == (
         refusal, object_name, receptacle,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from experiments.house import House
 from experiments.web.controls import MAX_PITCH, Controls, Input, control_step
-from mjsim.actions import IDLE, ActionResult, EventKind, Move, Pick, Place, Refusal
+from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
 from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
 from mjsim.person_parameters import PersonParameters
@@ -138,28 +138,3 @@ def test_keys_pressed_within_one_control_step_are_acted_on_one_after_the_other(s
     both = (Input(number=1, press="act"), Input(number=2, press="left hand"))
     actions, *_ = steps(world, world.reset(), Controls(), both, (), ())
     assert actions == [Pick(), Pick(), IDLE]
-
-
-@pytest.mark.parametrize("fidelity", ["full", "event"])
-def test_the_world_answers_as_it_will(scene, fidelity):
-    """Before every attempt of a walk past objects and bins, also while the hands are busy."""
-    world = World(scene, WorldOptions(fidelity=fidelity))
-    seen = world.reset()
-    kinds = set()
-    for step in range(400):
-        if step % 20 == 0:
-            attempt = Pick() if step % 40 else Place()
-            before = world.state_hash()
-            expected = world.answer(attempt)
-            assert world.state_hash() == before
-            result = world.step(attempt)
-            assert result.result == expected
-            kinds.add(expected.refusal)
-        else:
-            gap = seen.object_positions[0, :2] - seen.position
-            turn = math.remainder(math.atan2(gap[1], gap[0]) - seen.heading, 2 * math.pi)
-            result = world.step(Move(forward=0.8 * (abs(turn) < 0.5), turn=3.0 * turn))
-        seen = result.observation
-        if any(event.kind is EventKind.PICKED for event in result.events):
-            break
-    assert len(kinds) >= 2

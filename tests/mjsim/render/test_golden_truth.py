@@ -134,7 +134,11 @@ def test_segmentation_and_depth_of_the_apartment_are_what_rays_hit(scene, data, 
     np.testing.assert_allclose(frame.depth[check], depths.reshape(height, width)[check], rtol=0.01, atol=0.01)
 
 
-def check_labels(scene):
+@pytest.mark.parametrize("place", ["apartment", "house whose geoms have no names"])
+def test_labels_name_who_a_geom_belongs_to(scene, small_catalogue, place):
+    if place != "apartment":
+        placed = ("ball", 1.0, 1.0), ("cube", 4.0, 1.0)
+        scene = scene_of(small_catalogue, (1.5, 2.0, 0.0), *placed, height=0.1)
     labels = Labels.of(scene)
     keys, names = tuple(scene.receptacles), scene.index.names
     assert labels.instances == ("house", "person", *keys, *names)
@@ -155,16 +159,6 @@ def check_labels(scene):
     for placed in scene.episode.objects:
         instance = labels.instances.index(placed.name)
         assert labels.categories[labels.category_of_instance[instance]] == placed.category
-
-
-def test_labels_of_the_apartment(scene):
-    check_labels(scene)
-
-
-def test_labels_of_a_house_whose_geoms_have_no_names(small_catalogue):
-    check_labels(
-        scene_of(small_catalogue, (1.5, 2.0, 0.0), ("ball", 1.0, 1.0), ("cube", 4.0, 1.0), height=0.1)
-    )
 
 
 def test_maps_and_counts_agree_with_the_geom_ids(scene, data, renderer):
