@@ -44,6 +44,12 @@ class Played:
         """What was shown first at or after a time, s."""
         return next((o, s) for o, s in self.shown if o.time >= time - 1e-6)
 
+    def lay(self, visit):
+        """Where the object of a visit was last before it was picked up, m, (2,)."""
+        name = visit["object"]
+        last = [o for o, _ in self.shown if o.time < visit["t"] - 1e-6 and name not in o.carried][-1]
+        return last.object_positions[last.object_names.index(name), :2]
+
 
 def prepared(house, config, viewer=None, **options):
     """A session, its world and its log."""

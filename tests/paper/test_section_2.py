@@ -4,9 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+from planning_cases import optimum
 from sessions import opened, play
 
 from mjsim.observation import ObjectStatus
+from planner.problem import RoutingProblem, Shipment
 
 
 def tours(played):
@@ -58,30 +60,13 @@ def test_the_plan_is_the_shortest_of_all_feasible_orders_and_open(house, capacit
     session.assistant.begin(world.reset())
     plan = next(event for event in log.events if event["event"] == "plan")
     state = session.assistant.task_state(world.observation())
-    places = {("pick", n): xy for n, xy in state.loose.items()}
-    places |= {("place", n): state.deliveries[n] for n in state.loose}
-    points = {visit: np.array(xy) for visit, xy in places.items()} | {None: np.array(state.position)}
-
-    def gap(a, b):
-        return house.geodesics.shortest_path(points[a], points[b]).geodesic_distance
-
-    gaps = {(a, b): 0.0 if a == b else gap(a, b) for a in points for b in points if b is not None}
-    best = min(
-        sum(gaps[step] for step in itertools.pairwise([None, *order]))
-        for order in itertools.permutations(places)
-        if _is_feasible(order, capacity)
-    )
+    places = [state.position, *state.loose.values(), *(state.deliveries[name] for name in state.loose)]
+    points = [np.array(place) for place in places]
+    gaps = [[house.geodesics.shortest_path(a, b).geodesic_distance for b in points] for a in points]
+    shipments = tuple(Shipment(1 + k, 4 + k) for k in range(3))
+    best = optimum(RoutingProblem(np.array(gaps), 0, shipments, (), capacity))
     assert plan["status"] == "optimal"
     assert plan["cost_m"] == pytest.approx(best, abs=2e-3)
-
-
-def _is_feasible(order, capacity):
-    carried = 0
-    for k, (kind, name) in enumerate(order):
-        carried += 1 if kind == "pick" else -1
-        if carried > capacity or (kind == "place" and ("pick", name) not in order[:k]):
-            return False
-    return True
 
 
 def test_the_hud_shows_the_shortest_path_to_the_next_visit(followed, house):

@@ -43,11 +43,8 @@ def test_inverse_path_length_is_the_distance_between_locations_over_what_was_wal
     here = played.shown[0][0].position
     total = 0.0
     for event in played.of("visit"):
-        before = [
-            o for o, _ in played.shown if o.time < event["t"] - 1e-6 and event["object"] not in o.carried
-        ]
         if event["kind"] == "pick":
-            place = before[-1].object_positions[before[-1].object_names.index(event["object"]), :2]
+            place = played.lay(event)
         else:
             place = house.receptacles[played.world.scene.episode.targets[event["object"]]].approach
         total += house.geodesics.shortest_path(here, place).geodesic_distance

@@ -78,10 +78,7 @@ def test_people_stay_within_their_limits_and_describing_more_changes_nothing_els
         ("{reach = {gamma = [1.0, 0.1]}}", "reach.gamma: Expected `float`, got `array`"),
         ("{reach = {normal = [1.0, 0.1], mean = 1.0}}", "reach: Object contains unknown field `mean`"),
         ("{reach = {uniform = [1.1, 0.9]}}", "reach: uniform takes the lowest value, then the highest"),
-        (
-            "{reach = {normal = [9.0, 0.1]}}",
-            r"reach: normal = \[9\.0, 0\.1\] has no values from 0\.6 to 1\.5",
-        ),
+        ("{reach = {normal = [9.0, 0.1]}}", r"reach: normal = .* has no values from 0\.6 to 1\.5"),
         ("{reach = {normal = [1.0, 0.1], min = 1.2, max = 1.1}}", "reach: min must not exceed max"),
         ("{reach = nan}", "reach: nan: every number must be finite"),
         ("{reach = 'far'}", "reach: Expected `float`, got `str`"),

@@ -5,13 +5,10 @@ import contextlib
 import pytest
 
 from experiments.record.records import EventLog
-from experiments.session.task_log import TaskLog
 from experiments.trials.setup import prepare_session, prepared_planner, regret_evaluator, solver_source
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
-from planner.errors import UnreachableError
-from planner.route import TaskState
-from planner.service import Mode, Planner
+from planner.service import Planner
 
 
 @pytest.mark.parametrize(("assistance", "user"), [("none", "follower"), ("highlight", "boltzmann:1")])
@@ -31,15 +28,3 @@ def test_a_run_is_the_same_whether_plans_are_made_in_a_thread_or_inline(house, a
         runs.append((log.events, recorded["log_hash"].tolist(), recorded["state_hash"].tolist()))
     assert runs[0] == runs[1]
     assert sum(event["event"] == "plan" for event in runs[0][0]) > 1, "there was no deviation"
-
-
-@pytest.mark.parametrize("mode", [Mode.INLINE, Mode.THREAD])
-def test_a_task_that_cannot_be_done_logs_nothing(house, mode):
-    config, log = TrialConfig(objects=5, assistance="none", seed=2), EventLog()
-    planner = Planner(solver_source(config, house), regret_evaluator(config, house), mode)
-    episode = house.sample_episode(objects=5, seed=2)
-    plans = TaskLog(planner, log, house, episode, capacity=2, regrets=False)
-    state = TaskState((3.0, 3.0), {"mug": (99.0, 3.0)}, (), {"mug": (3.0, 3.0)})
-    with contextlib.closing(planner), pytest.raises(UnreachableError, match="mug"):
-        plans.plan(0.0, state, episode.start, shown=False)
-    assert log.events == [] and log.content == b""
