@@ -100,14 +100,16 @@ async def send_odd(address, messages, hello):
     with suppress(ConnectionClosed, InvalidStatus, OSError, TimeoutError):
         url = f"ws://{parts.netloc}{parts.path}"
         async with connect(
-            url, origin=f"http://{parts.netloc}", max_size=None, open_timeout=PATIENCE
+            url, origin=f"http://{parts.netloc}", max_size=None, max_queue=None, open_timeout=PATIENCE
         ) as socket:
-            for message in [json.dumps(HELLO)] * hello + messages:
-                with suppress(UnicodeEncodeError):
-                    await socket.send(message)
-            await (await socket.ping())
-            while True:
-                answers.append(await asyncio.wait_for(socket.recv(), 0.5))
+            with suppress(ConnectionClosed):  # answers that came before can still be read
+                for message in [json.dumps(HELLO)] * hello + messages:
+                    with suppress(UnicodeEncodeError):
+                        await socket.send(message)
+                await (await socket.ping())
+            async with asyncio.timeout(0.5):
+                while True:
+                    answers.append(await socket.recv())
     return answers
 
 
