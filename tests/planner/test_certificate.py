@@ -15,7 +15,7 @@ from planner.checker import check
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
-from planner.solver import SOLVERS, SolveLimit, solver
+from planner.solver import SolveLimit, solver
 from planner.verifier import verify_optimal
 
 seeds = st.integers(0, 2**32 - 1)
@@ -51,18 +51,6 @@ def test_the_relaxation_of_the_search_is_found_again(seed, n, onboard):
     derived = check(problem, plan)
     assert derived == pytest.approx(certificate.root * certificate.unit)
     assert derived <= plan.lower_bound * (1 + 1e-9)
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=seeds, n=st.integers(0, 5), onboard=st.integers(0, 2), capacity=st.integers(2, 3))
-def test_few_objects_are_solved_by_the_checker_itself(seed, n, onboard, capacity):
-    problem = random_problem(seed, n, onboard, capacity=capacity)
-    for name in SOLVERS:
-        plan = solver(name).solve(problem, limit=SolveLimit(work=3))
-        optimum = check(problem, plan)
-        assert plan.cost >= optimum - 1e-9
-        if plan.status is Status.OPTIMAL:
-            assert plan.cost == pytest.approx(optimum, rel=1e-9)
 
 
 @pytest.mark.parametrize("judge", [check, verify_optimal])

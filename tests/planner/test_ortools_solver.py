@@ -53,9 +53,10 @@ def test_local_search_finds_the_optimum_of_four_objects(seed, shipments, onboard
 def test_plans_are_feasible_and_bounded_from_any_state(seed, shipments, onboard, capacity, coincide, name):
     problem = random_problem(seed, shipments, min(onboard, capacity), capacity, coincide=coincide)
     plan = solver(name).solve(problem, limit=SolveLimit(work=20))
-    check(problem, plan)
+    derived = check(problem, plan)
     assert (plan.status is Status.OPTIMAL) == (plan.lower_bound == plan.cost)
     if 0 < shipments <= 4:
+        assert derived == pytest.approx(optimum(problem)), "the checker tries every order of so few"
         assert coincide or plan.lower_bound > 0
         assert plan.lower_bound <= optimum(problem) + 1e-9
 
@@ -64,13 +65,6 @@ def test_the_same_work_gives_the_same_plan():
     problem = random_problem(5, 12, 1, bins=6)
     first, second = (solver("ortools").solve(problem, seed=1, limit=SolveLimit(work=50)) for _ in range(2))
     assert (first.visits, first.cost) == (second.visits, second.cost)
-
-
-def test_searching_on_beats_the_nearest_first():
-    problem = random_problem(2, 10, bins=6)
-    greedy = solver("greedy").solve(problem)
-    searched = solver("ortools").solve(problem, limit=SolveLimit(work=50))
-    assert searched.cost < greedy.cost
 
 
 def test_everything_in_one_place_still_ends():

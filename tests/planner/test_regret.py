@@ -3,7 +3,6 @@
 import dataclasses
 import threading
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,13 +10,8 @@ from planning_cases import optimum, random_problem
 
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
-from planner.geodesics import Geodesics
-from planner.navmesh import NavMesh
-from planner.plan import Visit, VisitKind
 from planner.regret import after, regrets
-from planner.route import TaskState
 from planner.solver import SolveLimit, solver
-from planner.task_problems import TaskProblems
 from planner.tour import possible_next
 
 seeds = st.integers(0, 2**32 - 1)
@@ -119,20 +113,6 @@ def test_a_negative_radius_and_an_impossible_visit_are_refused():
         regrets(problem, TABLE, radius=-1.0)
     with pytest.raises(ProblemError, match="not possible now"):
         after(problem, problem.pick(0))
-
-
-def test_regrets_of_a_live_task_go_by_name():
-    geodesics = Geodesics(NavMesh.build([np.array([(3, 3), (4, 3), (4, 4), (3, 4)])], (0, 0, 8, 8)))
-    loose = {"near": (1.0, 2.0), "far": (7.0, 7.0)}
-    state = TaskState((1.0, 1.0), loose, ("held",), dict.fromkeys((*loose, "held"), (1.0, 3.0)))
-    found = {r.visit: r for r in regrets(TaskProblems(geodesics).problem(state), TABLE)}
-    assert set(found) == {(VisitKind.PICK, "near"), (VisitKind.PICK, "far"), (VisitKind.PLACE, "held")}
-    assert next(iter(found)) == (VisitKind.PICK, "near")  # it lies on the way of what is held
-    assert found[Visit(VisitKind.PICK, "near")].regret == 0
-    # Place first: back for the near one, then from there to the far one instead of from the bin.
-    detour = 1 + geodesics.shortest_path(loose["near"], loose["far"]).geodesic_distance
-    direct = geodesics.shortest_path((1.0, 3.0), loose["far"]).geodesic_distance
-    assert found[Visit(VisitKind.PLACE, "held")].regret == pytest.approx(detour - direct, abs=5e-3)
 
 
 def test_regrets_can_be_given_up():

@@ -100,23 +100,6 @@ def test_of_two_tours_that_nearly_tie_the_shorter_is_taken(seed, gap, scale):
         assert plan.status is Status.OPTIMAL
 
 
-@settings(max_examples=40, deadline=None)
-@given(
-    seed=seeds,
-    n=st.integers(1, 9),
-    onboard=st.integers(0, 2),
-    factor=st.floats(1e-12, 1e12),
-    exponent=st.integers(-300, 300),
-)
-def test_scaling_the_distances_scales_the_cost_and_keeps_the_tour(seed, n, onboard, factor, exponent):
-    problem = random_problem(seed, n, onboard)
-    one, twice = (TABLE.solve(p) for p in (problem, scaled(problem, 2.0**exponent)))
-    assert (one.visits, one.cost * 2.0**exponent) == (twice.visits, twice.cost)
-    other = TABLE.solve(scaled(problem, factor))
-    assert other.cost == pytest.approx(one.cost * factor, rel=2 * TOLERANCE)
-    assert other.status is one.status is twice.status is Status.OPTIMAL
-
-
 @settings(max_examples=30, deadline=None)
 @given(
     seed=seeds,

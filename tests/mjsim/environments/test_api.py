@@ -223,6 +223,7 @@ def test_info_tells_what_happened(easy):
     env = gymnasium.make(ID, actions="discrete", **easy)
     env.reset(seed=0)
     *_, refused = env.step(PLACE)
+    assert env.unwrapped.core.state.time == pytest.approx(0.04), "nothing to wait for"
     *_, picked = env.step(PICK)
     *_, terminated, _, placed = env.step(PLACE)
     env.close()

@@ -80,19 +80,6 @@ def test_a_blocked_stride_ends(small_catalogue):
     assert not taken.terminated and not taken.truncated
 
 
-def test_a_discrete_attempt_lasts_until_the_hands_are_done(small_catalogue):
-    core = core_of(
-        episode_of(small_catalogue, (1.0, 3.2, 0.3), ("cube", 1.6, 3.1)),
-        actions="discrete",
-    )
-    core.reset(0)
-    refused = core.step(MOVES.index("place"))
-    assert len(refused.steps) == 1 and refused.info["refusal"] == "hands_empty"
-    picked = core.step(MOVES.index("pick"))
-    assert len(picked.steps) > 10 and not core.state.busy
-    assert core.state.carried == ("o0",)
-
-
 WALK = Move(forward=1.4)
 
 
