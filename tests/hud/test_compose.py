@@ -15,7 +15,7 @@ from hud.conditions import condition
 from hud.errors import FrameError
 from hud.messages import message
 from hud.panels import clock_text
-from hud.state import ChecklistItem, HudState, InventorySlot, Marker, Message, MessageKind, Pointer
+from hud.state import ChecklistItem, HudState, InventorySlot, Message, MessageKind, Pointer
 from mjsim.model.catalogue import Catalogue
 
 SIZES = ((640, 480), (1280, 720), (1920, 1080))
@@ -104,14 +104,6 @@ def test_every_part_of_the_state_shows(part):
     frame = sample.backdrop(640, 480)
     before = kept.compose(frame, optimal())
     assert not np.array_equal(before, kept.compose(frame, dataclasses.replace(optimal(), **PARTS[part])))
-
-
-def test_markers_belong_to_the_world_and_are_not_drawn_twice():
-    frame = sample.backdrop(640, 480)
-    more = dataclasses.replace(
-        optimal(), markers=(Marker("sphere", (0, 0, 0), (1, 0, 0), (1, 0, 0, 1), "goal"),)
-    )
-    assert np.array_equal(compose(frame, more, {}), compose(frame, optimal(), {}))
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -208,20 +200,6 @@ def test_tones_differ_by_more_than_their_colour():
         tone = np.array(theme.TONES[kind], dtype=np.float64)
         shapes.append(np.abs(patch - tone).max(axis=2) < 12)
     assert all((shapes[i] ^ shapes[j]).sum() > 15 for i in range(3) for j in range(i))
-
-
-def test_a_message_fades_towards_the_frame():
-    frame = sample.backdrop(640, 480)
-    drawn = [
-        compose(frame, dataclasses.replace(optimal(), message=message("replanned", opacity=o)), {}).astype(
-            int
-        )
-        for o in (1.0, 0.5, 0.0)
-    ]
-    rect = Compositor({}).layout(optimal(), 640, 480).panels["message"]
-    area = np.s_[rect.y : rect.bottom, rect.x : rect.right]
-    assert np.array_equal(drawn[2][area], frame[area])
-    assert np.abs(drawn[1][area] - (drawn[0][area] + frame[area]) / 2).max() <= 3
 
 
 @pytest.mark.parametrize("size", [*SIZES, (1024, 768), (1366, 768)])

@@ -97,22 +97,11 @@ def test_lists_are_in_the_participants_order_with_what_was_picked_crossed_out_at
         assert [r.done for r in rows] == [False] * 4 + [True] * 2
 
 
-def test_optimal_numbers_the_steps_and_highlights_the_next():
-    view = sample.task(6, steps=3)
-    rows = shown("optimal", view).checklist
-    assert [r.number for r in rows] == list(range(1, 13))
-    assert [r.done for r in rows] == [True] * 3 + [False] * 9
-    assert [r.current for r in rows] == [False] * 3 + [True] + [False] * 8
-    steps = (*view.steps_done, *view.plan)
-    for row, (kind, name) in zip(rows, steps, strict=True):
-        item = view.object(name)
-        assert row.text == item.label and row.picture == item.picture
-        if kind == "pick":
-            assert row.detail.startswith("Pick up")
-            assert (item.room in row.detail) is not row.done
-        else:
-            assert row.detail.startswith(f"Put in {view.receptacle(item.receptacle).label}")
-            assert (view.receptacle(item.receptacle).room in row.detail) is not row.done
+def test_highlight_adds_the_room_of_what_lies_about():
+    view = sample.task(24, steps=5)
+    rooms = {o.label: o.room for o in view.objects}
+    for row in shown("highlight", view).checklist:
+        assert row.detail.startswith(rooms[row.text]) is not row.done
 
 
 def test_optimal_keeps_the_order_in_which_steps_were_really_done():

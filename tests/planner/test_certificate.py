@@ -15,7 +15,7 @@ from planner.checker import check
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
-from planner.solver import SolveLimit, solver
+from planner.solver import SOLVERS, SolveLimit, solver
 from planner.verifier import verify_optimal
 
 seeds = st.integers(0, 2**32 - 1)
@@ -141,6 +141,12 @@ def test_capacities_above_two_have_an_anytime_form_too():
     plans = list(solver("exact").improve(problem))
     assert check(problem, plans[-1]) == pytest.approx(min(plan.cost for plan in plans), rel=1e-9)
     assert plans[-1].certificate.proof is Proof.SPANNING_TREE
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_hardly_any_time_still_gives_a_plan(name):
+    problem = random_problem(4, 24)
+    check(problem, solver(name).solve(problem, limit=SolveLimit(seconds=1e-6)))
 
 
 @pytest.mark.parametrize("planner", [SEARCH, solver("ortools")])

@@ -61,17 +61,6 @@ def test_regrets_add_up_to_the_detour_of_the_whole_task(geodesics, seed, planner
     assert regretted >= 0
 
 
-def test_a_regret_far_beyond_the_radius_is_exact_all_the_same(geodesics):
-    task = Task(geodesics, 12, 2)
-    table, search = RegretEvaluator(geodesics), RegretEvaluator(geodesics, solver=SEARCH, radius=0.2)
-    capped = {stop for stop, regret in search.all(task.state).items() if regret.capped}
-    assert capped
-    for stop, regret in table.all(task.state).items():
-        assert search.of(task.state, stop) == pytest.approx(regret.regret, abs=3e-3)
-        if stop in capped:
-            assert search.all(task.state)[stop].regret <= regret.regret + 3e-3
-
-
 def test_a_plan_that_is_known_to_be_best_need_not_be_found_again(geodesics):
     class Counting(ExactSolver):
         solved = 0

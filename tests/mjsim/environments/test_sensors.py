@@ -107,12 +107,17 @@ def test_gps_and_compass_are_relative_to_the_start(core):
     assert_allclose(taken.observation["compass"], [math.cos(angle), math.sin(angle)], atol=0.005)
 
 
-def test_pose_is_in_the_house(core, moved):
+def test_places_are_those_of_the_house_seen_from_the_body(core, moved):
     """The small house is 6 m x 4 m with its corner at the origin."""
     x, y, c, s = moved["pose"]
     state = core.state
     assert_allclose([x * 3 + 3, y * 2 + 2], state.position, atol=1e-5)
     assert_allclose([c, s], [math.cos(state.heading), math.sin(state.heading)], atol=1e-6)
+    for slot, position in enumerate(state.object_positions):
+        row = moved["object_positions"][slot] * scale(core)
+        assert_allclose(row, [*in_body(core, position[:2]), position[2]], atol=1e-5)
+    receptacles = [in_body(core, np.array(at)) for at in ((0.3, 3.7), (5.7, 3.6))]
+    assert_allclose(moved["receptacles"] * scale(core), receptacles, atol=1e-5)
 
 
 def test_motion_is_in_the_body_frame(core):
@@ -130,12 +135,6 @@ def test_motion_is_in_the_body_frame(core):
     assert fastest[3] == 0.0
 
 
-def test_objects_are_seen_from_the_body(core, moved):
-    for slot, position in enumerate(core.state.object_positions):
-        row = moved["object_positions"][slot] * scale(core)
-        assert_allclose(row, [*in_body(core, position[:2]), position[2]], atol=1e-5)
-
-
 def test_empty_slots_are_masked(seen):
     assert seen["object_mask"].tolist() == [1, 1, 1, 0, 0]
     for name in ("object_positions", "object_rotations", "object_status", "object_categories", "goals"):
@@ -148,11 +147,6 @@ def test_categories_are_those_of_the_catalogue(small_catalogue, seen):
     named = [keys[i] for i in seen["object_categories"][:3].argmax(axis=1)]
     assert named == [category for category, *_ in THINGS]
     assert (seen["object_categories"][:3].sum(axis=1) == 1).all()
-
-
-def test_receptacles_are_where_they_stand(core, moved):
-    expected = [in_body(core, np.array(at)) for at in ((0.3, 3.7), (5.7, 3.6))]
-    assert_allclose(moved["receptacles"] * scale(core), expected, atol=1e-5)
 
 
 def test_carrying_changes_what_is_told(core):
