@@ -116,6 +116,7 @@ def test_person_is_optional(small_catalogue):
 @pytest.mark.parametrize(
     ("name", "old", "new", "culprit"),
     [
+        ("house.xml", '"mount:tray"', '"mount:trays"', "mount:tray"),
         ("house.xml", "</mujoco>", "", "house.xml"),
         ("tray.xml", '"receptacle"', '"thing"', "tray.xml.*'receptacle'"),
         ("cube.xml", 'mass="0.2"', 'mass="0"', "cube.xml.*weighs 0 kg"),
