@@ -39,7 +39,7 @@ def test_values_of_options(read, text, value):
 )
 def test_values_that_are_none(read, texts):
     for text in texts:
-        with pytest.raises(argparse.ArgumentTypeError):
+        with pytest.raises(argparse.ArgumentTypeError, match=re.escape(text) or None):
             read(text)
 
 

@@ -37,18 +37,15 @@ def test_cells_may_be_of_unlike_size_and_share_what_all_have(tmp_path):
         assistance = "optimal"
         objects = 12
         fidelity = "full"
-        person_seeds = "10:12"
+        person_seeds = "10:13"
+        house_seeds = [4, 9]
         """,
     )
-    cells = [("none", 6, "event")] * 3 + [("optimal", 12, "full")] * 2
+    cells = [("none", 6, "event")] * 3 + [("optimal", 12, "full")] * 3
     assert [(t.assistance, t.objects, t.fidelity) for t in trials] == cells
-    assert {t.house_seed for t in trials} == {7}
-    assert [(t.person_seed, t.order_seed) for t in trials] == [(0, 0), (1, 1), (2, 2), (10, 0), (11, 1)]
-
-
-def test_several_houses_are_gone_through_again(tmp_path):
-    cell = '[[cells]]\nassistance = "none"\nobjects = 6\npeople = 5\nhouse_seeds = [4, 9]'
-    assert [t.house_seed for t in design(tmp_path, cell)] == [4, 9, 4, 9, 4]
+    assert [t.house_seed for t in trials] == [7, 7, 7, 4, 9, 4]  # gone through again
+    people = [(0, 0), (1, 1), (2, 2), (10, 0), (11, 1), (12, 2)]
+    assert [(t.person_seed, t.order_seed) for t in trials] == people
 
 
 @pytest.mark.parametrize(
@@ -64,13 +61,10 @@ def test_several_houses_are_gone_through_again(tmp_path):
         ("[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = '0:99999999999'", "more than 1000000"),
         ("[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = [-1]", "negative"),
         ("[[cells]]\nobjects = 60\nassistance = 'none'\nseeds = 1", "objects is 60; it must be 1 to 40"),
-        ("[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = 1\ncapacity = 3", "capacity is 3"),
         (
             "[[cells]]\nobjects = 6\nassistance = 'none'\nperson_seeds = [1, 1]\nhouse_seeds = 0\norder_seeds = 0",
             "2 times",
         ),
-        ("[[cells]", "is not TOML"),
-        ("x = " + "[" * 5000, "is not TOML"),
     ],
 )
 def test_an_unusable_design_is_named_with_the_path_of_the_value(tmp_path, text, fault):
@@ -81,9 +75,6 @@ def test_an_unusable_design_is_named_with_the_path_of_the_value(tmp_path, text, 
 def test_a_file_that_cannot_be_read_is_named(tmp_path):
     with pytest.raises(ConfigError, match="cannot read design"):
         read_design(tmp_path / "none.toml")
-    (tmp_path / "latin.toml").write_bytes(b"a = '\xe9'")
-    with pytest.raises(ConfigError, match="is not TOML"):
-        read_design(tmp_path / "latin.toml")
 
 
 def test_a_byte_order_mark_is_no_fault(tmp_path):

@@ -10,9 +10,16 @@ import pytest
 
 from benchmarks.play import FAST
 from benchmarks.support.play_browser import SimulatedBrowser, begin_task
-from benchmarks.support.play_server import PlayProcess, fill_disk, parent_of, resident_memory, worker_of
+from benchmarks.support.play_server import (
+    PATIENCE,
+    PlayProcess,
+    fill_disk,
+    parent_of,
+    resident_memory,
+    worker_of,
+)
 from experiments.record.phases import TASK
-from experiments.record.records import read_events
+from experiments.record.records import EVENTS, read_events
 from experiments.replay.replay import replay
 
 FAULTS_OF_A_VISIT = 12
@@ -39,12 +46,16 @@ class FaultyVisit:
             self.times.append((fault.__name__, time.perf_counter() - began))
             assert number >= self._browser.acknowledged, f"{fault.__name__} lost an acknowledged input"
             await self._browser.taken()
+        self._browser.say(type="blur", away=True)
         await self._press(3)
         await self._browser.taken()
         await self._browser.leave()
         run = self._server.visit(self._browser.address) / TASK
-        counted = [event["rows"] for event in read_events(run / "events.jsonl") if event["event"] == "scroll"]
+        events = read_events(run / EVENTS)
+        counted = [event["rows"] for event in events if event["event"] == "scroll"]
         assert counted == [self._rows[number] for number in range(1, self._browser.acknowledged + 1)]
+        assert [event["away"] for event in events if event["event"] == "blur"] == [True]
+        assert events[-1]["reason"] == "interrupted"
         assert all(verdict.verified for verdict in replay(run).verdicts)
 
     async def cut(self):
@@ -76,12 +87,16 @@ class FaultyVisit:
         return await self.kill_worker()
 
     async def kill_server(self):
+        worker = worker_of(self._journal)
         self._server.kill()
         await self._browser.until(lambda: "closed" in self._browser.last)
         await self._browser.cut()
         began = time.perf_counter()
         await asyncio.to_thread(self._server.start)
         await self._open()
+        await self._browser.until(lambda: self._browser.phase == "paused")
+        assert self._browser.last["state"]["reason"] == "disconnected"
+        assert worker_of(self._journal) != worker
         return began
 
     async def full_disk(self):
@@ -140,6 +155,9 @@ def test_faults_lose_and_double_no_acknowledged_input(tmp_path, count, words):
             visit = FaultyVisit(server, first)
             asyncio.run(visit.play(faults[first : first + FAULTS_OF_A_VISIT]))
             times += visit.times
+        server.process.send_signal(signal.SIGTERM)
+        server.process.communicate(timeout=PATIENCE)  # until its workers have closed its output as well
+        assert server.process.returncode == 128 + signal.SIGTERM
     for fault in FAULTS:
         taken = [seconds for name, seconds in times if name == fault.__name__]
         print(f"{fault.__name__}: {np.percentile(taken, 50):.2f} s, 95 %: {np.percentile(taken, 95):.2f} s")
@@ -164,11 +182,8 @@ async def _press_at_random(folder, seconds):
         while time.perf_counter() - began < seconds:
             for _ in range(100):
                 axes = {name: float(rng.choice([-1, 0, 1])) for name in ("forward", "left", "turn", "look")}
-                browser.press(
-                    **axes,
-                    press=str(rng.choice(["left hand", "right hand"])),
-                    scroll=int(rng.integers(-3, 4)),
-                )
+                hand = str(rng.choice(["left hand", "right hand"]))
+                browser.press(**axes, press=hand, scroll=int(rng.integers(-3, 4)))
                 await asyncio.sleep(float(rng.exponential(0.1)))
                 await browser.until(lambda: browser.pending < 50, 2.0)
             browser.forget()

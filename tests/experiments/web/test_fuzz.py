@@ -27,17 +27,8 @@ HELLO = {
 }
 VALUES = [None, -1, 1e308, float("nan"), "x", [], {}, True, 2**70, "\x00", "ä" * 50]
 SMALL = ['{"type":"run"}', '{"type":"takeover"}', '{"type":"leave","x":1}', "{}", "", "null"]
-FILES = (
-    "../app.py",
-    "..%2f..%2fserver%2fapp.py",
-    "%2e%2e/%2e%2e/journal.py",
-    "/etc/passwd",
-    "style.css%00",
-    "x" * 4000,
-)
-VISITS = "", "A" * 43, "%2e%2e%2fvisit.json"
-PATHS = ("/", "/visits", "/%ff%fe", "//evil.example/", "*", "http://evil.example/")
-PATHS += (*(f"/static/{path}" for path in FILES), *(f"/play/{path}" for path in VISITS))
+PATHS = ("/", "/visits", "/%ff%fe", "//evil.example/", "*", "http://evil.example/", "/play/" + "A" * 43)
+PATHS += ("/static/../app.py", "/static/..%2f..%2fapp.py", "/static/style.css%00", "/static/" + "x" * 4000)
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "TRACE", "PATCH", "CONNECT", "get", "X" * 50)
 VALUES_OF_HEADERS = {
     "Content-Length": ("-1", "9" * 20, "1e3"),
@@ -57,7 +48,7 @@ def odd_message(rng):
     """A message that is malformed, oversized, out of order or too early."""
     if rng.random() < OVERSIZED:
         return b"x" * (MAX_TEXT + int(rng.integers(1, 100)))
-    match rng.integers(8):
+    match rng.integers(5):
         case 0:
             return rng.bytes(int(rng.integers(0, 200)))
         case 1:
@@ -72,12 +63,6 @@ def odd_message(rng):
             message = dict(HELLO) if rng.random() < 0.5 else {"type": "seen", "frame": 1}
             message[str(rng.choice(list(message)))] = VALUES[rng.integers(len(VALUES))]
             return json.dumps(message)
-        case 4:
-            return "[" * int(rng.integers(1, 20000))
-        case 5:
-            return json.dumps({"type": "pause", "reason": "y" * int(rng.integers(41, 60000))})
-        case 6:
-            return json.dumps({"type": "open", "folder": "/etc", "run": "/var/x"})
     return str(rng.choice(SMALL))
 
 

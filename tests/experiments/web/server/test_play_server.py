@@ -309,6 +309,7 @@ def test_large_bodies_and_many_visits_are_refused(client):
         ('"hello"', "malformed"),
         ('{"type":"open","folder":"/","run":"/"}', "malformed"),
         ('{"type":"seen","frame":-1}', "malformed"),
+        (json.dumps({"type": "pause", "reason": "y" * 41}), "malformed"),
         ('{"type":"run","more":1}', "malformed"),
         ('{"type":"inputs","inputs":[{"number":1,"forward":2}]}', "malformed"),
         ('{"type":"inputs","inputs":[{"number":1,"forward":NaN}]}', "malformed"),
