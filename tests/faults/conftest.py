@@ -8,6 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from experiments.trials.trial_config import TrialConfig
+
+BRIEF = TrialConfig(objects=2, assistance="optimal", seed=0, fidelity="event", regret=False)
+PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}  # of `mjsim plan`
 FAST = ("--objects", "2", "--fidelity", "event", "--no-regret")
 ROOT = Path(__file__).parents[2]
 
@@ -52,6 +56,24 @@ def own_module(tmp_path, monkeypatch):
 
     yield write
     sys.modules.pop("own_code", None)
+
+
+def participant(fault, after=0):
+    """A module with a participant that walks in circles; after so many control steps, a statement goes wrong."""
+    return f"""
+import os, signal, time
+from mjsim.actions import Move
+class Own:
+    needs = frozenset()
+    count = 0
+    def act(self, percept):
+        self.count += 1
+        if self.count > {after}:
+            {fault}
+        return Move(forward=0.5, turn=0.3)
+def build(house, rng):
+    return Own()
+"""
 
 
 def one_line(text):

@@ -15,10 +15,7 @@ from experiments.record.files import read_json
 from experiments.replay.replay import replay
 from experiments.session.film_config import FilmConfig
 from experiments.trials.trial import run_trial
-from experiments.trials.trial_config import TrialConfig
-from faults.conftest import FAST
-
-CONFIG = TrialConfig(objects=2, assistance="optimal", seed=0, fidelity="event", regret=False)
+from faults.conftest import BRIEF, FAST
 
 
 @pytest.fixture
@@ -45,7 +42,7 @@ def test_a_run_on_a_full_disk_is_kept_elsewhere(size, house, small_disk, tmp_pat
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     disk = small_disk(size)
     with pytest.raises(RecordError, match=r"No space left on device.*the run is kept in (.*)") as failure:
-        run_trial(CONFIG, disk / "out", topdown=False, house=house)
+        run_trial(BRIEF, disk / "out", topdown=False, house=house)
     kept = Path(str(failure.value).rpartition(" ")[2])
     assert read_json(kept / records.METRICS)["ended"] == "all delivered"
     assert replay(kept, house=house).ended == "all delivered"
@@ -55,18 +52,12 @@ def test_a_run_on_a_full_disk_is_kept_elsewhere(size, house, small_disk, tmp_pat
 def test_a_full_disk_costs_the_video_alone(house, small_disk):
     """The video is by far the largest file."""
     disk, warnings = small_disk("400k"), []
-    metrics = run_trial(
-        CONFIG,
-        disk / "out",
-        film=FilmConfig(320, 240),
-        topdown=False,
-        house=house,
-        on_warning=warnings.append,
-    )
+    out, film = disk / "out", FilmConfig(320, 240)
+    metrics = run_trial(BRIEF, out, film=film, topdown=False, house=house, on_warning=warnings.append)
     assert metrics["ended"] == "all delivered" and metrics["frames_sha256"] is None
     assert len(warnings) == 1 and warnings[0].startswith("no video: ")
-    assert not (disk / "out" / records.VIDEO).exists()
-    assert replay(disk / "out", house=house).ended == "all delivered"
+    assert not (out / records.VIDEO).exists()
+    assert replay(out, house=house).ended == "all delivered"
 
 
 def full(*_args, **_options):
@@ -76,7 +67,7 @@ def full(*_args, **_options):
 def test_a_full_disk_at_the_floor_plan_costs_the_floor_plan_alone(house, tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.trials.trial.draw_topdown", full)
     warnings = []
-    run_trial(CONFIG, tmp_path / "out", house=house, on_warning=warnings.append)
+    run_trial(BRIEF, tmp_path / "out", house=house, on_warning=warnings.append)
     assert warnings == ["no floor plan: OSError: [Errno 28] No space left on device"]
     assert replay(tmp_path / "out", house=house).ended == "all delivered"
 
@@ -85,7 +76,7 @@ def test_where_nothing_can_be_written_that_is_said(house, tmp_path, monkeypatch)
     monkeypatch.setattr("experiments.record.export.save_arrays", full)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with pytest.raises(OSError, match="No space left"):
-        run_trial(CONFIG, tmp_path / "out", topdown=False, house=house)
+        run_trial(BRIEF, tmp_path / "out", topdown=False, house=house)
     assert list(tmp_path.iterdir()) == []
 
 

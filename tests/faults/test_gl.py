@@ -13,11 +13,8 @@ from experiments.record.files import read_json
 from experiments.replay.replay import replay
 from experiments.session.first_person import FilmConfig
 from experiments.trials.trial import run_trial
-from experiments.trials.trial_config import TrialConfig
-from faults.conftest import FAST, ROOT, one_line
+from faults.conftest import BRIEF, FAST, PROBLEM, ROOT, one_line
 from mjsim.render import context
-
-PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
 
 
 @pytest.mark.slow
@@ -112,9 +109,8 @@ def test_a_driver_that_fails_late_costs_the_pictures_alone(
     lost = Driver(context._PROCESS._gl, uses, error())
     monkeypatch.setattr(context._PROCESS, "_gl", lost)
     warnings = []
-    config = TrialConfig(objects=2, assistance="optimal", seed=0, fidelity="event", regret=False)
     out = tmp_path / "out"
-    metrics = run_trial(config, out, film=FilmConfig(160, 120), house=house, on_warning=warnings.append)
+    metrics = run_trial(BRIEF, out, film=FilmConfig(160, 120), house=house, on_warning=warnings.append)
     assert metrics["ended"] == "all delivered" and metrics["frames_sha256"] is None
     assert [warning.partition(": ")[0] for warning in warnings] == ["no video", "no floor plan"]
     assert all("\n" not in warning for warning in warnings)

@@ -17,10 +17,9 @@ from experiments.record.checksums import CHECKSUMS
 from experiments.replay.replay import replay
 from experiments.trials import trial
 from experiments.trials.trial import run_trial
-from experiments.trials.trial_config import TrialConfig
+from faults.conftest import BRIEF
 from mjsim.files import remove_leftovers
 
-CONFIG = TrialConfig(objects=2, assistance="optimal", seed=0, fidelity="event", regret=False)
 CASES = int(os.environ.get("MJSIM_KILL_CASES", "1"))  # for each command, of four kills each
 FAST = ("--objects", "6", "--fidelity", "event", "--no-regret")
 COMMANDS = {
@@ -131,7 +130,7 @@ def test_a_run_killed_at_its_floor_plan_has_it_whole_or_not_at_all(step, after, 
     child = os.fork()
     if child == 0:
         try:
-            run_trial(CONFIG, tmp_path / "out", house=house)
+            run_trial(BRIEF, tmp_path / "out", house=house)
         finally:
             os._exit(1)
     _, status = os.waitpid(child, 0)

@@ -8,11 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli.failures import INTERNAL_ERROR
+from experiments.cli.failures import INTERNAL_ERROR, _report_text
 from experiments.cli.main import main
-from faults.conftest import ROOT, one_line
-
-PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
+from faults.conftest import PROBLEM, ROOT, one_line
 
 
 @pytest.fixture
@@ -53,23 +51,21 @@ def test_an_error_is_one_line(error, code, said, problem, tmp_path, capsys, monk
 
 def test_a_report_says_what_is_needed_and_no_secrets(problem, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("API_TOKEN", "sesame-1")
+    monkeypatch.setenv("API_TOKEN", "sesame")
     monkeypatch.setattr("experiments.cli.failures.exit_code", lambda _: None)
-    with pytest.raises(SystemExit):
-        main(["plan", problem, "--no-such-token", "sesame-2"])  # argparse refuses before anything runs
     assert main(["plan", problem + ".gone", "--planner", "greedy"]) == INTERNAL_ERROR
     report = Path(capsys.readouterr().err.split()[-1]).read_text()
     assert "Traceback" in report and "--planner greedy" in report and "mujoco 3." in report
-    assert "sesame" not in report
-
-
-def test_secrets_on_the_command_line_are_left_out():
-    from experiments.cli.failures import _report_text
-
-    text = _report_text(
-        ValueError("x"), ["serve", "--api-token", "sesame", "--password=sesame", "--port", "1"]
-    )
-    assert "sesame" not in text and "--port 1" in text
+    words = [
+        "serve",
+        "--api-token",
+        "sesame",
+        "--password=sesame",
+        "--port",
+        "1",
+    ]  # no command of today has a secret
+    report += _report_text(ValueError("x"), words)
+    assert "sesame" not in report and "--port 1" in report
 
 
 @pytest.mark.parametrize("words", [[], ["--no-such"], ["run"], ["run", "--out"], ["plan", "a", "b"], ["fly"]])

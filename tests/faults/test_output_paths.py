@@ -9,8 +9,7 @@ from experiments.cli.main import main
 from experiments.errors import RecordError
 from experiments.record.records import EPISODE, EVENTS, METRICS
 from experiments.record.run_directory import run_directory
-
-PROBLEM = {"distances": [[0, 1], [1, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}
+from faults.conftest import PROBLEM, one_line
 
 
 def fill_run(folder):
@@ -82,10 +81,9 @@ def refused(words, tmp_path, capsys, codes=(1, 2)):
     """The line with which a command refuses to write; everything is as it was."""
     before = tree(tmp_path)
     assert main([str(word) for word in words]) in codes
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1 and lines[0].startswith("mjsim: ")
+    line = one_line(capsys.readouterr().err)
     assert tree(tmp_path) == before
-    return lines[0]
+    return line
 
 
 @pytest.mark.parametrize("force", [[], ["--force"]], ids=["", "force"])

@@ -15,25 +15,9 @@ from experiments.record.writer import RecordWriter
 from experiments.replay.replay import replay
 from experiments.session.signals import PATIENCE, Stopped, signals_postponed, signals_raised
 from experiments.trials.trial import run_trial
-from experiments.trials.trial_config import TrialConfig
-from faults.conftest import FAST, ROOT, one_line
+from faults.conftest import BRIEF, FAST, ROOT, one_line, participant
 from mjsim.files import WORK
 
-PARTICIPANT = """
-import os, signal, time
-from mjsim.actions import Move
-class Own:
-    needs = frozenset()
-    count = 0
-    def act(self, percept):
-        self.count += 1
-        if self.count == 50:
-            os.kill(os.getpid(), signal.{name})
-            time.sleep({seconds})
-        return Move(forward=0.5, turn=0.3)
-def build(house, rng):
-    return Own()
-"""
 RUN = ("run", *FAST, "--no-video", "--no-floor-plan", "--assistance", "none", "--user", "own_code:build")
 
 
@@ -43,7 +27,9 @@ RUN = ("run", *FAST, "--no-video", "--no-floor-plan", "--assistance", "none", "-
 )
 def test_a_run_that_is_stopped_is_kept(name, seconds, house, tmp_path, mjsim, own_module):
     """Also where the participant hangs, and so never comes to an end by itself."""
-    own_module(PARTICIPANT.format(name=name, seconds=seconds))
+    own_module(
+        participant(f"if self.count == 50: os.kill(os.getpid(), signal.{name}); time.sleep({seconds})")
+    )
     done = mjsim(*RUN, "--out", "out")
     assert done.returncode == 128 + signal.Signals[name]
     assert "Traceback" not in done.stderr
@@ -113,10 +99,7 @@ def test_a_batch_that_is_stopped_writes_its_tables(number, tmp_path):
 
 
 def test_a_worker_that_is_killed_is_one_line(tmp_path, mjsim, own_module):
-    own_module(
-        "import os, signal\nclass Killer:\n    needs = frozenset()\n    def act(self, percept):\n"
-        "        os.kill(os.getpid(), signal.SIGKILL)\ndef build(house, rng):\n    return Killer()\n"
-    )
+    own_module(participant("os.kill(os.getpid(), signal.SIGKILL)"))
     words = ("--assistance", "none", "--user", "own_code:build", "--workers", "1", "--seeds", "0:4")
     done = mjsim("batch", *FAST, *words, "--out", "out")
     assert done.returncode == 1
@@ -127,8 +110,7 @@ def test_a_worker_that_is_killed_is_one_line(tmp_path, mjsim, own_module):
 def test_a_signal_in_the_very_first_step_leaves_one_state(house, tmp_path, monkeypatch):
     """Where a step takes so long that the signal cannot wait, it comes before the step is recorded."""
     monkeypatch.setattr(RecordWriter, "append", stopped_once(RecordWriter.append))
-    config = TrialConfig(objects=2, assistance="optimal", seed=0, regret=False)
-    assert run_trial(config, tmp_path / "out", topdown=False, house=house)["ended"] == "interrupted"
+    assert run_trial(BRIEF, tmp_path / "out", topdown=False, house=house)["ended"] == "interrupted"
     assert replay(tmp_path / "out", house=house).steps == 1
 
 
