@@ -115,7 +115,7 @@ def test_what_cannot_be_derived_is_not_claimed_by_the_checker():
     ],
 )
 def test_plans_only_get_better_and_end_with_the_solution(planner, n, work):
-    problem, limit = random_problem(5, n, 1), SolveLimit(work=work)
+    problem, limit = random_problem(5, n, 1), SolveLimit(work=work, stop=threading.Event())
     plans = list(planner.improve(problem, seed=1, limit=limit))
     solution = planner.solve(problem, seed=1, limit=limit)
     for plan in plans:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from planning_cases import optimum, random_problem
 
@@ -50,6 +50,7 @@ def test_local_search_finds_the_optimum_of_four_objects(seed, shipments, onboard
     coincide=st.booleans(),
     name=st.sampled_from(["ortools", "greedy"]),
 )
+@example(seed=0, shipments=0, onboard=0, capacity=1, coincide=False, name="greedy")
 def test_plans_are_feasible_and_bounded_from_any_state(seed, shipments, onboard, capacity, coincide, name):
     problem = random_problem(seed, shipments, min(onboard, capacity), capacity, coincide=coincide)
     plan = solver(name).solve(problem, limit=SolveLimit(work=20))

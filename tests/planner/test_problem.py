@@ -58,10 +58,6 @@ def test_malformed_problems_are_refused_by_name(changes, fault):
         problem(**changes)
 
 
-def test_a_right_plan_passes():
-    check(problem(), GOOD)
-
-
 @pytest.mark.parametrize(
     ("changes", "capacity", "fault"),
     [

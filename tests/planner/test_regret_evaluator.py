@@ -61,6 +61,15 @@ def test_regrets_add_up_to_the_detour_of_the_whole_task(geodesics, seed, planner
     assert regretted >= 0
 
 
+def test_a_regret_far_beyond_the_radius_is_exact_all_the_same(geodesics):
+    state = Task(geodesics, 12, 2).state
+    table, search = RegretEvaluator(geodesics), RegretEvaluator(geodesics, solver=SEARCH, radius=0.2)
+    capped = [stop for stop, regret in search.all(state).items() if regret.capped]
+    assert capped
+    for stop in capped:
+        assert search.of(state, stop) == pytest.approx(table.of(state, stop), abs=3e-3)
+
+
 def test_a_plan_that_is_known_to_be_best_need_not_be_found_again(geodesics):
     class Counting(ExactSolver):
         solved = 0
