@@ -137,7 +137,8 @@ def test_highlight_has_a_flagpole_over_every_misplaced_object_and_no_other(highl
 def test_flagpoles_are_seen_through_walls_dimmed(starts, size, assistance):
     """Every pole in the field of view has pixels; those of hidden objects change the picture less."""
     world, observation, state = starts[assistance]
-    seen = set(visible_objects(world.scene, world.data, observation.eye, observation.heading))
+    gaze = observation.eye, observation.heading, observation.pitch
+    seen = set(visible_objects(world.scene, world.data, *gaze))
     field = FieldOfView.of(world.scene.person)
     change = {True: [], False: []}
     with Renderer(world.scene.model, width=size[0], height=size[1], profile="draft") as renderer:
@@ -145,10 +146,7 @@ def test_flagpoles_are_seen_through_walls_dimmed(starts, size, assistance):
         for name in observation.object_names:
             pole = [m for m in state.markers if m.object == name and m.role == FLAGPOLE]
             top = max(pole, key=lambda m: m.position[2])
-            ahead = in_field_of_view(
-                [top.position], observation.eye, observation.heading, observation.pitch, field
-            )
-            if not ahead[0]:
+            if not in_field_of_view([top.position], *gaze, field)[0]:
                 continue
             difference = np.abs(renderer.rgb(world.data, markers=pole).astype(int) - plain).max(axis=2)
             assert (difference > 8).any(), f"{name} has no pole in the picture"

@@ -120,7 +120,11 @@ def test_effects_and_orders_of_a_study_are_those_of_its_score(seed):
 def test_effects_of_populations_are_those_of_large_pools():
     table, outcome = study(3, dict.fromkeys(ROWS.sizes, 5_000))
     found = population_effects(outcome, SIZES)[0]
+    steps = {"deviations": -1.0, "ipl": 0.5, "distance": -0.5, "time": 0.0}  # in standard deviations
+    places = np.arange(3) - SIZES @ np.arange(3) / SIZES.sum()
     for k, test in enumerate(ROWS.tests):
+        noncentrality = steps[test.measure] ** 2 * (SIZES @ places**2)
+        assert found[k] == pytest.approx(noncentrality / (noncentrality + SIZES.sum()), abs=0.01)
         assert found[k] == pytest.approx(population_eta_squared(table, read_published(), test), abs=1e-3)
 
 
@@ -195,9 +199,8 @@ def test_what_counts_is_identified_and_what_does_not_is_not(monkeypatch):
     contraction = dict(zip(TRUTH, found.fit.contraction().tolist(), strict=True))
     assert contraction["share"] > 0.5 > 0.4 > abs(contraction["idle"])
     sensitivity = found.fit.sensitivity()
-    assert (
-        abs(sensitivity[0, 0]) > 0.9 > 0.4 > abs(sensitivity[1, :3]).max()
-    )  # nothing of either is in the times
+    # Nothing of either is in the times.
+    assert abs(sensitivity[0, 0]) > 0.9 > 0.4 > abs(sensitivity[1, :3]).max()
     assert len(found.fit.kept) == 40
     again = calibrate([table_of(pool())], FREE, read_published(), draws=800, seed=0)
     assert np.array_equal(again.fit.distance, found.fit.distance)
@@ -254,11 +257,8 @@ def test_controls_change_what_they_name_and_leave_the_rest_of_the_population():
     design = type(design)(tuple(replace(t, behaviour=given) for t in design.trials))
     controls = {control.name: control.design.trials for control in read_controls(design)}
     (trial, *_) = controls["everyone-complies"]
-    assert trial.behaviour.as_dict() == {
-        "compliance.follows": 1.0,
-        "compliance.quits": 0.0,
-        "timing.guided_step": 9.0,
-    }
+    obedient = {"compliance.follows": 1.0, "compliance.quits": 0.0}
+    assert trial.behaviour.as_dict() == given.as_dict() | obedient
     assert all(not t.behaviour for t in controls["follower"])
     assert {t.assistance for t in controls["nearest"]} == {"highlight"}
     assert all(len(trials) == 24 for name, trials in controls.items() if name != "nearest")

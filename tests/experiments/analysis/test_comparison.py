@@ -22,17 +22,10 @@ def row(assistance, seed, value, **options):
     return settings | dict.fromkeys(METRICS, value) | {"ended": "all delivered"}
 
 
-def batch(folder, values, **options):
+def batch(folder, values):
     """A batch folder with the table of these values: condition -> value by seed."""
-    write_tables(
-        folder,
-        [
-            row(name, seed, v, **options)
-            for name, by_seed in values.items()
-            for seed, v in enumerate(by_seed)
-            if v is not ...
-        ],
-    )
+    cells = ((name, seed, v) for name, by_seed in values.items() for seed, v in enumerate(by_seed))
+    write_tables(folder, [row(*cell) for cell in cells if cell[2] is not ...])
     return folder
 
 

@@ -100,11 +100,8 @@ def test_verdicts_need_evidence():
     few = {name: rng.normal(size=8) for name in "ab"}
     many = {name: rng.normal(size=400) for name in "ab"}
     apart = {"a": rng.normal(size=50), "b": rng.normal(3, 1, 50)}
-    assert [compare_pairs(d, 0.5)[0].verdict for d in (few, many, apart)] == [
-        "undecided",
-        "equivalent",
-        "different",
-    ]
+    verdicts = [compare_pairs(data, 0.5)[0].verdict for data in (few, many, apart)]
+    assert verdicts == ["undecided", "equivalent", "different"]
 
 
 def test_hedges_g_by_its_formula():

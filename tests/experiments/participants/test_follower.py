@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sessions import prepared
 
-from experiments.participants import DEFAULT_PARTICIPANT, participant
+from experiments.participants import DEFAULT_PARTICIPANT
 from experiments.trials.trial_config import TrialConfig
 
 
@@ -24,9 +24,8 @@ def test_it_does_as_well_as_the_specialist_to_the_bit(house, assistance, user):
     assert played(house, assistance=assistance)[:2] == played(house, assistance=assistance, user=user)[:2]
 
 
-def test_it_is_the_default_and_needs_nothing():
+def test_it_is_the_default():
     assert TrialConfig(objects=6, assistance="none", seed=0).user == DEFAULT_PARTICIPANT == "follower"
-    assert participant("follower") is not participant("searcher")
 
 
 @pytest.mark.parametrize("assistance", ["none", "highlight", "optimal"])

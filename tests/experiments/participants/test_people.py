@@ -10,6 +10,7 @@ import pytest
 import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from experiments.cli.main import main
 from experiments.errors import ConfigError, ReplayError
@@ -120,11 +121,9 @@ quick_follower.person = {"walking_speed": {"uniform": [1.5, 1.6]}, "reading_time
 
 def test_a_participant_says_how_it_differs_and_the_configuration_has_the_last_word():
     user = f"{__name__}:quick_follower"
-    slow = Distributions.of({"reading_time": 2.0})
-    said, told = (
-        draw_person(TrialConfig(objects=2, assistance="optimal", seed=0, user=user, person=p))
-        for p in (Distributions(), slow)
-    )
+    config = TrialConfig(objects=2, assistance="optimal", seed=0, user=user)
+    slow = replace(config, person=Distributions.of({"reading_time": 2.0}))
+    said, told = draw_person(config), draw_person(slow)
     assert 1.5 <= said.walking_speed == told.walking_speed <= 1.6
     assert (said.reading_time, told.reading_time) == (1.0, 2.0)
 
