@@ -25,15 +25,10 @@ from experiments.errors import StatisticsError
 EXACT = {"rel": 1e-8, "abs": 1e-12}
 
 
-def groups(seed=0, sizes=(40, 37, 42), means=(0.0, 0.1, 0.8), spreads=(1.0, 1.5, 0.7)):
-    rng = np.random.default_rng(seed)
-    cases = zip(("none", "highlight", "optimal"), sizes, means, spreads, strict=True)
+def groups(sizes=(40, 37, 42)):
+    rng = np.random.default_rng(0)
+    cases = zip(("none", "highlight", "optimal"), sizes, (0.0, 0.1, 0.8), (1.0, 1.5, 0.7), strict=True)
     return {name: rng.normal(mean, spread, size) for name, size, mean, spread in cases}
-
-
-def factors(sizes=SIZES):
-    cells = [cell for cell, count in sizes.items() for _ in range(count)]
-    return np.array([a for a, _ in cells]), np.array([n for _, n in cells])
 
 
 @pytest.mark.parametrize(
@@ -57,7 +52,8 @@ def test_one_factor_is_analysed_as_by_scipy(test, smallest, expected):
 
 @pytest.mark.parametrize("kind", [2, 3])
 def test_two_factors_are_analysed_as_by_statsmodels(kind):
-    first, second = factors()
+    cells = [cell for cell, count in SIZES.items() for _ in range(count)]
+    first, second = (np.array([cell[k] for cell in cells]) for k in (0, 1))
     values = np.random.default_rng(1).normal(size=447) + (first == "optimal") + 0.02 * second
     data = pd.DataFrame({"y": values, "a": first, "b": second})
     table = anova_lm(ols("y ~ C(a, Sum) * C(b, Sum)", data).fit(), typ=kind)
