@@ -41,19 +41,6 @@ def test_one_failing_trial_does_not_stop_the_others(tmp_path, monkeypatch):
     assert any("nothing to go for" in (r.failure or "") for r in reports)
 
 
-@pytest.mark.parametrize(
-    ("design", "fault"),
-    [
-        ({"seeds": []}, "at least one value for --seeds"),
-        ({"objects": [6, 6]}, "--objects names a value twice"),
-        ({"assistance": []}, "at least one value for --assistance"),
-    ],
-)
-def test_a_design_that_makes_no_sense_is_refused(design, fault):
-    with pytest.raises(ConfigError, match=fault):
-        factorial(**{"objects": [6], "assistance": ["none"], "users": ["follower"], "seeds": [0], **design})
-
-
 def test_a_batch_needs_a_worker(tmp_path):
     with pytest.raises(ConfigError, match="at least one worker, got 0"):
         run_batch(

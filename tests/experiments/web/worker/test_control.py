@@ -1,7 +1,5 @@
 """The state machine of a session, and the inputs that wait for it."""
 
-import threading
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -54,17 +52,11 @@ def test_only_transitions_of_the_table_happen(triggers):
 
 def test_what_is_sent_again_counts_once():
     _, control = after()
-    for numbers in ((1, 2), (1, 2, 3), (3,), (4,)):
-        control.add([Input(number=number) for number in numbers])
-    assert [new.number for new in control.take_inputs()] == [1, 2, 3, 4]
-    assert control.take_inputs() == () and control.state.input == 4
-
-
-def test_a_restored_session_continues_its_numbers():
-    _, control = after()
     control.apply(Trigger.RESTORED, "disconnected", last=7)
-    control.add([Input(number=7), Input(number=8)])
-    assert [new.number for new in control.take_inputs()] == [8]
+    for numbers in ((7, 8), (8, 9, 10), (10,), (11,)):
+        control.add([Input(number=number) for number in numbers])
+    assert [new.number for new in control.take_inputs()] == [8, 9, 10, 11]
+    assert control.take_inputs() == () and control.state.input == 11
     assert control.state.reason == "disconnected"
 
 
@@ -75,12 +67,3 @@ def test_pauses_and_blurs_are_noted_in_order_with_their_time():
     notes = control.take_notes()
     assert [event for event, _ in notes] == ["pause", "blur", "resume"]
     assert all(fields["wall"] > 0.0 for _, fields in notes) and control.take_notes() == []
-
-
-def test_a_thread_that_waits_sees_the_change():
-    _, control = after(Trigger.OPENED)
-    waiting = threading.Thread(target=control.wait_for_change, args=(READY, 60.0))
-    waiting.start()
-    control.apply(Trigger.RUN)
-    waiting.join(10.0)
-    assert not waiting.is_alive()
