@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import queue
 import threading
+import time
 from contextlib import suppress
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
@@ -19,6 +20,7 @@ SETTINGS = {
     "LP_NUM_THREADS": "1",  # of software rendering; many workers share the machine
 }
 END_TIMEOUT = 5.0  # s that a process has to end
+RETRY = 0.1  # s until a worker is asked for again
 
 
 class WorkerProcess:
@@ -83,11 +85,15 @@ class WorkerPool:
         forkserver.ensure_running()
 
     async def start(self) -> WorkerProcess:
-        """A new worker."""
-        try:
-            return await asyncio.to_thread(WorkerProcess, asyncio.get_running_loop())
-        except EOFError as error:
-            raise OSError("the fork server ended") from error
+        """A new worker. A fork server that was just killed still takes connections, until another one replaces it."""
+        until = time.monotonic() + END_TIMEOUT
+        while True:
+            try:
+                return await asyncio.to_thread(WorkerProcess, asyncio.get_running_loop())
+            except (EOFError, ConnectionError) as error:
+                if time.monotonic() > until:
+                    raise OSError("the fork server ended") from error
+            await asyncio.sleep(RETRY)
 
     def discard(self, worker: WorkerProcess) -> None:
         """End a worker, without waiting for that."""

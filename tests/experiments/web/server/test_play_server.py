@@ -19,6 +19,7 @@ from experiments.web.protocol import Frame, Inputs, Leave, Open, Pause, Run, Sav
 from experiments.web.server.app import PlayConfig, PlayServer
 from experiments.web.server.guards import allowed_hosts
 from experiments.web.server.played_session import MAX_CRASHES
+from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
 from experiments.web.server.visits import VISIT, Visits, token_hash
 from experiments.web.state import Trigger
 
@@ -330,9 +331,8 @@ def test_a_bad_message_gets_a_typed_error_and_stops_nothing(client, message, cod
 
 
 def test_messages_may_come_too_early(client):
-    before_hello = ({"type": "run"}, inputs(1), {"type": "seen", "frame": 1}, {"type": "takeover"})
     with connected(client, new_visit(client)) as socket:
-        for message in before_hello:
+        for message in ({"type": "run"}, inputs(1), {"type": "seen", "frame": 1}, {"type": "takeover"}):
             socket.send_json(message)
             assert socket.receive_json()["code"] == "too early"
         socket.send_json(hello())
@@ -406,6 +406,24 @@ def test_workers_that_die_again_and_again_are_not_replaced_for_ever(client, pool
                 pool.workers[-1].die()
             until_phase(socket, "loading" if len(pool.workers) < MAX_CRASHES else "failed")
             assert pool.discarded[crash] is pool.workers[crash]
+
+
+def test_a_fork_server_that_was_just_killed_costs_no_session(monkeypatch):
+    faults = iter([EOFError, ConnectionResetError])
+
+    def worker(_loop):
+        for fault in faults:
+            raise fault
+        return "worker"
+
+    monkeypatch.setattr("experiments.web.server.pool.WorkerProcess", worker)
+    for name in (*SETTINGS, HOUSE):
+        monkeypatch.setenv(name, "")  # is put back afterwards
+    assert asyncio.run(WorkerPool("apartment").start()) == "worker"
+    faults = iter(lambda: EOFError, None)
+    monkeypatch.setattr("experiments.web.server.pool.END_TIMEOUT", 0.3)
+    with pytest.raises(OSError, match="the fork server ended"):
+        asyncio.run(WorkerPool("apartment").start())
 
 
 def test_beyond_the_limit_people_wait_in_a_queue(client):
