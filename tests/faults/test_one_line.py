@@ -56,24 +56,23 @@ def test_a_report_says_what_is_needed_and_no_secrets(problem, tmp_path, capsys, 
     assert main(["plan", problem + ".gone", "--planner", "greedy"]) == INTERNAL_ERROR
     report = Path(capsys.readouterr().err.split()[-1]).read_text()
     assert "Traceback" in report and "--planner greedy" in report and "mujoco 3." in report
-    words = [
-        "serve",
-        "--api-token",
-        "sesame",
-        "--password=sesame",
-        "--port",
-        "1",
-    ]  # no command of today has a secret
-    report += _report_text(ValueError("x"), words)
+    # No command of today has a secret.
+    report += _report_text(
+        ValueError("x"), ["fly", "--api-token", "sesame", "--password=sesame", "--port", "1"]
+    )
     assert "sesame" not in report and "--port 1" in report
 
 
-@pytest.mark.parametrize("words", [[], ["--no-such"], ["run"], ["run", "--out"], ["plan", "a", "b"], ["fly"]])
+@pytest.mark.parametrize(
+    "words",
+    ["", "--no-such", "run", "run --out", "plan a b", "fly", "play --port 70000", "play --sessions 0"],
+)
 def test_a_command_line_that_is_none(words, capsys):
     with pytest.raises(SystemExit) as stop:
-        main(words)
+        main(words.split())
     assert stop.value.code == 2
-    assert "--help" in one_line(capsys.readouterr().err)
+    line = one_line(capsys.readouterr().err)
+    assert "--help" in line and ("is not a number from" in line) == words.startswith("play")
 
 
 @pytest.mark.parametrize(

@@ -66,12 +66,19 @@ def test_the_overview_names_every_command():
         (["run", "--planner", "oracle", "--no-video"], "unknown solver 'oracle'"),
         (["run", "--house", "castle", "--no-video"], "no house 'castle'"),
         (["run", "--profile", "sepia"], "no render profile 'sepia'"),
+        (["play", "--user", "follower"], "belongs to `mjsim run`"),
+        (["play", "--assistance", "nonsense"], "no assistance condition"),
+        (["play", "--objects", "0"], "objects is 0"),
+        (["play", "--film", "nothing.mp4"], "there is no film"),
+        (["play", "--public-url", "ftp://x"], "must be of the form"),
+        (["play", "--host", "no.such.host.invalid"], "name another --port (0 for any) or --host"),
         (["batch", "--seeds", "1,1"], "--seeds names a value twice"),
         (["batch", "--assistance", ","], "at least one value for --assistance"),
     ],
 )
 def test_bad_input_is_named_in_one_line_and_leaves_nothing(arguments, fault, tmp_path, capsys):
-    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
+    code = 1 if "--host" in arguments else 2
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == code
     message = capsys.readouterr().err.strip().splitlines()[-1]
     assert message.startswith("mjsim: ")
     assert fault in message

@@ -65,14 +65,6 @@ def fill(folder):
     (folder / METRICS).write_text("{}")
 
 
-def test_a_run_directory_appears_whole(tmp_path):
-    with run_directory(tmp_path / "run") as folder:
-        fill(folder)
-        assert not (tmp_path / "run").exists()
-    assert (tmp_path / "run" / EPISODE).is_file()
-    assert [p.name for p in tmp_path.iterdir()] == ["run"]
-
-
 def test_a_complete_record_is_kept_even_where_something_fails_afterwards(tmp_path):
     with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run") as folder:
         fill(folder)
@@ -80,15 +72,17 @@ def test_a_complete_record_is_kept_even_where_something_fails_afterwards(tmp_pat
     assert (tmp_path / "run" / METRICS).is_file()
 
 
-def test_a_run_replaces_an_earlier_one_unless_it_fails(tmp_path):
+def test_a_run_appears_whole_and_replaces_an_earlier_one_unless_it_fails(tmp_path):
     for text in ("first", "second"):
         with run_directory(tmp_path / "run", replace=True) as folder:
             fill(folder)
             (folder / METRICS).write_text(text)
+            assert (tmp_path / "run").exists() is (text == "second")
     with pytest.raises(ZeroDivisionError), run_directory(tmp_path / "run", replace=True) as folder:
         (folder / EVENTS).write_text("third")
         raise ZeroDivisionError
     assert (tmp_path / "run" / METRICS).read_text() == "second"
+    assert (tmp_path / "run" / EPISODE).is_file()
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
