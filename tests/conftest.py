@@ -1,5 +1,8 @@
 """Fixtures shared by the tests: the apartment as shipped, and a small house written for tests."""
 
+import signal
+import sys
+
 import pytest
 from hypothesis import settings
 
@@ -56,6 +59,30 @@ def episode(catalogue, navmesh):
 def scene(episode, catalogue):
     """The composed `episode`; do not change it."""
     return compose(episode, catalogue)
+
+
+@pytest.fixture(autouse=True)
+def signals_as_in_a_terminal():
+    """Under `nohup`, and in the background of a shell, tests would inherit that signals are ignored."""
+    defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in defaults.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def own_module(tmp_path, monkeypatch):
+    """Makes a module of a user's own importable, here and in commands that run in the folder of the test."""
+
+    def write(text, name="own_code"):
+        (tmp_path / f"{name}.py").write_text(text)
+        monkeypatch.syspath_prepend(str(tmp_path))
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        return name
+
+    yield write
+    sys.modules.pop("own_code", None)
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from msgspec import structs
+from user_code import participant
 
 from experiments.cli.main import main
 from experiments.errors import UserCodeError
@@ -13,7 +14,7 @@ from experiments.record.files import read_json
 from experiments.record.records import read_events
 from experiments.replay.replay import replay
 from experiments.trials.trial import run_trial
-from faults.conftest import BRIEF, FAST, one_line, participant
+from faults.conftest import BRIEF, FAST, one_line
 
 CONDITION = """
 from hud.conditions.none import hud_state as shown

@@ -92,7 +92,10 @@ def test_every_damage_is_noticed(run, other, house, tmp_path_factory, name, resu
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_missing_file_is_noticed(copy, house, name):
+def test_half_a_file_and_none_are_noticed(copy, house, name):
+    content = (copy / name).read_bytes()
+    (copy / name).write_bytes(content[: len(content) // 2])
+    fault_of(copy, house)
     (copy / name).unlink()
     fault_of(copy, house)
 

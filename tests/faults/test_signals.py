@@ -7,6 +7,7 @@ import sys
 import time
 
 import pytest
+from user_code import participant
 
 from experiments.record import records
 from experiments.record.files import read_json
@@ -15,7 +16,7 @@ from experiments.record.writer import RecordWriter
 from experiments.replay.replay import replay
 from experiments.session.signals import PATIENCE, Stopped, signals_postponed, signals_raised
 from experiments.trials.trial import run_trial
-from faults.conftest import BRIEF, FAST, ROOT, one_line, participant
+from faults.conftest import BRIEF, FAST, ROOT, one_line
 from mjsim.files import WORK
 
 RUN = ("run", *FAST, "--no-video", "--no-floor-plan", "--assistance", "none", "--user", "own_code:build")

@@ -53,10 +53,7 @@ def test_deviations_over_all_visits_of_the_task_and_over_those_with_a_choice():
     metrics = measured(*CHOICES, objects=2)
     assert metrics.nd_strict_2n == pytest.approx(1 / 4)
     assert metrics.nd_feasible == pytest.approx(1 / 3)
-
-
-def test_an_unfinished_task_still_has_two_visits_per_object():
-    assert measured(CHOICES[0], objects=6).nd_strict_2n == pytest.approx(1 / 12)
+    assert measured(CHOICES[0], objects=6).nd_strict_2n == pytest.approx(1 / 12), "also of an unfinished task"
 
 
 def test_without_any_choice_there_are_no_deviations():
@@ -103,13 +100,6 @@ def test_where_nobody_judged_there_is_no_regret_to_speak_of():
     assert (metrics.regretful_visits, metrics.unjudged_visits) == (0, 2)
 
 
-def test_completion_time_is_that_of_the_last_delivery():
-    placed = [{"t": t, "event": "placed"} for t in (5.0, 11.5)]
-    metrics = measured(*placed, end=11.5)
-    assert (metrics.completion_time_s, metrics.delivered) == (11.5, 2)
-    assert metrics.completion_over_familiarisation is None
-
-
 def test_completion_time_over_the_own_familiarisation():
     metrics = measured(
         {"t": 0.0, "event": "phase_ended", "phase": "flythrough", "duration_s": 80.0}, end=20.0
@@ -117,22 +107,24 @@ def test_completion_time_over_the_own_familiarisation():
     assert metrics.completion_over_familiarisation == 0.25
 
 
-def test_an_unfinished_trial_takes_until_its_end():
-    metrics = measured({"t": 5.0, "event": "placed"}, end=60.0, reason="time limit")
-    assert (metrics.completion_time_s, metrics.ended) == (60.0, "time limit")
+def test_completion_time_is_that_of_the_last_delivery_or_of_the_end():
+    placed = [{"t": t, "event": "placed"} for t in (5.0, 11.5)]
+    whole = measured(*placed, end=11.5)
+    assert (whole.completion_time_s, whole.delivered) == (11.5, 2)
+    assert whole.completion_over_familiarisation is None
+    unfinished = measured(placed[0], end=60.0, reason="time limit")
+    assert (unfinished.completion_time_s, unfinished.ended) == (60.0, "time limit")
 
 
-def test_an_object_that_falls_out_again_is_not_delivered():
-    assert measured({"t": 1.0, "event": "placed"}, {"t": 2.0, "event": "dislodged"}).delivered == 0
-
-
-def test_refusals_replans_and_failures_are_counted():
+def test_refusals_replans_and_failures_are_counted_and_what_falls_out_again_is_not_delivered():
     metrics = measured(
         {"t": 1.0, "event": "attempt", "applied": False},
         {"t": 2.0, "event": "attempt", "applied": True},
         {"t": 3.0, "event": "pick_failed"},
         {"t": 4.0, "event": "grip_lost"},
         {"t": 5.0, "event": "plan", "cost_m": 9.0},
+        {"t": 6.0, "event": "placed"},
+        {"t": 7.0, "event": "dislodged"},
     )
-    assert (metrics.refusals, metrics.replans, metrics.failures) == (1, 1, 2)
+    assert (metrics.refusals, metrics.replans, metrics.failures, metrics.delivered) == (1, 1, 2, 0)
     assert (metrics.planned_distance_m, metrics.reach_bound_m) == (3.0, 1.0)

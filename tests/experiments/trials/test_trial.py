@@ -7,6 +7,7 @@ import sys
 import av
 import numpy as np
 import pytest
+from user_code import participant
 
 from experiments.record import records
 from experiments.record.files import read_json
@@ -125,19 +126,8 @@ def test_an_interrupted_trial_keeps_what_was_done(fidelity, house, tmp_path):
     assert replay(tmp_path / "run", house=house).ended == "interrupted"
 
 
-def test_participants_see_only_what_their_condition_shows(house, tmp_path, monkeypatch):
-    """A spy in place of the participant, loaded by its dotted name as a user's own would be."""
-    config = TrialConfig(objects=6, assistance="none", seed=0, user="trial_spy:build", time_limit=0.2)
-    (tmp_path / "trial_spy.py").write_text(
-        "from mjsim.actions import IDLE\n"
-        "class Spy:\n"
-        "    needs = frozenset()\n"
-        "    def act(self, percept):\n"
-        "        assert percept.guidance is None and not percept.flagpoles\n"
-        "        assert percept.hud().markers == ()\n"
-        "        return IDLE\n"
-        "def build(house, rng):\n"
-        "    return Spy()\n"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
+def test_participants_see_only_what_their_condition_shows(house, tmp_path, own_module):
+    seen = "percept.guidance, [*percept.flagpoles], percept.hud().markers"
+    own_module(participant(f"assert ({seen}) == (None, [], ())"))
+    config = TrialConfig(objects=6, assistance="none", seed=0, user="own_code:build", time_limit=0.2)
     assert run_trial(config, tmp_path / "run", topdown=False, house=house)["ended"] == "time limit"

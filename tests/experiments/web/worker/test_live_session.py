@@ -30,16 +30,9 @@ def wandering(seed: int, steps: int):
         batch = []
         for _ in range(rng.integers(0, 3) if rng.random() < 0.2 else 0):
             number += 1
-            press = rng.choice([None, None, "act", "left hand"])
-            batch.append(
-                Input(
-                    number=number,
-                    forward=float(rng.choice([0.0, 1.0, 1.0])),
-                    yaw=float(rng.normal(0.0, 0.7)),
-                    press=None if press is None else str(press),
-                    scroll=int(rng.choice([0, 0, 0, 2, -1])),
-                )
-            )
+            axes = {"forward": float(rng.choice([0.0, 1.0, 1.0])), "yaw": float(rng.normal(0.0, 0.7))}
+            press = str(rng.choice(["", "", "act", "left hand"])) or None
+            batch.append(Input(number=number, **axes, press=press, scroll=int(rng.choice([0, 0, 0, 2, -1]))))
         yield batch
 
 
