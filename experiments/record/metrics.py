@@ -42,7 +42,9 @@ class Metrics:
     Attributes:
         ended: Why the trial ended.
         delivered: Objects in their receptacle at the end.
-        nd_strict_2n: Visits that differ from the suggested next one, over two per object of the task.
+        visits: Successful picks and places.
+        nd_strict_2n: Visits that differ from the suggested next one, over two per object of the task; None, as are
+            the other deviations and inverse path lengths, where no visit was made.
         nd_feasible: Visits that differ from the suggested next one, over the visits at which another one was feasible;
             0 when there was never a choice.
         nd_bin_tied: As `nd_feasible`, but which of two objects goes first into the same bin is no choice.
@@ -73,12 +75,13 @@ class Metrics:
 
     ended: str | None
     delivered: int
-    nd_strict_2n: float
-    nd_feasible: float
-    nd_bin_tied: float
+    visits: int
+    nd_strict_2n: float | None
+    nd_feasible: float | None
+    nd_bin_tied: float | None
     nd_regret_10cm: float | None
-    ipl_locations: float
-    ipl_stand: float
+    ipl_locations: float | None
+    ipl_stand: float | None
     task_distance_m: float
     completion_time_s: float
     completion_over_familiarisation: float | None
@@ -134,12 +137,13 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
     return Metrics(
         ended=events[-1].get("reason"),
         delivered=_count(events, "placed") - _count(events, "dislodged"),
-        nd_strict_2n=_over(_deviations(visits), 2 * events[0]["objects"]),
-        nd_feasible=_over(_deviations(_choices(visits)), len(_choices(visits))),
-        nd_bin_tied=_nd_bin_tied(visits),
+        visits=len(visits),
+        nd_strict_2n=_over(_deviations(visits), 2 * events[0]["objects"]) if visits else None,
+        nd_feasible=_over(_deviations(_choices(visits)), len(_choices(visits))) if visits else None,
+        nd_bin_tied=_nd_bin_tied(visits) if visits else None,
         nd_regret_10cm=_nd_regret(visits, regrets),
-        ipl_locations=_over(sum(v["location_m"] for v in visits), walked, empty=1.0),
-        ipl_stand=_over(sum(v["geodesic_m"] for v in visits), walked, empty=1.0),
+        ipl_locations=_path_length(visits, "location_m", walked),
+        ipl_stand=_path_length(visits, "geodesic_m", walked),
         task_distance_m=walked,
         completion_time_s=end,
         completion_over_familiarisation=_over_familiarisation(events, end),
@@ -171,6 +175,10 @@ def _count(events: Sequence[Event], *kinds: str) -> int:
 
 def _over(part: float, whole: float, empty: float = 0.0) -> float:
     return part / whole if whole > 0 else empty
+
+
+def _path_length(visits: Sequence[Event], between: str, walked: float) -> float | None:
+    return _over(sum(visit[between] for visit in visits), walked, empty=1.0) if visits else None
 
 
 def _choices(visits: Sequence[Event]) -> list[Event]:

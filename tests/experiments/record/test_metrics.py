@@ -61,6 +61,13 @@ def test_without_any_choice_there_are_no_deviations():
     assert (metrics.nd_feasible, metrics.nd_bin_tied, metrics.nd_strict_2n) == (0.0, 0.0, 0.0)
 
 
+def test_who_makes_no_visit_has_neither_the_best_score_nor_any():
+    metrics = measured(end=60.0, reason="time limit")
+    scores = ("nd_strict_2n", "nd_feasible", "nd_bin_tied", "nd_regret_10cm", "ipl_locations", "ipl_stand")
+    assert metrics.visits == 0
+    assert [getattr(metrics, name) for name in scores] == [None] * 6
+
+
 def test_the_order_within_a_bin_is_forgiven_and_no_choice():
     tied = {"deviated": True, "tied": True, "tied_alternatives": 1}
     only_tied = visit(1, **tied, alternatives=1)  # hands full of two things for one bin

@@ -199,6 +199,16 @@ def test_a_visit_from_the_story_to_the_result(client, pool):
     assert [opened.config["objects"] for opened in asked] == [1, 6]
 
 
+def test_who_did_nothing_has_a_result_without_a_path_efficiency(client, pool, monkeypatch):
+    for name in ("ipl_stand", "total_regret_m"):
+        monkeypatch.setitem(METRICS, name, None)
+    link = new_visit(client)
+    go_through(client, link)
+    answer = client.get(link)
+    assert answer.status_code == 200
+    assert "Your result" in answer.text and "Path efficiency" not in answer.text
+
+
 def test_a_film_comes_first_where_there_is_one(tmp_path, pool):
     film = tmp_path / "film.mp4"
     film.write_bytes(b"0123456789")
