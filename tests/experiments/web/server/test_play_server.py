@@ -199,7 +199,7 @@ def test_a_visit_from_the_story_to_the_result(client, pool):
     assert [opened.config["objects"] for opened in asked] == [1, 6]
 
 
-def test_who_did_nothing_has_a_result_without_a_path_efficiency(client, pool, monkeypatch):
+def test_who_did_nothing_has_a_result_without_a_path_efficiency(client, monkeypatch):
     for name in ("ipl_stand", "total_regret_m"):
         monkeypatch.setitem(METRICS, name, None)
     link = new_visit(client)
