@@ -211,11 +211,11 @@ class PauseEvent(LoggedEvent, frozen=True):
     """The clock was stopped.
 
     Attributes:
-        reason: `hidden` (the tab), `disconnected`, `asked` or `taken over`.
+        reason: `hidden` (the tab), `disconnected`, `silent` (no sign of life of the page), `asked` or `taken over`.
         wall: When, s since 1970.
     """
 
-    reason: str
+    reason: Literal["asked", "hidden", "disconnected", "silent", "taken over"]
     wall: float
 
 
@@ -238,6 +238,56 @@ class BlurEvent(LoggedEvent, frozen=True):
     """
 
     away: bool
+    wall: float
+
+
+class DisplayEvent(LoggedEvent, frozen=True):
+    """How well the person saw the session in the last 5 s, as the page measured it.
+
+    Attributes:
+        renderer: What drew the picture.
+        width: Width of the view, px of the page.
+        height: Its height, px of the page.
+        pixel_ratio: How many px of the screen one px of the page has.
+        frames_per_s: Pictures shown a second.
+        frame_ms: Median of the times between two pictures.
+        frame_ms_95: 95 % of these times are shorter.
+        latency_ms: Median from an input to the picture that shows it; null where nothing was pressed.
+        dropped: Pictures that came and were not shown.
+        wall: When, s since 1970.
+    """
+
+    renderer: str
+    width: Count
+    height: Count
+    pixel_ratio: float
+    frames_per_s: float
+    frame_ms: float
+    frame_ms_95: float
+    latency_ms: float | None
+    dropped: Count
+    wall: float
+
+
+class GapEvent(LoggedEvent, frozen=True):
+    """The page was silent; from 1 s on the clock stood and nothing was held.
+
+    Attributes:
+        seconds: For how long, s.
+        wall: When it was heard again, s since 1970.
+    """
+
+    seconds: float
+    wall: float
+
+
+class RestartedEvent(LoggedEvent, frozen=True):
+    """The process that simulates the session had died; another one continued from the last state on the disk.
+
+    Attributes:
+        wall: When, s since 1970.
+    """
+
     wall: float
 
 

@@ -8,7 +8,8 @@ from mjsim.actions import EventKind, WorldEvent
 from mjsim.observation import Observation
 
 WORLD_EVENTS = {kind.value: kind for kind in EventKind}
-EXTERNAL_EVENTS = ("scroll", "overrun", "pause", "resume", "blur")  # that come from outside of the simulation
+# that come from outside of the simulation
+EXTERNAL_EVENTS = ("scroll", "overrun", "pause", "resume", "blur", "display", "gap", "restarted")
 
 
 def catch_up(assistant: Assistant, observation: Observation, events: Sequence[Event]) -> None:

@@ -18,14 +18,18 @@ MAX_TEXT = 64 * 1024  # bytes of a message from the browser
 MAX_INPUTS = 64  # of one message
 FRAME_HEAD = struct.Struct("<BBBBHHIIQf")
 CODECS = {"jpeg": 1, "h264": 2}
+BEAT_PERIOD = 0.5  # s between two signs of life, both ways
+MAX_SILENCE = 1.0  # s without a message after which the link counts as lost
+DISPLAY_PERIOD = 5.0  # s between two messages `display`
 KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # codes with which the server closes
 
 Codec = Literal["jpeg", "h264", "none"]
-PauseReason = Literal["asked", "hidden", "disconnected", "taken over"]
+PauseReason = Literal["asked", "hidden", "disconnected", "silent", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
 Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # px
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+Measured = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 
 
 class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
@@ -67,6 +71,31 @@ class Seen(WireMessage, frozen=True):
     """The browser has shown a frame, by its number."""
 
     frame: Count
+
+
+class Beat(WireMessage, frozen=True):
+    """A sign of life, twice a second both ways. After 1 s without any message from the page the clock is stopped."""
+
+
+class Display(WireMessage, frozen=True):
+    """How well the person saw the session in the last 5 s; this is only logged.
+
+    `renderer` is what drew the picture, in words; `width` and `height` are those of the view, px of the page, and
+    `pixel_ratio` is how many px of the screen one of them has. `frames_per_s` counts the pictures that were shown,
+    `frame_ms` and `frame_ms_95` are median and 95 % of the times between two of them, `latency_ms` the median from an
+    input to the picture that shows it, absent where nothing was pressed, and `dropped` counts the pictures that came
+    and were not shown.
+    """
+
+    renderer: Annotated[str, msgspec.Meta(max_length=200)]
+    width: Length
+    height: Length
+    pixel_ratio: Annotated[float, msgspec.Meta(gt=0.0, le=100.0)]
+    frames_per_s: Measured
+    frame_ms: Measured
+    frame_ms_95: Measured
+    dropped: Count
+    latency_ms: Measured | None = None
 
 
 class Pause(WireMessage, frozen=True):
@@ -193,9 +222,9 @@ class Error(WireMessage, frozen=True):
     message: str
 
 
-FromBrowser = Hello | TakeOver | Run | Inputs | View | Seen | Pause | Blur | Leave
-ToBrowser = State | Taken | Snapshot | Text | Busy | Saved | Queue | Occupied | Replaced | Error
-ToWorker = Open | Run | Inputs | View | Seen | Pause | Blur | Leave
+FromBrowser = Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave
+ToBrowser = State | Taken | Snapshot | Text | Busy | Beat | Saved | Queue | Occupied | Replaced | Error
+ToWorker = Open | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave
 FromWorker = State | Taken | Frame | Snapshot | Text | Busy | Saved
 
 decode_from_browser: Any = msgspec.json.Decoder(FromBrowser).decode

@@ -47,10 +47,10 @@ class SessionControl:
                     self._inputs.append(new)
                     self.state = msgspec.structs.replace(self.state, input=new.number)
 
-    def note_blur(self, away: bool) -> None:
-        """Note that the page lost the keyboard, or got it back."""
+    def note(self, event: str, **fields: Any) -> None:
+        """Note something that the page told, for the log."""
         with self._changed:
-            self._note("blur", away=away)
+            self._note(event, **fields)
 
     def take_inputs(self) -> tuple[Input, ...]:
         """All inputs since the last call."""

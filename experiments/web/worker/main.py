@@ -8,13 +8,27 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import SimpleQueue
 
+import msgspec
+
 from experiments.record import records
 from experiments.record.run_directory import is_run
 from experiments.session.endings import INTERRUPTED
 from experiments.session.user_code import describe
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
-from experiments.web.protocol import Blur, Inputs, Leave, Open, Pause, Run, Saved, Seen, View, WireMessage
+from experiments.web.protocol import (
+    Blur,
+    Display,
+    Inputs,
+    Leave,
+    Open,
+    Pause,
+    Run,
+    Saved,
+    Seen,
+    View,
+    WireMessage,
+)
 from experiments.web.state import Trigger
 from experiments.web.worker import houses
 from experiments.web.worker.clock import Clock
@@ -70,7 +84,9 @@ class Worker:
             case Leave():
                 self._control.apply(Trigger.END, INTERRUPTED)
             case Blur(away):
-                self._control.note_blur(away)
+                self._control.note("blur", away=away)
+            case Display():
+                self._control.note("display", **msgspec.structs.asdict(message))
             case View():
                 self._viewer.set_view(message)
             case Seen(frame) if self._viewer.drawer is not None:

@@ -1,7 +1,7 @@
 // Types and constants of docs/protocol.md, made by `make client-protocol`; change them in experiments/web/protocol.py.
 
 /** @typedef {"jpeg" | "h264" | "none"} Codec */
-/** @typedef {"asked" | "hidden" | "disconnected" | "taken over"} PauseReason */
+/** @typedef {"asked" | "hidden" | "disconnected" | "silent" | "taken over"} PauseReason */
 /** @typedef {"loading" | "ready" | "running" | "paused" | "over" | "failed"} Phase */
 /** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; snapshots?: boolean }} View How a page wants to see the session: size in px, how frames are compressed, whether snapshots are sent. */
 /** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page, which may reconnect, its trial and its view. */
@@ -10,7 +10,9 @@
 /** @typedef {{ number: number; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input A change at the keyboard, the mouse, a gamepad or a touch screen. */
 /** @typedef {{ type: "inputs"; inputs: Array<Input> }} Inputs What the person pressed, in order, each once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen The browser has shown a frame, by its number. */
-/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "taken over" }} Pause Stop the clock; the reason is logged. */
+/** @typedef {{ type: "beat" }} Beat A sign of life, twice a second both ways. After 1 s without any message from the page the clock is stopped. */
+/** @typedef {{ type: "display"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null }} Display How well the person saw the session in the last 5 s; this is only logged. */
+/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "silent" | "taken over" }} Pause Stop the clock; the reason is logged. */
 /** @typedef {{ type: "blur"; away: boolean }} Blur The page lost the keyboard to another window, or got it back; this is only logged. */
 /** @typedef {{ type: "leave" }} Leave End the trial now. */
 /** @typedef {{ type: "state"; phase: Phase; reason: string; input: number }} State The state of the session, why it is paused, over or failed, and the number of the last input that it received. */
@@ -32,13 +34,16 @@
 /** @typedef {{ type: "replaced" }} Replaced Another page took the session over; this connection is closed. */
 /** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was refused and does not count: a code, and the reason in words. */
 /** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} Frame A frame of a view, by number from 1: the start of a control step, the last input that counts, and the picture. */
-/** @typedef {Hello | TakeOver | Run | Inputs | View | Seen | Pause | Blur | Leave} FromBrowser */
-/** @typedef {State | Taken | Snapshot | Text | Busy | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
+/** @typedef {Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave} FromBrowser */
+/** @typedef {State | Taken | Snapshot | Text | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
 
 export const FRAME_HEAD_BYTES = 28;
 /** @type {Record<number, Codec>} */
 export const CODECS = { 1: "jpeg", 2: "h264" };
 export const MAX_INPUTS = 64;
+export const BEAT_PERIOD = 0.5;
+export const MAX_SILENCE = 1.0;
+export const DISPLAY_PERIOD = 5.0;
 export const KEY_FLAG = 1;
 export const REFUSED = 4000;
 export const REPLACED = 4001;

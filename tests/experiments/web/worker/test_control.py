@@ -62,7 +62,7 @@ def test_what_is_sent_again_counts_once():
 
 def test_pauses_and_blurs_are_noted_in_order_with_their_time():
     _, control = after(Trigger.OPENED, Trigger.RUN, Trigger.PAUSE)
-    control.note_blur(True)
+    control.note("blur", away=True)
     control.apply(Trigger.RUN)
     notes = control.take_notes()
     assert [event for event, _ in notes] == ["pause", "blur", "resume"]
