@@ -24,18 +24,20 @@ def write(file, text="precious"):
 
 
 NOTES = "notes.txt"
+
+
+def fill_batch(folder):
+    fill_run(folder / "trials" / "one")
+    write(folder / "trials.csv", "objects\n")
+
+
 STATES = {  # by name: what makes the state of a path
     "run": [fill_run],
     "run with notes": [fill_run, lambda path: write(path / NOTES)],
     "notes": [lambda path: write(path / NOTES)],
-    "batch": [
-        lambda path: fill_run(path / "trials" / "one"),
-        lambda path: write(path / "trials.csv", "objects\n"),
-    ],
-    "tables of others": [
-        lambda path: (path / "trials").mkdir(parents=True),
-        lambda path: write(path / "trials.csv"),
-    ],
+    "batch": [fill_batch],
+    "strange batch": [fill_batch, lambda path: write(path / "trials" / "mine" / NOTES)],
+    "tables of others": [lambda path: write(path / "trials.csv"), lambda path: (path / "trials").mkdir()],
     "file": [write],
     "dangling link": [lambda path: path.symlink_to(path.with_name("nowhere"))],
     "loop": [lambda path: path.symlink_to(path)],
@@ -46,7 +48,6 @@ STATES = {  # by name: what makes the state of a path
     "pipe": [os.mkfifo],
     "below a file": [write],
 }
-STATES["strange batch"] = [*STATES["batch"], lambda path: write(path / "trials" / "mine" / NOTES)]
 
 
 def make(state, path):

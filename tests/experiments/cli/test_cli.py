@@ -73,6 +73,7 @@ def test_the_overview_names_every_command():
         (["play", "--public-url", "ftp://x"], "must be of the form"),
         (["play", "--host", "no.such.host.invalid"], "name another --port (0 for any) or --host"),
         (["batch", "--seeds", "1,1"], "--seeds names a value twice"),
+        (["batch", "--seeds", "0", "--workers", "0"], "at least one worker, got 0"),
         (["batch", "--assistance", ","], "at least one value for --assistance"),
     ],
 )

@@ -429,10 +429,7 @@ def test_a_replay_that_fails_leaves_no_film(film, house, tmp_path):
     ("arguments", "fault"),
     [
         (["--camera", "free"], "a camera needs a film"),
-        (
-            ["--video", "x.mp4", "--camera", "top-down", "--eye", "1,2,3"],
-            "only --camera free takes --eye and --target",
-        ),
+        (["--video", "x.mp4", "--camera", "top-down", "--eye", "1,2,3"], "only --camera free takes --eye"),
         (["--video", "x.mp4", "--profile", "sepia"], "no render profile 'sepia'"),
         (["--assistance", "telepathy"], "no assistance condition 'telepathy'"),
     ],

@@ -60,18 +60,6 @@ class FaultyVisit:
         self._browser.reload()
         return await self._open()
 
-    async def second_tab(self):
-        first, second = self._browser, SimulatedBrowser(self._browser.address)
-        began = time.perf_counter()
-        await second.open(TASK)
-        await second.until(lambda: "occupied" in second.last)
-        second.say(type="takeover")
-        await first.until(lambda: "replaced" in first.last)
-        await first.close()
-        second.acknowledged = first.acknowledged
-        self._browser = second
-        return began
-
     async def kill_worker(self):
         return self._hit_worker(lambda worker: os.kill(worker, signal.SIGKILL))
 
@@ -123,7 +111,6 @@ class FaultyVisit:
 FAULTS = (
     FaultyVisit.cut,
     FaultyVisit.reload,
-    FaultyVisit.second_tab,
     FaultyVisit.kill_worker,
     FaultyVisit.kill_fork_server,
     FaultyVisit.kill_server,
@@ -134,7 +121,7 @@ FAULTS = (
 @pytest.mark.parametrize(
     ("count", "words"),
     [
-        (7, FAST),
+        (6, FAST),
         pytest.param(120, FAST, marks=pytest.mark.slow),
         pytest.param(80, (), marks=pytest.mark.slow),
     ],

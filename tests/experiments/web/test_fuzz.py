@@ -30,16 +30,8 @@ SMALL = ['{"type":"run"}', '{"type":"takeover"}', '{"type":"leave","x":1}', "{}"
 PATHS = ("/", "/visits", "/%ff%fe", "//evil.example/", "*", "http://evil.example/", "/play/" + "A" * 43)
 PATHS += ("/static/../app.py", "/static/..%2f..%2fapp.py", "/static/style.css%00", "/static/" + "x" * 4000)
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "TRACE", "PATCH", "CONNECT", "get", "X" * 50)
-VALUES_OF_HEADERS = {
-    "Content-Length": ("-1", "9" * 20, "1e3"),
-    "Host": ("evil.example",),
-    "Origin": ("null",),
-    "Range": ("bytes=9999999-1", "bytes=0-0,1-1,2-2"),
-    "Upgrade": ("websocket", "h2c"),
-    "Cookie": ("c" * 3000,),
-    "": ("no name",),
-}
-HEADERS = [f"{name}: {value}" for name, values in VALUES_OF_HEADERS.items() for value in values]
+HEADERS = ["Content-Length: -1", "Content-Length: 1e3", "Host: evil.example", "Origin: null", "Upgrade: h2c"]
+HEADERS += ["Range: bytes=9999999-1", "Range: bytes=0-0,1-1,2-2", "Cookie: " + "c" * 3000, ": no name"]
 HEADERS += ["Transfer-Encoding: chunked", "If-Modified-Since: never", "Connection: Upgrade", "no colon"]
 HEADERS += ["Sec-WebSocket-Version: 99", "Expect: 100-continue", "Accept-Encoding: \xff\xfe"]
 

@@ -313,7 +313,6 @@ def test_large_bodies_and_many_visits_are_refused(client):
     [
         (b"\0" * 100, "malformed"),
         ("", "malformed"),
-        ("{", "malformed"),
         ("[" * 50000, "malformed"),
         ('"hello"', "malformed"),
         ('{"type":"open","folder":"/","run":"/"}', "malformed"),
@@ -492,25 +491,12 @@ def test_frames_have_a_fixed_head():
     assert protocol.FRAME_HEAD.unpack(data[:28]) == (1, 2, 1, 0, 640, 480, 7, 8, 2**40, 12.5)
 
 
-def documented(section):
-    """Fields by type of message, as a table of docs/protocol.md has them."""
+def test_the_protocol_is_documented():
     text = (Path(__file__).parents[4] / "docs" / "protocol.md").read_text("utf-8")
-    table = text.split(f"## {section}\n")[1].split("\n## ")[0]
-    rows = [row.split("|") for row in table.splitlines() if row.startswith("| `")]
-    return {row[1].strip(" `"): set(re.findall(r"`(\w+)`", row[2])) for row in rows if len(row) > 4}
-
-
-@pytest.mark.parametrize(
-    ("section", "union"), [("From the client", protocol.FromBrowser), ("From the server", protocol.ToBrowser)]
-)
-def test_the_protocol_is_documented(section, union):
-    types = {kind.__struct_config__.tag: set(kind.__struct_fields__) for kind in union.__args__}
-    found = documented(section)
-    assert {name: found[name] for name in types} == types
-
-
-def test_documented_close_codes_and_limits_are_those_of_the_code():
-    text = (Path(__file__).parents[4] / "docs" / "protocol.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \| ([^|]*)\|", text, re.MULTILINE))
+    for kind in (*protocol.FromBrowser.__args__, *protocol.ToBrowser.__args__):
+        fields = set(re.findall(r"`(\w+)`", rows[kind.__struct_config__.tag]))
+        assert fields == set(kind.__struct_fields__)
     for code in (protocol.REFUSED, protocol.REPLACED, protocol.IDLE, protocol.TOO_MUCH, protocol.SLOW):
         assert str(code) in text
     assert set(re.findall(r"`([a-z ]+)` \(", text)) >= {"malformed", "too early", "out of order", "too much"}
