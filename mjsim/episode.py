@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from mjsim.errors import EpisodeError, brief
-from mjsim.files import write_text_atomically
+from mjsim.files import read_json, read_text, write_text_atomically
 
 FORMAT_VERSION = 1
 CAPACITY = 2  # PAPER section 2: the knapsack of the study
@@ -98,10 +98,12 @@ class Episode:
                 raise EpisodeError(
                     f"episode format {found!r} is not {FORMAT_VERSION}; sample it again with this version"
                 )
-            return msgspec.json.decode(text, type=cls)
+            episode = msgspec.json.decode(text, type=cls)
+            _check_fields(read_json(text))
+            return episode
         except msgspec.ValidationError as error:
             raise EpisodeError(f"episode is malformed: {error}; sample it again") from error
-        except (msgspec.DecodeError, RecursionError) as error:
+        except (ValueError, RecursionError) as error:
             raise EpisodeError(f"episode is not JSON: {error}") from error
 
     def save(self, path: Path) -> None:
@@ -116,7 +118,7 @@ class Episode:
             EpisodeError: The file is missing or malformed; the message names the file.
         """
         try:
-            return cls.from_json(path.read_text(encoding="utf-8"))
+            return cls.from_json(read_text(path))
         except OSError as error:
             raise EpisodeError(f"cannot read episode {path}: {error.strerror}") from error
         except UnicodeDecodeError as error:
@@ -129,3 +131,13 @@ class Episode:
 
 class _Header(msgspec.Struct):
     format: Any = None
+
+
+def _check_fields(raw: dict[str, Any]) -> None:
+    """Raise an EpisodeError where an episode of JSON values holds what nobody reads."""
+    tables = [(Episode, "episode", raw), (StartPose, "start", raw["start"])]
+    tables += [(PlacedObject, f"objects[{k}]", table) for k, table in enumerate(raw["objects"])]
+    for kind, place, table in tables:
+        known = {"format", *(field.name for field in dataclasses.fields(kind))}
+        if unknown := sorted(set(table) - known):
+            raise EpisodeError(f"{place} has the unknown field {unknown[0]!r}; correct or remove it")

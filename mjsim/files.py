@@ -1,4 +1,4 @@
-"""Writing files and folders whole or not at all.
+"""Reading files to an end and values strictly; writing files and folders whole or not at all.
 
 Work in progress has a name that begins with `WORK`, in the folder of its final place. The work of killed processes is
 removed, once it is a day old, by the next process that writes into the same folder.
@@ -7,18 +7,60 @@ removed, once it is a day old, by the next process that writes into the same fol
 import contextlib
 import ctypes
 import errno
+import json
 import os
 import shutil
+import stat
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+MAX_INPUT = 256_000_000  # bytes of a file that is read
 WORK = ".mjsim-work-"
 MAX_AGE = 24 * 3600  # s since the last change of a leftover, after which it is removed
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # of Linux's renameat2
+
+
+def check_input(path: Path) -> None:
+    """Raise an OSError where reading would not end (a pipe, a device), or has over `MAX_INPUT` bytes to read."""
+    found = path.stat()
+    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening says it of a folder
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+    if found.st_size > MAX_INPUT:
+        raise OSError(errno.EFBIG, f"larger than {MAX_INPUT // 10**6} MB", str(path))
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a file; an OSError as of `check_input`."""
+    check_input(path)
+    with path.open("rb") as file:
+        return file.read(MAX_INPUT)
+
+
+def read_text(path: Path) -> str:
+    """The content of a UTF-8 file, with or without a byte order mark; an OSError as of `check_input`."""
+    return read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n")
+
+
+def read_json(text: str) -> Any:
+    """Values of strict JSON; a ValueError where a key is there twice, or a number is NaN or infinite."""
+    return json.loads(text, object_pairs_hook=_once, parse_constant=_refuse)
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(f"the key {next(k for k in keys if keys.count(k) > 1)!r} is there twice; keep one")
+    return found
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no number of JSON")
 
 
 @contextmanager

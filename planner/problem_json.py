@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
+from mjsim.files import read_json
 from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
 from planner.plan import Plan, Status, Visit, VisitKind
@@ -116,11 +117,15 @@ def claim_from_json(text: str | bytes, problem: RoutingProblem) -> Plan:
 
 def _decode(text: str | bytes, kind: type[T], remedy: str) -> T:
     try:
-        return msgspec.json.decode(text, type=kind)
-    except msgspec.DecodeError as error:  # names the path of the value, what was expected and what came
-        raise ProblemError(f"{error}; {remedy}") from error
+        if isinstance(text, bytes):
+            text = text.decode("utf-8-sig")
+        found = msgspec.json.decode(text, type=kind)
+        read_json(text)
+        return found
     except UnicodeError as error:
         raise ProblemError(f"not UTF-8 ({error}); {remedy}") from error
+    except ValueError as error:  # names the path of the value, what was expected and what came
+        raise ProblemError(f"{error}; {remedy}") from error
     except RecursionError as error:
         raise ProblemError(f"nested too deeply; {remedy}") from error
 

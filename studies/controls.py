@@ -12,6 +12,7 @@ from experiments.errors import ConfigError
 from experiments.participants.distribution import Distributions
 from experiments.trials.design import Design
 from experiments.trials.trial_config import TrialConfig
+from mjsim.files import read_text
 
 FILE = Path(__file__).with_name("controls.toml")
 
@@ -51,7 +52,7 @@ def read_controls(design: Design, path: Path = FILE, *, only: str | None = None)
         ConfigError: The file is unusable, there is no such control, or no person of the design is left.
     """
     try:
-        tables = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8-sig")), dict[str, _Control])
+        tables = msgspec.convert(tomllib.loads(read_text(path)), dict[str, _Control])
     except (
         OSError,
         UnicodeDecodeError,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from experiments.errors import ConfigError
+from mjsim.files import MAX_INPUT, read_bytes
 from planner.errors import PlannerError, ProblemError
 from planner.plan import Plan, Status
 from planner.problem import RoutingProblem
@@ -201,9 +202,17 @@ def _check(problem_name: str, claim_name: str) -> int:
     return 0
 
 
+def _standard_input() -> bytes:
+    if sys.stdin is None:
+        raise ConfigError("standard input is closed; give a file, or open it")
+    if len(text := sys.stdin.buffer.read(MAX_INPUT + 1)) > MAX_INPUT:
+        raise ConfigError(f"standard input has more than {MAX_INPUT // 10**6} MB; give a smaller problem")
+    return text
+
+
 def _read(name: str, parse: Callable[[bytes], T]) -> T:
     try:
-        text = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
+        text = _standard_input() if name == "-" else read_bytes(Path(name))
     except OSError as error:
         raise ConfigError(f"cannot read {name}: {error.strerror}") from error
     try:

@@ -18,6 +18,7 @@ from typing import Annotated, Any
 import msgspec
 
 from experiments.errors import ConfigError
+from mjsim.files import read_text
 
 SHAPES = ("constant", "normal", "lognormal", "uniform", "beta", "mixture")
 _STANDARD = statistics.NormalDist()
@@ -167,7 +168,7 @@ class Distributions(Mapping[str, Distribution]):
         try:
             if text.lstrip().startswith("{"):
                 return cls.of(tomllib.loads(f"person = {text}")["person"])
-            return cls.of(tomllib.loads(Path(text).read_text(encoding="utf-8-sig")))
+            return cls.of(tomllib.loads(read_text(Path(text))))
         except OSError as error:
             raise ConfigError(
                 f"cannot read {text}: {error.strerror}; name a TOML file, or give values between braces, such as "

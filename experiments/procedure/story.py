@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from experiments.errors import ConfigError
+from mjsim.files import read_text
 
 STORY_FILE = Path(__file__).with_name("story.md")
 READING_SPEED = 238.0  # words a minute (Brysbaert, Journal of Memory and Language 109, 2019)
@@ -12,7 +13,7 @@ def story_text(path: Path | None = None) -> str:
     """The story of a UTF-8 file, or of this package: plain text with blank lines between paragraphs."""
     file = path or STORY_FILE
     try:
-        text = file.read_text(encoding="utf-8").strip()
+        text = read_text(file).strip()
     except OSError as error:
         raise ConfigError(f"cannot read the story {file}: {error.strerror}") from error
     except UnicodeDecodeError as error:

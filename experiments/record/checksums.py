@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from experiments.errors import RecordError
-from mjsim.files import write_text_atomically
+from mjsim.files import check_input, read_bytes, write_text_atomically
 
 CHECKSUMS = "SHA256SUMS"
 _LINE = re.compile(r"([0-9a-f]{64})  ([^/\\]+)")
@@ -28,7 +28,7 @@ def read_checksums(folder: Path) -> dict[str, str]:
     """
     path = folder / CHECKSUMS
     try:
-        lines = path.read_text(encoding="ascii").split("\n")
+        lines = read_bytes(path).decode("ascii").split("\n")
     except (OSError, UnicodeDecodeError) as error:
         raise RecordError(f"cannot read {path}: {error}") from error
     found = [_LINE.fullmatch(line) for line in lines[:-1]]
@@ -40,5 +40,6 @@ def read_checksums(folder: Path) -> dict[str, str]:
 
 def sha256_of(path: Path) -> str:
     """SHA-256 of a file's content, in hexadecimal digits."""
+    check_input(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from mjsim.files import replacing, write_text_atomically
+from mjsim.files import check_input, read_text, replacing, write_text_atomically
+from mjsim.files import read_json as strict_json
 
 # NumPy's name of an array's type (or `TEXT`), and its shape; None where any length will do.
 Layout = tuple[str, tuple[int | None, ...]]
@@ -32,6 +33,7 @@ def read_arrays(
         RecordError: The file is missing, cut short, damaged or incomplete; the message names it.
     """
     try:
+        check_input(path)
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in only or archive.files}
     except FileNotFoundError as error:
@@ -82,7 +84,7 @@ def read_json(path: Path) -> Any:
         RecordError: The file is missing or not JSON; the message names it.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return strict_json(read_text(path))
     except OSError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:  # not JSON, not UTF-8, or nested too deeply

@@ -29,6 +29,7 @@ from experiments.record.records import Event, EventLog
 from mjsim.actions import StepAction
 from mjsim.episode import Episode
 from mjsim.errors import EpisodeError, PersonError
+from mjsim.files import read_bytes
 from mjsim.observation import Observation
 from mjsim.person_parameters import PersonParameters
 from mjsim.world_state import WorldState
@@ -237,7 +238,7 @@ def read_log(directory: Path) -> bytes:
     """
     if not (directory / records.EVENTS).is_file():
         raise RecordError(f"{directory} is not a run directory: it has no {records.EVENTS}")
-    log = (directory / records.EVENTS).read_bytes()
+    log = read_bytes(directory / records.EVENTS)
     try:
         start = json.loads(log.split(b"\n", 1)[0])
     except (ValueError, RecursionError):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
+from mjsim.files import read_text
 
 # 7: groups of a person's values. 6: the participant. 5: distances between places, ties, gaps of suggestions.
 # 4: typed checkpoints. 3: untyped ones. 2: no health of the physics. 1: neither state hashes nor checkpoints.
@@ -93,7 +94,7 @@ def read_events(path: Path) -> list[Event]:
         RecordError: The file is missing, or a line is not JSON; the message names file and line.
     """
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_text(path).splitlines()
     except OSError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError as error:

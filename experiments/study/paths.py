@@ -21,6 +21,7 @@ from experiments.record.topdown import PLANNED, WALKED, planned_path
 from experiments.study.figures import svg
 from experiments.study.table import StudyTable
 from mjsim.episode import Episode
+from mjsim.files import read_text
 
 WIDTH = 4.0  # inches of a panel
 DISTANCE = "distance"
@@ -54,7 +55,7 @@ def _run_of(row: Any, folder: Path) -> Path | None:
     """The run directory of a row; fingerprints are of one trial only."""
     for path in sorted((folder / TRIALS).glob(f"[!.]*/{records.METRICS}")):
         try:
-            metrics = json.loads(path.read_text(encoding="utf-8"))
+            metrics = json.loads(read_text(path))
         except (OSError, ValueError):
             continue
         if row.get("fingerprint") is not None and metrics.get("fingerprint") == row["fingerprint"]:

@@ -20,6 +20,7 @@ from experiments.trials.trial_config import (
     TrialConfig,
     episode_settings,
 )
+from mjsim.files import read_text
 
 MAX_NUMBERS = 1_000_000
 
@@ -109,7 +110,7 @@ def read_design(path: Path) -> Design:
     trials: list[TrialConfig] = []
     reached = None
     try:
-        file = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8-sig")), _File)
+        file = msgspec.convert(tomllib.loads(read_text(path)), _File)
         for reached, cell in enumerate(file.cells):  # noqa: B007 - for errors
             trials += _cell_trials({**file.all_cells, **cell}, path.parent)
         reached = None

@@ -17,6 +17,7 @@ from experiments.participants import participant_names
 from experiments.procedure.story import story_text
 from experiments.record.phases import STORY
 from experiments.trials.trial_config import PATHS, TrialConfig
+from mjsim.files import read_bytes
 from mjsim.model.catalogue import Catalogue
 from mjsim.sources import PACKAGES, digest_of, source_digest
 
@@ -39,7 +40,7 @@ def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
     """Hash or version by what it is of; equal configurations with equal inputs give equal records."""
     inputs = {"house": catalogue.content, "code of mjsim": source_digest(*CODE), **_libraries()}
     if config.episode is not None:
-        inputs["episode"] = hashlib.sha256(Path(config.episode).read_bytes()).hexdigest()
+        inputs["episode"] = hashlib.sha256(read_bytes(Path(config.episode))).hexdigest()
     if STORY in config.phase_names:
         text = story_text(None if config.story is None else Path(config.story))
         inputs["story"] = hashlib.sha256(text.encode()).hexdigest()

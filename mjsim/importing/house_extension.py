@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mjsim.errors import AssetError
-from mjsim.files import exchange, work_folder, write_text_atomically
+from mjsim.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.importing.model_writer import MODEL
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
@@ -65,7 +65,7 @@ class HouseExtension:
             raise AssetError(f"{folder} is not a folder; choose another --out")
         if self._file.exists():
             self.catalogue = Catalogue.load(str(self._file))
-            self._text = self._file.read_text(encoding="utf-8")
+            self._text = read_text(self._file)
             extended = tomllib.loads(self._text).get("extends")
             if house is not None and extended != _reference(house, folder):
                 owner = extended or self.catalogue.label

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from trimesh.resolvers import FilePathResolver
 
 from mjsim.errors import AssetError
+from mjsim.files import check_input
 from mjsim.importing.surface import Floats, Surface, joined
 
 SUFFIXES = (".glb", ".obj", ".stl", ".ply")
@@ -19,11 +21,22 @@ MAX_TRIANGLES = 5_000_000
 PLAIN = (0.74, 0.72, 0.68)  # RGB of what has no colour
 
 
+class _Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
+    """Files that a mesh names, such as its materials, if they are files."""
+
+    def absolute(self, name: str) -> Path:
+        """The path of a file by its name; an OSError where reading it would not end."""
+        path = Path(super().absolute(name))
+        if path.exists():
+            check_input(path)
+        return path
+
+
 def read_surface(path: Path) -> Surface:
     """All triangles of a mesh file, in its own unit and axes; `AssetError` where there are none that can be read."""
     _check_file(path)
     with _parsing(path):
-        geometries = trimesh.load_scene(path, process=False).dump()
+        geometries = trimesh.load_scene(path, process=False, resolver=_Beside(path)).dump()
     meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
     if not meshes:
         raise AssetError(f"{path} {_what_it_has(geometries)}; export it as a mesh of triangles")

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from mjsim.errors import AssetError, brief
-from mjsim.files import is_file
+from mjsim.files import is_file, read_text
 from mjsim.model.assets import models_root
 
 
@@ -28,7 +28,7 @@ def catalogue_path(house: str, folder: Path = Path()) -> Path:
 def read_tables(path: Path, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
     """Tables of a catalogue with those of the one that it extends, whose entries it replaces by key, and texts."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path)
         tables = tomllib.loads(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise AssetError(brief(f"cannot read catalogue {path}: {error}")) from error

@@ -8,6 +8,7 @@ from pathlib import Path
 import mujoco
 
 from mjsim.errors import AssetError
+from mjsim.files import read_bytes
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
@@ -68,9 +69,11 @@ def _elements(path: str, folder: str, files: dict[str, bytes]) -> Iterator[ET.El
 def _read(path: str, files: dict[str, bytes]) -> bool:
     if path not in files:
         try:
-            files[path] = Path(path).read_bytes()
-        except OSError:
+            files[path] = read_bytes(Path(path))
+        except FileNotFoundError:
             return False
+        except OSError as error:
+            raise AssetError(f"cannot read {path}: {error.strerror}; give a file") from error
     return True
 
 

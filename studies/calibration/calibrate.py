@@ -11,6 +11,7 @@ from experiments.errors import RecordError, StatisticsError
 from experiments.participants.distribution import Distributions
 from experiments.record.origin import origin_of
 from experiments.study.table import StudyTable
+from mjsim.files import read_text
 from studies.calibration.inference import OBJECTS, Cells, Fit, Rows, fit
 from studies.calibration.population import FreeParameters
 from studies.calibration.surrogate import Surrogate, Values, learn
@@ -134,7 +135,7 @@ def fitted_study(study: Path, behaviour: Distributions, about: str) -> str:
     Raises:
         RecordError: The file has a population of its own.
     """
-    text = study.read_text(encoding="utf-8")
+    text = read_text(study)
     if "behaviour]" in text:
         text, _, _ = text.partition("\n# Fitted")
         if "behaviour]" in text:

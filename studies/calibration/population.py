@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
 from experiments.participants.distribution import Distribution, Distributions, distribution
+from mjsim.files import read_text
 
 FILE = Path(__file__).parents[1] / "calibration.toml"
 Values = NDArray[np.float64]
@@ -64,7 +65,7 @@ def read_free_parameters(path: Path = FILE) -> FreeParameters:
         ConfigError: The file is unusable; the message names it.
     """
     try:
-        file = tomllib.loads(path.read_text(encoding="utf-8"))
+        file = tomllib.loads(read_text(path))
         found = FreeParameters(
             {name: distribution(name, given) for name, given in file["free"].items()}, file["population"]
         )

@@ -59,6 +59,8 @@ def test_file_round_trip(small, tmp_path):
     path = tmp_path / "deep" / "episode.json"
     small.save(path)
     assert Episode.load(path) == small
+    path.write_text(small.to_json(), encoding="utf-8-sig")
+    assert Episode.load(path) == small
     assert [p.name for p in path.parent.iterdir()] == ["episode.json"]
 
 
@@ -107,6 +109,21 @@ def test_missing_field_is_named(small, field):
 def test_other_texts_are_refused(text):
     with pytest.raises(EpisodeError):
         Episode.from_json(text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"seed": 3', '"seed": 3, "seed": 77', "the key 'seed' is there twice"),
+        ('"seed": 3', '"seed": 3, "sed": 77', "episode has the unknown field 'sed'"),
+        ('"heading"', '"z": 0, "heading"', "start has the unknown field 'z'"),
+        ('"model"', '"mass": 1, "model"', r"objects\[0\] has the unknown field 'mass'"),
+        ('"seed": 3', '"seed": NaN', "not JSON"),
+    ],
+)
+def test_what_nobody_reads_is_refused(small, old, new, said):
+    with pytest.raises(EpisodeError, match=said):
+        Episode.from_json(small.to_json().replace(old, new))
 
 
 @pytest.mark.parametrize("field", ["point", "position", "quaternion"])

@@ -10,8 +10,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.errors import AssetError
+from mjsim.files import read_text
 from mjsim.model.footprint import outline_points
-from mjsim.model.model_files import elements
+from mjsim.model.model_files import content_hash, elements
 from mjsim.model.validation.findings import Finding
 
 MAX_NUMBER = 1e6  # larger ones in an MJCF file are typing mistakes
@@ -91,13 +93,16 @@ class Compiled:
 def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
     """Compile an MJCF file on its own, or say why that cannot be done."""
     try:
-        path.read_bytes().decode("utf-8")
+        read_text(path)
+        content_hash("", [path])  # reads all that the file refers to, or says why not
         # Before MuJoCo reads it: that takes NaN for a missing number, and leaves a log file.
         if found := list(check_numbers(subject, path)):
             return found
         return Compiled.of(subject, path, mujoco.MjModel.from_xml_path(str(path)))
     except OSError as error:
         message, remedy = f"{path} cannot be read: {error.strerror}", "correct the path"
+    except AssetError as error:
+        message, _, remedy = str(error).rpartition("; ")
     except UnicodeDecodeError as error:
         message, remedy = f"is not UTF-8 at byte {error.start}", "save it as UTF-8"
     except (ValueError, mujoco.FatalError) as error:
