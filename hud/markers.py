@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hud.state import HudState, Marker, Rgba, Shape, Vec2, Vec3
 
-CHEST_HEIGHT = 1.2  # m, of the breadcrumb line at the person's end
+CHEST = 0.75  # height of the breadcrumb line at the person's end, of the eye's
 BREADCRUMB_RADIUS = 0.04  # m; 7 px across at 5 m in a 480 px frame
 BREADCRUMB_SPACING = 0.28  # m along the floor path
 
@@ -28,21 +28,19 @@ WHITE: Rgba = (0.95, 0.95, 0.95, 1.0)
 SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
 
 
-def breadcrumbs(path: NDArray[np.float64], clearance: float = 0.0) -> tuple[Marker, ...]:
+def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float = 0.0) -> tuple[Marker, ...]:
     """Spheres along a floor path (k, 2), m, from chest height down to the floor at its end (PAPER section 5).
 
-    They are counted back from the end; the first `clearance` m of the path stay empty.
+    The person's eyes are `eye_height` m above the floor. The spheres are counted back from the end; the first
+    `clearance` m of the path stay empty.
     """
+    chest = CHEST * eye_height
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     length = float(along[-1])
     count = max(0, int((length - clearance) / BREADCRUMB_SPACING + 1e-9)) + 1
     at = length - BREADCRUMB_SPACING * np.arange(count - 1, -1, -1)
-    heights = (
-        CHEST_HEIGHT + (BREADCRUMB_RADIUS - CHEST_HEIGHT) * at / length
-        if length > 0.0
-        else [BREADCRUMB_RADIUS]
-    )
+    heights = chest + (BREADCRUMB_RADIUS - chest) * at / length if length > 0.0 else [BREADCRUMB_RADIUS]
     xs, ys = (np.interp(at, along, path[:, axis]) for axis in (0, 1))
     return tuple(
         Marker("sphere", (float(x), float(y), float(z)), (BREADCRUMB_RADIUS, 0.0, 0.0), RED, BREADCRUMB)

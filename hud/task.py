@@ -124,6 +124,7 @@ class TaskView:
         ahead: What the planner suggests: `plan`, `segment`, `path` and `goal`.
         position: Floor position of the person, m.
         eye: Position of the eye, m.
+        eye_height: Of the eye above the floor when the person looks straight ahead, m.
         message: What the message bar shows, or None.
         clock: Elapsed task time to show, s, or None.
         camera: The eye camera, which a pointer to a goal out of view needs; None for no pointer.
@@ -146,6 +147,7 @@ class TaskView:
     ahead: PlanAhead = KnownPlan()
     position: tuple[float, float] = (0.0, 0.0)
     eye: Vec3 = (0.0, 0.0, 1.6)
+    eye_height: float = 1.6
     message: Message | None = None
     clock: float | None = None
     camera: CameraView | None = None

@@ -20,7 +20,7 @@ class PublishedTest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         measure: Short name of the measure.
         effect: What it tests.
         df: Degrees of freedom, of the effect and of the error.
-        p: As printed: `<.001`, `=.523` or `n.s.`.
+        p: As printed: `=.523` or `n.s.`; None where none is.
         objects: At which number of objects; None over all.
         statistic: F, or None where it is not printed.
         p_fits: False where the p printed with F is known not to go with it.
@@ -29,7 +29,7 @@ class PublishedTest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     measure: str
     effect: Literal["assistance", "objects", "interaction"]
     df: tuple[int, int]
-    p: str
+    p: str | None = None
     objects: int | None = None
     statistic: float | None = msgspec.field(default=None, name="F")
     p_fits: bool = True
@@ -41,8 +41,10 @@ class PublishedTest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def significant(self) -> bool:
-        """The printed decision at .05."""
-        return self.p.startswith("<") or (self.p.startswith("=") and float(self.p[1:]) < ALPHA)
+        """The decision at .05: by the printed p, else by F."""
+        if self.p is None:
+            return float(f.sf(self.statistic, *self.df)) < ALPHA
+        return self.p != NOT_SIGNIFICANT and float(self.p[1:]) < ALPHA
 
     def test(self, people: int) -> FTest | None:
         """The test with its effect size; None where F is not printed."""
@@ -57,16 +59,17 @@ class PublishedTest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def inconsistency(self) -> str | None:
         """What is wrong between the printed F and p; None where they go together."""
-        if self.statistic is None or self.p == NOT_SIGNIFICANT:
+        if self.statistic is None:
             return None
         implied = float(f.sf(self.statistic, *self.df))
-        printed = float(self.p[1:])
-        places = len(self.p.partition(".")[2])
-        half = 0.5 * 10.0**-places * (1 + 1e-9)
         test = f"F({self.df[0]},{self.df[1]}) = {self.statistic:g}"
         if not self.p_fits:
             return f"the printed p does not go with {test}, which gives p = {_short(implied)}"
-        if implied < printed if self.p[0] == "<" else abs(implied - printed) <= half:
+        if self.p is None:
+            return None
+        places = len(self.p.partition(".")[2])
+        half = 0.5 * 10.0**-places * (1 + 1e-9)
+        if abs(implied - float(self.p[1:])) <= half:
             return None
         return f"printed p {self.p}, but {test} gives p = {_short(implied)}"
 
@@ -76,12 +79,13 @@ def _short(p: float) -> str:
 
 
 class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An order of means as printed; one of the last five says which.
+    """An order of means as printed; `pair` or one of the last four says which.
 
     Attributes:
         measure: Short name of the measure.
         objects: At which number of objects; None over all.
         pair: The first is smaller than the second by Tukey's test.
+        p: Of that test, as printed.
         same: Tukey's test finds no difference.
         rising: The condition whose means rise with the number of objects.
         lowest: The condition with the lowest mean at every number of objects.
@@ -91,6 +95,7 @@ class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     measure: str
     objects: int | None = None
     pair: tuple[str, str] | None = None
+    p: str | None = None
     same: tuple[str, str] | None = None
     rising: str | None = None
     lowest: str | None = None

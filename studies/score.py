@@ -164,7 +164,9 @@ class _Judge:
     def _test_rows(self, test: PublishedTest) -> Iterator[Row]:
         people = self.published.people_of(test.objects)
         printed = f"F({test.df[0]},{test.df[1]}) " + (
-            "n.s." if test.statistic is None else f"= {test.statistic:g}, p {test.p}"
+            "n.s."
+            if test.statistic is None
+            else f"= {test.statistic:g}" + (f", p {test.p}" if test.p else "")
         )
         row = Row(
             EFFECT_SIZE,
@@ -176,7 +178,7 @@ class _Judge:
             test.interval(people),
             remark=test.inconsistency(),
         )
-        if test.measure.startswith(LIKERT_PREFIX) and self.table.origin != RECORDED:
+        if self._is_not_simulated(test.measure):
             yield replace(row, ours=NOT_SIMULATED)
             yield replace(row, kind=INFERENCE, ours=NOT_SIMULATED)
             return
@@ -188,6 +190,9 @@ class _Judge:
         except StatisticsError as error:
             yield replace(row, remark=str(error))
             yield replace(row, kind=INFERENCE, remark=str(error))
+
+    def _is_not_simulated(self, measure: str) -> bool:
+        return measure.startswith(LIKERT_PREFIX) and self.table.origin != RECORDED
 
     def _effect_size(self, row: Row, test: PublishedTest, found: FTest) -> Row:
         low, high = row.target or (0.0, 1.0)
@@ -216,9 +221,11 @@ class _Judge:
 
     def _direction_row(self, direction: Direction) -> Row:
         held_out = direction.objects is None
-        row = Row(
-            DIRECTION, direction.measure, direction.label(), direction.objects, held_out, direction.label()
-        )
+        label = direction.label()
+        printed = label if direction.p is None else f"{label}, p {direction.p}"
+        row = Row(DIRECTION, direction.measure, label, direction.objects, held_out, printed)
+        if self._is_not_simulated(direction.measure):
+            return replace(row, ours=NOT_SIMULATED)
         # A test's decision depends on how many people there are: studies of the published size decide.
         decided = direction.pair is not None or direction.same is not None
         return self._judged(row, partial(points, row=direction), by_rate=decided)

@@ -125,6 +125,7 @@ NAMES: dict[str, Callable[[], str]] = {  # what can be named, for help
         f": {', '.join(condition_names())}, or package.module:attribute; "
         f"{', '.join(f'-{name}' for name in option_names())} may follow"
     ),
+    "training_assistance": lambda: ": as --assistance",
     "planner": lambda: f": {', '.join(SOLVERS)}, or package.module:attribute",
     "person": lambda: (
         ": a TOML file, or in braces such as '{walking_speed = {normal = [1.2, 0.2], min = 0.8}}'"

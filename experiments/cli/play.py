@@ -113,6 +113,7 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
     from experiments.trials.training import training_config
 
     condition(task.assistance)
+    condition(task.training_assistance)
     if task.planner not in SOLVERS:  # those are loaded by the workers
         solver(task.planner)
     training = msgspec.structs.replace(training_config(task), time_limit=TRAINING_LIMIT)

@@ -96,7 +96,7 @@ class Replayer:
         record = self.record
         evaluator = RegretEvaluator(self.house.geodesics, capacity=self._world.options.capacity)
         assistant = Assistant(
-            TaskBoard(self.house, record.episode, record.start["order"]),
+            TaskBoard(self.house, record.episode, record.start["order"], record.person.eye_height),
             assistance=self._assistance,
             planner=Planner(LogSource(record.plans, lambda: session.time), evaluator),
             log=self._log,

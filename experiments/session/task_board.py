@@ -17,6 +17,7 @@ from hud.state import Message, Vec3
 from hud.task import Alternative, KnownPlan, PlanAhead, TaskObject, TaskReceptacle, TaskStep, TaskView
 from mjsim.episode import CAPACITY, Episode
 from mjsim.observation import ObjectStatus, Observation
+from mjsim.person_parameters import PersonParameters
 from planner.plan import Visit, VisitKind
 from planner.regret import Regret
 from planner.route import Route
@@ -91,12 +92,20 @@ class TaskBoard:
         house: The house.
         episode: The disorganized house.
         order: Object names in this participant's random order (PAPER section 5).
+        eye_height: Of the person, m.
     """
 
-    def __init__(self, house: House, episode: Episode, order: Sequence[str]) -> None:
+    def __init__(
+        self,
+        house: House,
+        episode: Episode,
+        order: Sequence[str],
+        eye_height: float = PersonParameters.eye_height,
+    ) -> None:
         self.house = house
         self.episode = episode
         self._order = tuple(order)
+        self._eye_height = eye_height
         self._done: list[TaskStep] = []
         self._scroll = 0
         self._latest = _Shown("started", -math.inf)
@@ -153,6 +162,7 @@ class TaskBoard:
             ahead=ahead,
             position=(float(observation.position[0]), float(observation.position[1])),
             eye=_vec3(observation.eye),
+            eye_height=self._eye_height,
             message=self._message(observation.time),
             clock=observation.time,
             camera=camera,

@@ -29,7 +29,7 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
     """What each trial depends on; raises the error of a trial that cannot be run, as far as that shows beforehand."""
     for check, names in (
         (participant, {trial.user for trial in trials}),
-        (condition, {trial.assistance for trial in trials}),
+        (condition, {name for trial in trials for name in (trial.assistance, trial.training_assistance)}),
         (solver, {trial.planner for trial in trials}),
     ):
         for name in sorted(names):

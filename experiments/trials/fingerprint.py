@@ -60,7 +60,8 @@ def changes(before: Inputs, now: Inputs) -> list[str]:
 
 def plugins(config: TrialConfig) -> tuple[str, ...]:
     """Names of the modules outside this package that the participant, condition and planner come from."""
-    named = (config.user, config.assistance.partition("-")[0], config.planner)
+    conditions = (config.assistance, config.training_assistance)
+    named = (config.user, config.planner, *(name.partition("-")[0] for name in conditions))
     modules = {module for module, colon, _ in (name.partition(":") for name in named) if colon}
     packages = {*PACKAGES, *participant_names()}
     return tuple(sorted(module for module in modules if module.partition(".")[0] not in packages))

@@ -142,7 +142,7 @@ def prepare_session(
     session = Session(
         world,
         Assistant(
-            TaskBoard(house, scene.episode, order),
+            TaskBoard(house, scene.episode, order, scene.person.eye_height),
             assistance=config.assistance,
             planner=planner,
             log=log,

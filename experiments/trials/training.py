@@ -4,7 +4,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from experiments.record.phases import TASK
-from experiments.trials.trial_config import TrialConfig
+from experiments.trials.trial_config import NO_ASSISTANCE, TrialConfig
 
 TRAINING_LIMIT = 3600.0  # s; generous
 _TRAINING_SEED = 7  # sets the house of the training apart from that of the task
@@ -13,14 +13,16 @@ _TRAINING_SEED = 7  # sets the house of the training apart from that of the task
 def training_config(config: TrialConfig) -> TrialConfig:
     """The training trial that belongs to a trial: one object in the same house, without limit of time.
 
-    Person, assistance and fidelity are those of the trial. The object lies where the house's seed says, but elsewhere
-    than in the task.
+    Person and fidelity are those of the trial; its assistance has a setting of its own. The object lies where the
+    house's seed says, but elsewhere than in the task.
     """
     seed = int(np.random.SeedSequence([config.house_seed, _TRAINING_SEED]).generate_state(1)[0])
     return replace(
         config,
         objects=1,
         points=1,
+        assistance=config.training_assistance,
+        training_assistance=NO_ASSISTANCE,
         house_seed=seed,
         episode=None,
         phases=TASK,

@@ -11,7 +11,7 @@ import msgspec
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
 from experiments.participants.distribution import Distributions
-from experiments.record.phases import STORY, TASK, phases_of
+from experiments.record.phases import STORY, TASK, TRAINING, phases_of
 from experiments.trials.person import check_person
 from mjsim.episode import CAPACITY, POINTS, Episode
 from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions
@@ -19,6 +19,7 @@ from planner.solver import DEFAULT_SOLVER
 
 SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
 SEEDS = ("house_seed", "person_seed", "order_seed")
+NO_ASSISTANCE = "none"
 MAX_SEED = 2**63 - 1  # tables hold 64 bits
 
 
@@ -115,6 +116,13 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             path=True,
         ),
     ] = None
+    training_assistance: Annotated[
+        str,
+        _about(
+            "Assistance condition of the training: one for everybody, whatever the task shows (PAPER section 7).",
+            metavar="NAME",
+        ),
+    ] = NO_ASSISTANCE
     person: Annotated[
         Distributions,
         _about(
@@ -168,6 +176,11 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         if self.story is not None and STORY not in self.phase_names:
             raise ConfigError(
                 f"there is a story, {self.story}, but no phase to read it in; add story to the phases"
+            )
+        if self.training_assistance != NO_ASSISTANCE and TRAINING not in self.phase_names:
+            raise ConfigError(
+                f"there is an assistance for a training, {self.training_assistance}, but no training; add it to "
+                "the phases"
             )
         check_person(self.person)
 

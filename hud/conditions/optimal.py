@@ -11,7 +11,7 @@ def hud_state(view: TaskView) -> HudState:
     done = len(view.steps_done)
     steps = (*view.steps_done, *view.plan)
     checklist = tuple(_row(view, i, kind, name, done) for i, (kind, name) in enumerate(steps))
-    crumbs = () if view.segment is None else breadcrumbs(view.segment)
+    crumbs = () if view.segment is None else breadcrumbs(view.segment, view.eye_height)
     return assemble(view, "Your plan", checklist, (*crumbs, *misplaced_flagpoles(view)))
 
 

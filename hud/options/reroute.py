@@ -18,5 +18,7 @@ def apply(view: TaskView, state: HudState) -> HudState:
     if view.path is None or not any(marker.role == BREADCRUMB for marker in state.markers):
         return state
     others = tuple(marker for marker in state.markers if marker.role not in (BREADCRUMB, RIM))
-    found = dataclasses.replace(state, markers=(*breadcrumbs(view.path, CLEARANCE), *others), rerouted=True)
+    found = dataclasses.replace(
+        state, markers=(*breadcrumbs(view.path, view.eye_height, CLEARANCE), *others), rerouted=True
+    )
     return rims.apply(view, found) if any(marker.role == RIM for marker in state.markers) else found

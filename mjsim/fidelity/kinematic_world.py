@@ -24,6 +24,7 @@ from mjsim.fidelity.kinematic_steps import (
 from mjsim.fidelity.kinematics import Gait
 from mjsim.fidelity.motion_primitives import MotionTrajectory, play_rows
 from mjsim.fidelity.trunk_contact import Floor
+from mjsim.inventory import LEFT
 from mjsim.model import avatar
 from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
@@ -58,7 +59,12 @@ class KinematicWorld:
             loads=carrying.loads,
             posture_pace=full.person.posture_pace,
             carrying=scene.person.carrying,
-            postures=np.array([avatar.REST, avatar.CARRY, avatar.TUCKED, avatar.ASIDE]),
+            postures=np.array(
+                [
+                    avatar.posture(LEFT, place, scene.person.eye_height)
+                    for place in (avatar.REST, avatar.CARRY, avatar.TUCKED, avatar.ASIDE)
+                ]
+            ),
             clearance=carrying.clearance,
             timestep=float(scene.model.opt.timestep),
             compliance=np.zeros((2, 2)),

@@ -48,7 +48,7 @@ _FOOT_CONTACT = (0.1, 3.0, 0.2)
 EYE_FORWARD = 0.06
 START_PITCH = math.radians(-12.0)
 PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
-# Postures of a hand in the body frame: forward, to its own side, up; m.
+# Postures of a hand in the body frame of a person of usual eye height: forward, to its own side, up; m.
 REST = (0.34, 0.27, 1.00)
 CARRY = (0.50, 0.24, 1.25)
 TUCKED = (0.27, 0.19, 1.22)
@@ -69,10 +69,13 @@ def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
     return f"{PREFIX}{hand}/{kind}/{instance}/{grip}"
 
 
-def posture(hand: int, place: tuple[float, float, float]) -> tuple[float, float, float]:
-    """A posture such as `CARRY` for hand 0 (left) or 1 (right): x, y, z in the body frame, m."""
+def posture(hand: int, place: tuple[float, float, float], eye_height: float) -> tuple[float, float, float]:
+    """A posture such as `CARRY` for hand 0 (left) or 1 (right): x, y, z in the body frame, m.
+
+    Who has lower eyes, m, holds the hands lower in proportion.
+    """
     forward, side, up = place
-    return forward, side if hand == 0 else -side, up
+    return forward, side if hand == 0 else -side, up * (eye_height / PersonParameters.eye_height)
 
 
 def eye_position(
@@ -99,7 +102,7 @@ def attach_avatar(
     body = _add_body(spec, start, person.body_radius)
     _add_head(spec, body, person)
     for number, hand in enumerate(HANDS):
-        _add_hand(spec, body, hand, posture(number, REST))
+        _add_hand(spec, body, hand, posture(number, REST, person.eye_height))
     _declare_welds(spec, object_names)
 
 

@@ -49,9 +49,11 @@ class Carrying:
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._owners = _geom_owners(scene)
         self._no_contacts = (_NO_GEOMS, _NO_FRAMES, self._owners)
-        self._postures = {p: np.array(p) for p in (avatar.CARRY, avatar.TUCKED, avatar.ASIDE)}
+        eyes = person.parameters.eye_height
+        postures = avatar.CARRY, avatar.TUCKED, avatar.ASIDE
+        self._postures = {p: np.array(avatar.posture(LEFT, p, eyes)) for p in postures}
         self._compliance = np.zeros((2, 2))
-        targets, rest = rig.hand_targets, np.array(avatar.REST)
+        targets, rest = rig.hand_targets, np.array(avatar.posture(LEFT, avatar.REST, eyes))
         self._body = (rig.pose, rig.motion, tuple(self.clearance))
         self._hands = (
             targets, person.hand_velocities, self._compliance, np.zeros((2, 3)), rest, self.loads,
@@ -87,7 +89,7 @@ class Carrying:
     def carry_position(self, hand: int, item: int, body: BodyMotion | None = None) -> NDArray[np.float64]:
         """Best position (3,), body frame, m, for a hand to carry object `item` clear of the house."""
         radius, height = self.loads[item].tolist()
-        forward, left, up = avatar.posture(hand, avatar.CARRY)
+        forward, left, up = avatar.posture(hand, avatar.CARRY, self._person.parameters.eye_height)
         rig, carrying = self._person.rig, self._person.parameters.carrying
         body = body or BodyMotion(rig.pose, rig.motion, self.clearance)
         point = drawn_in(forward, left, radius, body, carrying)

@@ -12,7 +12,7 @@ from mjsim.model.rays import receptacle_in_sight, sees
 from mjsim.observation import ObjectStatus
 from mjsim.person.person import Person
 
-_CHEST_HEIGHT = 1.2  # m
+_CHEST = 0.75  # of the eye's height
 
 
 def resolve_pick(
@@ -93,7 +93,7 @@ def _object_distance(person: Person, item: int) -> float:
 
 def _object_in_sight(person: Person, item: int) -> bool:
     """Whether the centre or a grip is visible from the eye or the chest; nothing is picked through a wall."""
-    viewpoints = person.rig.eye, np.array([*person.rig.position, _CHEST_HEIGHT])
+    viewpoints = person.rig.eye, np.array([*person.rig.position, _CHEST * person.parameters.eye_height])
     points = [person.center(item), *(person.grips.point(item, grip) for grip in avatar.GRIPS)]
     model, data = person.scene.model, person.data
     return any(sees(model, data, eye, point) for eye in viewpoints for point in points)

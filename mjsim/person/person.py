@@ -93,7 +93,7 @@ class Person:
 
     def move_hand_to_rest(self, hand: int) -> None:
         """Move an empty hand's target towards its rest, by one control step."""
-        rest = avatar.posture(hand, avatar.REST)
+        rest = avatar.posture(hand, avatar.REST, self.parameters.eye_height)
         move_hand(self.rig.hand_targets, self.hand_velocities, hand, *rest, self.posture_pace, self.dt)
 
     def center(self, item: int) -> NDArray[np.float64]:

@@ -118,7 +118,7 @@ def test_optimal_shows_breadcrumbs_along_the_segment_and_the_flagpoles_of_highli
     view = with_path(sample.task(12, steps=5), [5.0, 5.0], [6.0, 6.0])
     state = shown("optimal", view)
     crumbs = tuple(m for m in state.markers if m.role == "breadcrumb")
-    assert view.segment is not None and crumbs == breadcrumbs(view.segment)
+    assert view.segment is not None and crumbs == breadcrumbs(view.segment, view.eye_height)
     assert crumbs and not any(m.x_ray for m in crumbs), "walls hide the path"
     assert state.markers == (*crumbs, *shown("highlight", view).markers)
     assert (state.pointer, state.minimap, state.rerouted) == (None, None, False)
@@ -134,7 +134,9 @@ def test_guided_is_optimal_with_its_options():
     assert {m.role for m in state.markers} == {"breadcrumb", "rim", "goal", "flagpole"}
     assert state.pointer is not None and state.rerouted
     assert view.path is not None
-    assert tuple(m for m in state.markers if m.role == "breadcrumb") == breadcrumbs(view.path, CLEARANCE)
+    assert tuple(m for m in state.markers if m.role == "breadcrumb") == breadcrumbs(
+        view.path, view.eye_height, CLEARANCE
+    )
     assert {"reroute", "rims", "pin", "pointer", "bins", "minimap", "regret", "xray"} == set(option_names())
 
 

@@ -18,10 +18,10 @@ coordinates = st.floats(-8.0, 8.0).map(lambda v: round(v, 3))
 paths = st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=7).map(np.array)
 
 
-@given(paths, st.sampled_from((0.0, 0.5)))
-def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(path, clearance):
+@given(paths, st.sampled_from((0.0, 0.5)), st.sampled_from((1.0, 1.6, 2.0)))
+def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(path, clearance, eye_height):
     line = LineString(path)
-    marks = breadcrumbs(path, clearance)
+    marks = breadcrumbs(path, eye_height, clearance)
     assume(line.length > 0.01)
     if line.length < clearance:
         assert len(marks) == 1 and marks[0].position == pytest.approx((*path[-1], marks[0].size[0]))
@@ -37,13 +37,14 @@ def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(path,
     expected = [line.length - 0.28 * k for k in range(count - 1, -1, -1)]
     along = [line.interpolate(max(s, 0.0)).coords[0] for s in expected]  # negative: from the end
     assert np.allclose(points[:, :2], along, atol=1e-6)
-    slope = (1.2 - 0.04) / line.length
-    assert np.allclose(points[:, 2], [1.2 - slope * s for s in expected], atol=1e-6)
+    chest = 0.75 * eye_height
+    slope = (chest - 0.04) / line.length
+    assert np.allclose(points[:, 2], [chest - slope * s for s in expected], atol=1e-6)
 
 
 def test_a_person_at_the_goal_sees_one_breadcrumb_on_the_floor():
     for path in ([[1.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]]):
-        (mark,) = breadcrumbs(np.array(path))
+        (mark,) = breadcrumbs(np.array(path), 1.6)
         assert mark.position == (1.0, 1.0, mark.size[0])
 
 

@@ -9,7 +9,7 @@ from sessions import SIZES, opened, play
 
 from hud import theme
 from hud.compose import Compositor
-from hud.markers import BREADCRUMB, BREADCRUMB_RADIUS, CHEST_HEIGHT, FLAGPOLE
+from hud.markers import BREADCRUMB, BREADCRUMB_RADIUS, CHEST, FLAGPOLE
 from mjsim.model.sight import FieldOfView, in_field_of_view, visible_objects
 from mjsim.observation import ObjectStatus
 from mjsim.render import CameraPose, Renderer
@@ -177,8 +177,8 @@ def test_breadcrumbs_descend_from_chest_height_to_the_floor(starts, size):
             points = eye + np.column_stack([right, up, -depth]) @ pose.rotation.T
             heights.append(float(points[:, 2].max()) - BREADCRUMB_RADIUS)
     length = len(crumbs) - 1
-    assert heights[0] == pytest.approx(CHEST_HEIGHT, abs=0.02 + 1.2 / length)
-    assert heights[1] == pytest.approx(CHEST_HEIGHT / 2, abs=0.05 + 1.2 / length)
+    assert heights[0] == pytest.approx(1.6 * CHEST, abs=0.02 + 1.2 / length)
+    assert heights[1] == pytest.approx(0.8 * CHEST, abs=0.05 + 1.2 / length)
     assert heights[2] == pytest.approx(BREADCRUMB_RADIUS, abs=0.02 + 1.2 / length)
     assert crumbs[-1].position[2] == pytest.approx(BREADCRUMB_RADIUS)
     assert {crumb.rgba[:3] for crumb in crumbs} == {(0.90, 0.10, 0.06)}

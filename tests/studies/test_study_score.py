@@ -10,6 +10,7 @@ from study_people import SIZES, made_up_people, table_of
 
 from experiments.cli.main import main
 from experiments.errors import StatisticsError
+from experiments.study.measures import read_measures
 from experiments.trials.table import write_tables
 from studies.published import read_published
 from studies.score import DIRECTION, EFFECT_SIZE, INFERENCE, VARIANCE, draw, inconsistencies, score
@@ -39,9 +40,43 @@ def test_degrees_of_freedom_are_those_of_the_design():
 
 def test_inconsistent_numbers_are_flagged():
     lines = inconsistencies(PUBLISHED)
-    assert len(lines) == 2
+    assert [line.partition(",")[0] for line in lines] == [
+        "deviations",
+        "deviations",
+        "likert_need_to_follow",
+        "likert_useful",
+    ]
     assert "F(2,116) = 41.48" in lines[0]
     assert lines[1].endswith("printed p =.001, but F(6,435) = 2.865 gives p = .0095")
+    assert lines[2].endswith("printed p =.000, but F(2,116) = 7.59 gives p = .0008")
+
+
+def test_answers_stand_as_the_paper_prints_them():
+    """*Usable* is "faster than with the help of the training"; control of speed is printed without a number."""
+    tests = {t.measure: (t.statistic, t.p) for t in PUBLISHED.tests if t.measure.startswith("likert_")}
+    assert tests == {
+        "likert_control_what": (11.38, "=.000"),
+        "likert_control_speed": (None, "n.s."),
+        "likert_need_to_follow": (7.59, "=.000"),
+        "likert_prefer_what": (15.56, "=.000"),
+        "likert_useful": (7.83, "=.000"),
+        "likert_faster": (12.72, "=.000"),
+    }
+    known = read_measures().likert
+    assert all(name.removeprefix("likert_") in known for name in tests)
+    pairs = {(d.measure, *d.pair, d.p) for d in PUBLISHED.directions if d.measure.startswith("likert_")}
+    assert pairs == {
+        ("likert_control_what", "optimal", "none", "<.001"),
+        ("likert_control_what", "optimal", "highlight", "<.001"),
+        ("likert_need_to_follow", "none", "optimal", "<.01"),
+        ("likert_need_to_follow", "highlight", "optimal", "<.01"),
+        ("likert_prefer_what", "none", "optimal", "<.001"),
+        ("likert_prefer_what", "highlight", "optimal", "<.001"),
+        ("likert_faster", "none", "optimal", "<.001"),
+        ("likert_useful", "none", "optimal", "<.001"),
+        ("likert_useful", "none", "highlight", "<.05"),
+        ("likert_useful", "highlight", "optimal", "<.05"),
+    }
 
 
 def test_what_is_not_significant_bounds_the_effect():
@@ -75,7 +110,7 @@ def test_only_rows_at_6_objects_may_be_fitted_and_are_counted_apart(people):
 
 def test_answers_are_not_simulated(people):
     rows = [r for r in score(people, PUBLISHED).rows if r.measure.startswith("likert_")]
-    assert len(rows) == 10
+    assert len(rows) == 2 * 6 + 10, "six analyses of variance, ten of Tukey's tests"
     assert {(r.ours, r.agrees) for r in rows} == {("not simulated", None)}
 
 
@@ -145,7 +180,7 @@ def test_the_score_command_writes_its_files(tmp_path, capsys):
     assert main(["study", "score", str(tmp_path)]) == 0
     assert capsys.readouterr().out.startswith("Simulated. A study of 447 people")
     found = json.loads((tmp_path / "analysis" / "score.json").read_text())
-    assert (found["origin"], len(found["rows"]), len(found["inconsistent"])) == ("Simulated", 46, 2)
+    assert (found["origin"], len(found["rows"]), len(found["inconsistent"])) == ("Simulated", 58, 4)
     page = (tmp_path / "analysis" / "score.html").read_text()
     assert "http" not in page
     assert page.count('<p class="origin">Simulated</p>') == 5

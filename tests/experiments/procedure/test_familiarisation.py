@@ -48,7 +48,13 @@ def session(house, tmp_path_factory):
     out = tmp_path_factory.mktemp("session") / "run"
     person = Distributions.of({"viewing_distance": 1.6})
     config = TrialConfig(
-        objects=2, assistance="optimal", seed=3, fidelity="event", phases=SESSION, person=person
+        objects=2,
+        assistance="optimal",
+        training_assistance="optimal",  # without help, the short-sighted search for longer than a training lasts
+        seed=3,
+        fidelity="event",
+        phases=SESSION,
+        person=person,
     )
     run_trial(config, out, topdown=False, house=house)
     return out
@@ -160,10 +166,24 @@ def test_a_design_names_phases(tmp_path):
 def test_the_training_is_a_trial_of_one_object_with_the_same_person():
     config = TrialConfig(objects=24, assistance="highlight", seed=5, phases=SESSION, fidelity="event")
     training = training_config(config)
-    assert (training.objects, training.phases, training.assistance) == (1, "task", "highlight")
+    assert (training.objects, training.phases) == (1, "task")
     assert training.person_seed == config.person_seed
     assert training.house_seed != config.house_seed
     assert training == training_config(config)
+
+
+def test_everybody_has_the_same_training_whatever_the_task_shows():
+    """The item "faster than with the help of the training" compares with one and the same help."""
+
+    def shown(assistance, **options):
+        config = TrialConfig(objects=6, assistance=assistance, seed=5, phases=SESSION, **options)
+        return training_config(config).assistance
+
+    conditions = ("none", "highlight", "optimal", "guided-minimap")
+    assert {shown(name) for name in conditions} == {"none"}
+    assert {shown(name, training_assistance="highlight") for name in conditions} == {"highlight"}
+    with pytest.raises(ConfigError, match="but no training"):
+        TrialConfig(objects=6, assistance="none", seed=5, training_assistance="highlight")
 
 
 def test_a_session_logs_its_phases_and_a_trial_without_them_logs_none(session, house, tmp_path):

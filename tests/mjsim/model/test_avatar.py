@@ -6,8 +6,9 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from small_worlds import scene_of
+from small_worlds import scene_of, world_of
 
+from mjsim.actions import Move
 from mjsim.errors import AssetError
 from mjsim.model import avatar
 from mjsim.person_parameters import PersonParameters
@@ -136,8 +137,19 @@ def test_incomplete_objects_are_named(change, message):
         avatar.attach_avatar(spec, ["c"], start=(0, 0, 0), person=PersonParameters())
 
 
+@pytest.mark.parametrize("fidelity", ["full", "event"])
+def test_hands_stay_below_low_eyes(small_catalogue, fidelity):
+    """Empty hands keep their proportion to the eyes, also after a walk."""
+    person = PersonParameters(eye_height=1.1)
+    world = world_of(scene_of(small_catalogue, START, ("cube", 2.0, 3.0), person=person), fidelity)
+    for _ in range(10):
+        world.step(Move(forward=0.5))
+    heights = [world.data.site(f"{avatar.PREFIX}{hand}_grip").xpos[2] for hand in avatar.HANDS]
+    assert heights == pytest.approx([1.1 / 1.6 * avatar.REST[2]] * 2, abs=0.03)
+
+
 def test_hands_mirror_each_other():
     for place in (avatar.REST, avatar.CARRY, avatar.ASIDE, avatar.TUCKED):
-        left, right = avatar.posture(0, place), avatar.posture(1, place)
+        left, right = avatar.posture(0, place, 1.6), avatar.posture(1, place, 1.6)
         assert np.array(left) * (1, -1, 1) == pytest.approx(right)
         assert left[1] > 0

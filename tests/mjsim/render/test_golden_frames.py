@@ -115,7 +115,7 @@ def marker_pixels(studio, pose, markers):
 def test_walls_hide_breadcrumbs_as_they_hide_things(studio, golden_frame):
     """From the hall, a way through the door into the bedroom: what has passed the door is behind the wall."""
     path = studio.house.geodesics.shortest_path((6.4, 5.15), (0.8, 3.4)).points
-    crumbs = breadcrumbs(path)
+    crumbs = breadcrumbs(path, 1.6)
     pose = eye_at((0.8, 5.4), (2.2, 3.8))
     camera = CameraView(pose.position, pose.rotation, pose.fovy, 320, 240)
     behind = tuple(m for m in crumbs if m.position[1] < 4.1 and m.position[0] < 2.4)

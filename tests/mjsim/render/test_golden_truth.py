@@ -13,7 +13,7 @@ import pytest
 from shapely import LineString, Point
 from small_worlds import scene_of
 
-from hud.markers import BREADCRUMB_RADIUS, CHEST_HEIGHT, breadcrumbs
+from hud.markers import BREADCRUMB_RADIUS, CHEST, breadcrumbs
 from mjsim.episode import Episode
 from mjsim.model.scene import compose
 from mjsim.render import CameraPose, Labels, Renderer
@@ -59,7 +59,7 @@ def test_breadcrumb_pixels_lie_on_the_planners_path(house, data, renderer, start
     first = line.interpolate(min(2.0, line.length)).coords[0]
     eye = np.array([*start, 2.4])  # so high that the spheres stand apart
     pose = CameraPose.looking_at(eye, (*first, 0.7), 1.0)
-    crumbs = breadcrumbs(path)
+    crumbs = breadcrumbs(path, 1.6)
     bare, marked = (renderer.depth(data, pose, m) for m in ((), crumbs))
     mask = marked < bare - 1e-3
     edges = (
@@ -80,7 +80,7 @@ def test_breadcrumb_pixels_lie_on_the_planners_path(house, data, renderer, start
         centre = surface[near] + (surface[near] - eye) / ranges[near] * BREADCRUMB_RADIUS
         assert line.distance(Point(centre[:2])) < 0.01
         along = line.project(Point(centre[:2])) / line.length
-        expected = CHEST_HEIGHT + (BREADCRUMB_RADIUS - CHEST_HEIGHT) * along
+        expected = 1.6 * CHEST + (BREADCRUMB_RADIUS - 1.6 * CHEST) * along
         assert centre[2] == pytest.approx(expected, abs=0.012)
     assert found >= 3
 
