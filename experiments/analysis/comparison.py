@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.stats import t
 
@@ -22,7 +21,7 @@ from experiments.analysis.statistics.noncentral import t_interval
 from experiments.errors import ConfigError, RecordError
 from experiments.record.origin import origin_of
 from experiments.trials.design import counted
-from experiments.trials.table import NAME
+from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
 
 CIRCUMSTANCES = (
@@ -72,10 +71,7 @@ class Difference:
 def read_blocks(folder: Path) -> list[Block]:
     """The trials of a batch by circumstances, in the order of its table; errors if they are of one condition only."""
     path = folder / f"{NAME}.parquet"
-    try:
-        rows = pq.read_table(path).to_pylist()
-    except (OSError, ValueError) as error:
-        raise RecordError(f"{folder} is not a batch: {path} cannot be read ({error})") from error
+    rows = read_rows(path)
     missing = [name for name in ("assistance", *SEEDS, *CIRCUMSTANCES) if rows and name not in rows[0]]
     if missing:
         raise RecordError(f"{path} was written by another version: it has no {', '.join(missing)}")
@@ -88,7 +84,12 @@ def read_blocks(folder: Path) -> list[Block]:
     for row in rows:
         # The time limit follows from the number of objects where none was given.
         label = ", ".join(f"{n} {row[n]}" for n in varying if n != "time_limit" or "objects" not in varying)
-        blocks[label][row["assistance"]][tuple(row[name] for name in identity)] = row
+        person = tuple(row[name] for name in identity)
+        if blocks[label][row["assistance"]].setdefault(person, row) is not row:
+            seeds = ", ".join(f"{name} {row[name]}" for name in SEEDS)
+            raise RecordError(
+                f"{path} has two trials of {row['assistance']}, {seeds}; remove the one of another version"
+            )
     return [Block(label, conditions) for label, conditions in blocks.items()]
 
 

@@ -17,6 +17,7 @@ class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     column: str  # the column that is scored
     why: str = ""  # reason for it
     unit: str = ""  # unit of the column, or nothing
+    range: tuple[float, float] = (0.0, 1e6)  # of its columns; other values cannot be
     without: str | None = None  # the column used instead if that one has no values
     others: tuple[str, ...] = ()  # other readings of the measure, reported as well
 

@@ -1,5 +1,6 @@
 """The people of a study: one row each of trials.parquet, as plain columns."""
 
+import difflib
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -8,15 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
 from experiments.record.origin import RECORDED, origin_of
 from experiments.session.endings import ALL_DELIVERED
-from experiments.study.measures import LIKERT_PREFIX, Measures, resolve
+from experiments.study.measures import FILE, LIKERT_PREFIX, Measures, resolve
 from experiments.trials.design import confounded_rows, counted
-from experiments.trials.table import NAME
+from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
 
 REQUIRED = ("assistance", "objects", "user")
@@ -74,10 +74,7 @@ class StudyTable:
 def read_study(folder: Path, measures: Measures) -> StudyTable:
     """Read the people of a study or a batch; a RecordError names a missing column or an invalid value."""
     path = folder / f"{NAME}.parquet"
-    try:
-        rows = pq.read_table(path).to_pylist()
-    except (OSError, ValueError) as error:
-        raise RecordError(f"{folder} is not a study: {path} cannot be read ({error})") from error
+    rows = read_rows(path)
     if not rows:
         raise RecordError(f"{path} has no rows; there are no participants yet")
     missing = [name for name in REQUIRED if name not in rows[0]]
@@ -89,6 +86,7 @@ def read_study(folder: Path, measures: Measures) -> StudyTable:
 def study_table(rows: Sequence[Mapping[str, Any]], measures: Measures, path: Path) -> StudyTable:
     """People by their rows; a RecordError names `path` and a value that is invalid."""
     _check_design(rows, path)
+    _check_answer_columns(rows[0], measures, path)
     numbers = {column: _numbers(rows, column, path) for column in _candidates(measures) if column in rows[0]}
     known = {column for column, values in numbers.items() if not np.isnan(values).all()}
     sources = {}
@@ -105,6 +103,7 @@ def study_table(rows: Sequence[Mapping[str, Any]], measures: Measures, path: Pat
     answers = [name for name in columns if name.startswith(LIKERT_PREFIX)]
     if origin != RECORDED and answers:
         raise RecordError(f"{path} has answers of simulated people ({answers[0]}); nothing simulates answers")
+    _check_ranges(rows, numbers, measures, path)
     for name in answers:
         _check_answers(columns[name], name, path)
     return StudyTable(
@@ -125,6 +124,34 @@ def _check_design(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
             raise RecordError(f"{path}: row {k} has the assistance {row['assistance']!r}, not a name")
         if not isinstance(row["objects"], int) or isinstance(row["objects"], bool) or row["objects"] < 1:
             raise RecordError(f"{path}: row {k} has {row['objects']!r} objects, not a whole number from 1 on")
+
+
+def _check_answer_columns(row: Mapping[str, Any], measures: Measures, path: Path) -> None:
+    known = _likert_columns(measures)
+    for name in row:
+        if name.lower().startswith(LIKERT_PREFIX.rstrip("_")) and name not in known:
+            near = difflib.get_close_matches(name, known, 1, cutoff=0.0)[0]
+            raise RecordError(
+                f"{path} has answers {name!r}, which no item of {FILE} has (the nearest is {near}); add the item "
+                "under [likert] there, or rename or remove the column"
+            )
+
+
+def _check_ranges(
+    rows: Sequence[Mapping[str, Any]],
+    numbers: Mapping[str, NDArray[np.float64]],
+    measures: Measures,
+    path: Path,
+) -> None:
+    for measure in measures.objective.values():
+        low, high = measure.range
+        for name in (measure.column, *filter(None, [measure.without]), *measure.others):
+            values = numbers.get(name, np.empty(0))
+            for k in np.flatnonzero((values < low) | (values > high)).tolist():
+                raise RecordError(
+                    f"{path}: row {k} (person seed {rows[k].get('person_seed')}) has the {name} {values[k]:g}, not a "
+                    f"number from {low:g} to {high:g}; correct it, or leave the person out"
+                )
 
 
 def _likert_columns(measures: Measures) -> list[str]:

@@ -8,9 +8,13 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from mjsim.files import replacing
+from experiments.errors import RecordError
+from experiments.record.origin import is_simulated
+from experiments.trials.trial_config import SEEDS
+from mjsim.files import check_input, replacing
 
 NAME = "trials"
+_TRIAL = ("user", *SEEDS, "assistance", "objects", "fingerprint")  # equal for equal trials
 
 
 def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
@@ -28,3 +32,29 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
     with replacing(csv) as temporary:
         pa.csv.write_csv(table.select(present), temporary)
     return parquet, csv
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """The rows of a Parquet file.
+
+    Raises:
+        RecordError: It cannot be read, or has a trial twice.
+    """
+    try:
+        check_input(path)
+        rows: list[dict[str, Any]] = pa.parquet.read_table(path).to_pylist()
+    except (OSError, ValueError) as error:
+        raise RecordError(f"{path} cannot be read ({error})") from error
+    seen: dict[tuple[Any, ...], int] = {}
+    for k, row in enumerate(rows):
+        if row.get("fingerprint") is None and row.get("person_seed") is None:
+            continue  # nothing says who it is
+        # People may play the same trial; they do not answer and walk alike.
+        names = _TRIAL if is_simulated(row.get("user")) else sorted(row)
+        first = seen.setdefault(tuple(str(row.get(name)) for name in names), k)
+        if first != k:
+            trial = ", ".join(f"{name} {row.get(name)}" for name in _TRIAL)
+            raise RecordError(
+                f"{path}: rows {first} and {k} are the same trial ({trial}); remove one of them"
+            )
+    return rows

@@ -10,7 +10,7 @@ from scipy.stats import nct, ttest_rel
 from experiments.analysis.comparison import compare, mean_interval, missing_pairs, read_blocks
 from experiments.cli.compare import METRICS
 from experiments.cli.main import main
-from experiments.errors import ConfigError
+from experiments.errors import ConfigError, RecordError
 from experiments.record.origin import SIMULATED
 from experiments.trials.table import write_tables
 from experiments.trials.trial_config import TrialConfig
@@ -48,6 +48,13 @@ def test_pairs_that_are_missing_are_named_and_left_out(tmp_path):
     assert list(missing_pairs(blocks)) == ["without a counterpart in none or optimal: 2 trials, seeds 1, 3"]
     (found,) = compare(blocks, ["task_distance_m"])
     assert (found.pairs, found.means, found.difference) == (2, (2.5, 5.0), 2.5)
+
+
+def test_two_versions_of_a_trial_are_refused(tmp_path):
+    twice = [row("none", 1, 2.0) | {"fingerprint": version} for version in ("old", "new")]
+    write_tables(tmp_path, [*twice, row("optimal", 1, 2.0)])
+    with pytest.raises(RecordError, match="two trials of none, house_seed 1"):
+        read_blocks(tmp_path)
 
 
 @pytest.mark.parametrize("unknown", [None, np.nan])

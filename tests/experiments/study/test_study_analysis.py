@@ -18,7 +18,7 @@ from experiments.study.analysis import analyse
 from experiments.study.cost import StudyCost
 from experiments.study.measures import read_measures
 from experiments.study.power import Wanted, plan_power
-from experiments.trials.table import write_tables
+from experiments.trials.table import read_rows, write_tables
 
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
 
@@ -157,12 +157,35 @@ def test_notes_name_what_confounds():
         ({"objects": 0}, "0 objects, not a whole number"),
         ({"nd_feasible": "much"}, "'much', which is no number"),
         ({"nd_feasible": float("inf")}, "infinite nd_feasible"),
+        ({"nd_feasible": 7.3}, "nd_feasible 7.3, not a number from 0 to 1; correct"),
+        ({"nd_strict_2n": -2}, r"row 0 \(person seed 0\) has the nd_strict_2n -2"),
+        ({"ipl_locations": -0.1}, "ipl_locations -0.1"),
+        ({"completion_time_s": 1e308}, "completion_time_s 1e\\+308"),
+        ({"task_distance_m": -1.0}, "task_distance_m -1"),
+        ({"user": "human", "likert_ease": 4}, r"likert_ease.*nearest is likert_easy.*under \[likert\]"),
+        ({"user": "human", "Likert_easy": 4}, "Likert_easy"),
         ({"user": "human", "likert_useful": 6}, "the answer 6; answers are whole numbers"),
     ],
 )
 def test_values_that_cannot_be_are_named(change, message):
     with pytest.raises(RecordError, match=message):
         table_of(made_up_people(SMALL, **change))
+
+
+@pytest.mark.parametrize("key", ["fingerprint", "person_seed"])
+def test_rows_that_are_there_twice_are_named(key, tmp_path, capsys):
+    rows = [row | {"fingerprint": f"f{k}"} for k, row in enumerate(made_up_people(SMALL))]
+    if key == "person_seed":
+        rows = [{name: v for name, v in row.items() if name != "fingerprint"} for row in rows]
+    study(tmp_path, [*rows, rows[3] | {"ended": "time limit"}])
+    for command in ("study analyze", "study score", "compare"):
+        assert main([*command.split(), str(tmp_path)]) == 2
+        assert "rows 3 and 36 are the same trial" in capsys.readouterr().err
+    # People may play the same trial.
+    people = [row | {"user": "human", "person_seed": 0} for row in rows]
+    assert len(read_rows(write_tables(tmp_path, people)[0])) == 36
+    with pytest.raises(RecordError, match="rows 0 and 36"):
+        read_rows(write_tables(tmp_path, people + people[:1])[0])
 
 
 def test_unusual_folders_get_one_line(tmp_path, capsys):
