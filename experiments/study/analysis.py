@@ -10,8 +10,9 @@ import numpy as np
 from experiments.analysis.comparison import Interval, mean_interval
 from experiments.analysis.statistics.anova import Values, brown_forsythe, one_way, two_way, welch
 from experiments.analysis.statistics.effects import FTest
+from experiments.analysis.statistics.mixed import mixed_model
 from experiments.analysis.statistics.mixtures import fit_mixtures
-from experiments.analysis.statistics.models import mixed_model, ordinal_model
+from experiments.analysis.statistics.models import ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
 from experiments.analysis.statistics.power import POWER, detectable_eta_squared
 from experiments.errors import StatisticsError

@@ -23,7 +23,7 @@ REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "test
 FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)
 TEST_COLUMNS = (
     *("origin", "measure", "column", "test", "effect", "objects", "statistic", "df1", "df2", "people", "p"),
-    *("partial_eta_squared", "low", "high", "reason"),
+    *("partial_eta_squared", "low", "high", "of", "reason"),
 )
 
 

@@ -150,15 +150,17 @@ def _variance(pool: Pool) -> float:
     return float(np.mean([v.var(ddof=1) for v in pool.values()]))
 
 
-def _eta_squared(pool: Pool, wanted: Wanted) -> float:
-    """Partial eta squared of the wanted effect, in cells of equal size."""
+def _eta_squared(pool: Pool, wanted: Wanted, draws: int = 1) -> float:
+    """Partial eta squared of the wanted effect, in cells of equal size.
+
+    The means of a pool differ by chance too; those of people drawn from it (`draws` 2) by its chance and their own.
+    """
     if wanted.eta_squared is not None:
         return wanted.eta_squared
     if wanted.difference is not None:
         ratio = wanted.difference**2 / (2 * len(_levels(pool, wanted.effect)) * _variance(pool))
         return ratio / (1 + ratio)
-    # The means of the pool differ by chance too.
-    chance = _freedom(pool, wanted.effect) * float(np.mean([1 / len(v) for v in pool.values()]))
+    chance = draws * _freedom(pool, wanted.effect) * float(np.mean([1 / len(v) for v in pool.values()]))
     squares = _squares({cell: float(v.mean()) for cell, v in pool.items()}, wanted.effect)
     ratio = (squares / _variance(pool) - chance) / len(pool)
     if ratio <= 0:
@@ -181,7 +183,7 @@ def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int
     for _ in range(RESAMPLES):
         drawn = {cell: rng.choice(v, len(v)) for cell, v in pool.items()}
         try:
-            size = _eta_squared(drawn, wanted)
+            size = _eta_squared(drawn, wanted, draws=2)
             freedom = _freedom(pool, wanted.effect)
             found.append(people_per_cell(size, freedom, len(pool), wanted.power, wanted.alpha))
         except StatisticsError:  # these people show no effect, or too small a one
@@ -200,9 +202,8 @@ _UNLIMITED = 2**31
 
 def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:
     """The pool's people with the wanted effect, and no other, in place of its own."""
-    if wanted.difference is None and wanted.eta_squared is None:
-        return pool
-    pattern = _pattern(pool, wanted.effect)
+    own = wanted.difference is None and wanted.eta_squared is None
+    pattern = _own_pattern(pool, wanted.effect) if own else _pattern(pool, wanted.effect)
     ratio = eta_squared / (1 - eta_squared) * len(pool) * _variance(pool)
     scale = math.sqrt(ratio / sum(step**2 for step in pattern.values()))
     return {cell: v - v.mean() + scale * pattern[cell] for cell, v in pool.items()}
@@ -217,6 +218,19 @@ def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
 
     names = EFFECTS[:2] if effect == "interaction" else (effect,)
     return {cell: math.prod(step(cell, name) for name in names) for cell in pool}
+
+
+def _own_pattern(pool: Pool, effect: str) -> dict[Cell, float]:
+    """Means of the pool's cells, less those of the other effects; up to a factor, as chance enlarges them."""
+    means = {cell: float(v.mean()) for cell, v in pool.items()}
+    grand = float(np.mean(list(means.values())))
+
+    def margin(cell: Cell, place: int) -> float:
+        return float(np.mean([m for other, m in means.items() if other[place] == cell[place]])) - grand
+
+    if effect != "interaction":
+        return {cell: margin(cell, EFFECTS.index(effect)) for cell in pool}
+    return {cell: m - grand - margin(cell, 0) - margin(cell, 1) for cell, m in means.items()}
 
 
 def _drawn_power(pool: Pool, wanted: Wanted, size: int, rng: np.random.Generator) -> float:

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from experiments.analysis.page import Block, Paragraph, Table, p_value, page, shown, table
 from experiments.analysis.statistics.effects import FTest
-from experiments.analysis.statistics.models import MixedModel, OrdinalModel
+from experiments.analysis.statistics.mixed import MixedModel, WaldTest
+from experiments.analysis.statistics.models import OrdinalModel
 from experiments.errors import ExperimentError
 from experiments.record.origin import RECORDED
 from experiments.study.analysis import STRICT, Analysis, Result
@@ -20,7 +21,7 @@ CAUTION = (
     "These people were simulated. The numbers follow from a model of people and are no evidence about people; "
     "answers to survey questions are not simulated."
 )
-TEST_HEAD = ("measure", "test", "effect", "objects", "F", "df", "p", "partial η²", "90 % interval")
+TEST_HEAD = ("measure", "test", "effect", "objects", "F", "df", "p", "partial η²", "90 % interval", "of")
 PAIR_HEAD = (
     "measure",
     "objects",
@@ -129,6 +130,7 @@ def _tests(analysis: Analysis) -> tuple[Block, ...]:
             p_value(t.p),
             t.eta_squared,
             t.interval,
+            t.of,
         )
         for r in analysis.results
         for effect, t in f_tests(r)
@@ -136,7 +138,7 @@ def _tests(analysis: Analysis) -> tuple[Block, ...]:
     return (Table(TEST_HEAD, rows),)
 
 
-def _freedom(test: FTest) -> str:
+def _freedom(test: FTest | WaldTest) -> str:
     return f"{test.df1}, {test.df2:.4g}"
 
 
@@ -172,12 +174,21 @@ def _mixtures(analysis: Analysis) -> tuple[Block, ...]:
 
 def _mixed(analysis: Analysis) -> tuple[Block, ...]:
     rows = [
-        (r.measure, effect, t.statistic, t.df, p_value(t.p), m.house_variance, m.residual_variance, m.houses)
+        (
+            r.measure,
+            effect,
+            t.statistic,
+            _freedom(t),
+            p_value(t.p),
+            m.house_variance,
+            m.residual_variance,
+            m.houses,
+        )
         for r in analysis.results
         if isinstance(m := r.value, MixedModel)
         for effect, t in m.tests.items()
     ]
-    head = ("measure", "effect", "Wald χ²", "df", "p", "variance of houses", "of people in a house", "houses")
+    head = ("measure", "effect", "Wald F", "df", "p", "variance of houses", "of people in a house", "houses")
     return (Table(head, rows),)
 
 

@@ -1,6 +1,7 @@
 """Analyses of variance between subjects, with one or two factors."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from experiments.analysis.statistics.effects import FTest
 from experiments.errors import StatisticsError
 
 Values = NDArray[np.float64]
+OWN_VARIANCE = "variance, each group in units of its own"
 EFFECTS = ("assistance", "objects", "interaction")  # of a two-way analysis of variance, in order
 
 
@@ -45,6 +47,9 @@ def one_way(groups: Mapping[str, Values]) -> FTest:
 def welch(groups: Mapping[str, Values]) -> FTest:
     """Welch's analysis of variance, which does not assume equal variances; every group must vary.
 
+    F df1 estimates the sum of n (mean - weighted mean)^2 / variance over groups, whatever df2 is: the effect size and
+    its interval are both of this sum and of the people, as if every group had variance 1.
+
     Source: Welch 1951, doi:10.1093/biomet/38.3-4.330.
     """
     check_groups(groups, least=2)
@@ -54,7 +59,15 @@ def welch(groups: Mapping[str, Values]) -> FTest:
     from statsmodels.stats.oneway import anova_oneway
 
     found = anova_oneway(list(groups.values()), use_var="unequal")
-    return FTest(float(found.statistic), len(groups) - 1, float(found.df[1]), people_in(groups))
+    people = people_in(groups)
+    return FTest(
+        float(found.statistic),
+        len(groups) - 1,
+        float(found.df[1]),
+        people,
+        people - len(groups),
+        OWN_VARIANCE,
+    )
 
 
 def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
@@ -66,7 +79,7 @@ def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
     distances = {name: np.abs(values - np.median(values)) for name, values in groups.items()}
     if not any(varies(values) for values in distances.values()):
         raise StatisticsError("the distances from the median do not vary within any group")
-    return _fisher(distances)
+    return replace(_fisher(distances), of="variance of the distances from the medians")
 
 
 def _fisher(groups: Mapping[str, Values]) -> FTest:
@@ -129,13 +142,23 @@ def sum_coded(first: NDArray[Any], second: NDArray[Any]) -> dict[str, Values]:
         raise StatisticsError(
             f"no people in the cell {empty[0][0]}, {empty[0][1]}; tests of two factors need all"
         )
-    one, other = (
-        1.0 * (levels[:, None] == names[:-1]) - (levels == names[-1])[:, None]
-        for levels in (first, second)
-        for names in [np.unique(levels)]
-    )
+    one, other = (_contrasts(levels, np.unique(levels)) for levels in (first, second))
     both = (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
     return {"constant": np.ones((len(one), 1)), **dict(zip(EFFECTS, (one, other, both), strict=True))}
+
+
+def design_columns(assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, Values]:
+    """Columns of `sum_coded`, or of assistance alone where there is one number of objects."""
+    if len(np.unique(objects)) > 1:
+        return sum_coded(assistance, objects)
+    names = np.unique(assistance)
+    if len(names) < 2:
+        raise StatisticsError(f"there is only one level ({names[0]})")
+    return {"constant": np.ones((len(assistance), 1)), EFFECTS[0]: _contrasts(assistance, names)}
+
+
+def _contrasts(levels: NDArray[Any], names: NDArray[Any]) -> Values:
+    return np.asarray(1.0 * (levels[:, None] == names[:-1]) - (levels == names[-1])[:, None])
 
 
 def _residual(values: Values, columns: Mapping[str, Values], names: Iterable[str]) -> float:

@@ -25,6 +25,9 @@ class FTest:
     df1: int  # degrees of freedom of the effect
     df2: float  # of the error; not a whole number in Welch's test
     people: int  # sample size
+    # degrees of freedom within groups, if they are not df2; and what the effect size is a share of
+    within: int | None = None
+    of: str = "variance"
 
     @cached_property
     def p(self) -> float:
@@ -33,8 +36,8 @@ class FTest:
 
     @property
     def eta_squared(self) -> float:
-        """Partial eta squared, F df1 / (F df1 + df2)."""
-        return partial_eta_squared(self.statistic, self.df1, self.df2)
+        """Partial eta squared, F df1 / (F df1 + degrees of freedom within groups)."""
+        return partial_eta_squared(self.statistic, self.df1, self.df2 if self.within is None else self.within)
 
     @cached_property
     def interval(self) -> Interval | None:
@@ -58,7 +61,7 @@ class FTest:
 
     def as_json(self) -> dict[str, Any]:
         """The test, its p, and its effect size."""
-        names = ("statistic", "df1", "df2", "people", "p", "eta_squared", "interval")
+        names = ("statistic", "df1", "df2", "people", "p", "eta_squared", "interval", "of")
         return {name: getattr(self, name) for name in names}
 
 

@@ -5,19 +5,20 @@ The number of kinds is chosen by Schwarz's criterion (BIC).
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import betaln, digamma, expit
+from scipy.special import betaln, digamma, expit, logit
 
 from experiments.errors import StatisticsError
 
 MAX_KINDS = 3
 MIN_PEOPLE = 10
 PRECISIONS = (0.0, 7.0)  # logarithms of a + b; beyond the upper one, people of a kind do not differ
-STARTS = 3
+STARTS = 10  # random means, besides those that the data and the fit of fewer kinds suggest
 
 Counts = NDArray[np.int64]
 
@@ -45,22 +46,19 @@ def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
         raise StatisticsError("a number of accepted visits is below 0 or above that of all visits")
     # Equal people are counted, not computed again.
     cases, people = np.unique(np.stack([accepted, visits], axis=1), axis=0, return_counts=True)
-    return sorted((_fit(cases, people, kinds) for kinds in range(1, MAX_KINDS + 1)), key=lambda m: m.bic)
+    found: list[Mixture] = []
+    for kinds in range(1, MAX_KINDS + 1):
+        found.append(_fit(cases, people, kinds, found[-1] if found else None))
+    return sorted(found, key=lambda m: m.bic)
 
 
-def _fit(cases: Counts, people: Counts, kinds: int) -> Mixture:
+def _fit(cases: Counts, people: Counts, kinds: int, fewer: Mixture | None) -> Mixture:
     """The best of several climbs; `cases` are accepted and all visits, (m, 2), `people` how many have them, (m,)."""
-    rng = np.random.default_rng(kinds)  # of the starts alone
-    rates = np.sort(np.repeat(cases[:, 0] / cases[:, 1], people))
-    spread = np.quantile(rates, (np.arange(kinds) + 0.5) / kinds).clip(0.02, 0.98)
     bounds = [(-8.0, 8.0)] * (2 * kinds - 1) + [PRECISIONS] * kinds
-    climbs = []
-    for start in range(STARTS):
-        means = spread if start == 0 else np.sort(rng.uniform(0.05, 0.95, kinds))
-        first = np.concatenate([np.zeros(kinds - 1), np.log(means / (1 - means)), np.full(kinds, 2.0)])
-        climbs.append(
-            minimize(_loss, first, (cases, people, kinds), jac=True, method="L-BFGS-B", bounds=bounds)
-        )
+    climbs = [
+        minimize(_loss, first, (cases, people, kinds), jac=True, method="L-BFGS-B", bounds=bounds)
+        for first in _starts(cases, people, kinds, fewer)
+    ]
     best = min(climbs, key=lambda climb: float(climb.fun))
     weights, means, precisions = _parts(best.x, kinds)
     order = np.argsort(-means)
@@ -72,6 +70,34 @@ def _fit(cases: Counts, people: Counts, kinds: int) -> Mixture:
         likelihood,
         (3 * kinds - 1) * math.log(int(people.sum())) - 2 * likelihood,
     )
+
+
+def _starts(
+    cases: Counts, people: Counts, kinds: int, fewer: Mixture | None
+) -> Iterator[NDArray[np.float64]]:
+    """Parameters to climb from: quantiles, the fit of one kind less with each kind in two halves, random means."""
+    rng = np.random.default_rng(kinds)  # of the starts alone
+    rates = np.sort(np.repeat(cases[:, 0] / cases[:, 1], people))
+    spread = np.quantile(rates, (np.arange(kinds) + 0.5) / kinds).clip(0.02, 0.98)
+    yield _start(np.ones(kinds), spread, np.full(kinds, math.exp(2.0)))
+    if fewer is not None:
+        for k in range(kinds - 1):
+            parts = (np.array(v) for v in (fewer.shares, fewer.means, fewer.precisions))
+            shares, means, precisions = (np.insert(v, k, v[k]) for v in parts)
+            shares[k : k + 2] /= 2
+            means[k : k + 2] = expit(logit(means[k]) + np.array([0.5, -0.5]))
+            yield _start(shares, means, precisions)
+    for _ in range(STARTS if kinds > 1 else 0):
+        means = np.sort(rng.uniform(0.05, 0.95, kinds))
+        for logs in (np.full(kinds, 2.0), rng.uniform(*PRECISIONS, kinds)):
+            yield _start(np.ones(kinds), means, np.exp(logs))
+
+
+def _start(
+    shares: NDArray[np.float64], means: NDArray[np.float64], precisions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    weights = np.log(shares)
+    return np.concatenate([weights[:-1] - weights[-1], logit(means), np.log(precisions)]).clip(-8.0, 8.0)
 
 
 def _parts(

@@ -1,18 +1,14 @@
-"""Regressions of statsmodels: ordinal answers, and houses as a random factor."""
+"""Proportional odds of ordinal answers, by statsmodels."""
 
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from experiments.analysis.statistics.anova import EFFECTS, Values, sum_coded, varies
+from experiments.analysis.statistics.anova import Values, varies
 from experiments.errors import StatisticsError
-
-MIN_HOUSES = 5  # fewer say little about the variance between houses
 
 
 @dataclass(frozen=True)
@@ -32,17 +28,6 @@ class OrdinalModel:
     # by condition: odds of a higher answer, over those under the first condition
     odds_ratios: Mapping[str, float]
     people: int  # number of answers
-
-
-@dataclass(frozen=True)
-class MixedModel:
-    """A linear model with houses as a random factor, fitted by restricted maximum likelihood."""
-
-    # Wald tests by effect: `assistance`, and where there are several levels, `objects` and `interaction`
-    tests: Mapping[str, Chi2Test]
-    house_variance: float  # variance between houses, in squared units of the measure
-    residual_variance: float  # variance between people in a house
-    houses: int  # number of houses
 
 
 def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
@@ -75,48 +60,3 @@ def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
         dict(zip(list(groups)[1:], ratios.tolist(), strict=True)),
         len(answers),
     )
-
-
-def mixed_model(
-    values: Values, assistance: NDArray[Any], objects: NDArray[Any], houses: NDArray[Any]
-) -> MixedModel:
-    """Fit assistance, number of objects and both together as fixed effects, and houses as a random one.
-
-    All arrays have one entry per person, (n,). Raises `StatisticsError` if houses are few, a cell is empty or it fails.
-    """
-    count = len(np.unique(houses))
-    if count < MIN_HOUSES:
-        raise StatisticsError(f"a mixed model needs at least {MIN_HOUSES} houses; there are {count}")
-    if not varies(values):
-        raise StatisticsError("the values do not vary")
-    terms = "C(assistance, Sum)"
-    if len(np.unique(objects)) > 1:
-        sum_coded(assistance, objects)  # which finds empty cells
-        terms += " * C(objects, Sum)"
-    spread = float(values.std())  # in its units, so that small and large measures converge alike
-    data = {"y": values / spread, "assistance": assistance, "objects": objects}
-    fit = _fit_mixed(f"y ~ {terms}", data, houses)
-    found = fit.wald_test_terms(scalar=True).table.iloc[1:]  # without the constant
-    tests = (Chi2Test(float(x), int(df), float(p)) for x, p, df in found.itertuples(index=False))
-    return MixedModel(
-        dict(zip(EFFECTS, tests, strict=False)),
-        float(np.asarray(fit.cov_re)[0, 0]) * spread**2,
-        float(fit.scale) * spread**2,
-        count,
-    )
-
-
-def _fit_mixed(formula: str, data: Mapping[str, NDArray[Any]], houses: NDArray[Any]) -> Any:
-    from statsmodels.formula.api import mixedlm
-
-    for method in ("bfgs", "powell"):
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")  # of a variance between houses of zero
-            try:
-                fit = mixedlm(formula, data, groups=houses).fit(method=method)
-            except (np.linalg.LinAlgError, ValueError):
-                continue
-        # At the edge, some optimizations end in an infinite likelihood.
-        if fit.converged and np.isfinite(fit.llf):
-            return fit
-    raise StatisticsError("the mixed model does not converge")

@@ -10,7 +10,8 @@ from experiments.cli.requirements import require_extra
 
 DESCRIPTION = """\
 Say how many people each cell of a study needs to find an effect, what they cost and how many hours they take. How
-much people differ comes from a pool: a folder of simulated people in the same cells, 200 in each or more.
+much people differ comes from a pool: a folder of simulated people in the same cells, 10 in each or
+more; 200 make the interval narrow.
 
 The wanted effect is a difference of means (--difference), a partial eta squared (--eta-squared), or, with neither, the
 effect that the pool shows. Whether simulated people differ as much as real ones is not known; docs/study.md says what

@@ -17,7 +17,7 @@ from experiments.record.origin import RECORDED, SIMULATED
 from experiments.study.analysis import analyse
 from experiments.study.cost import StudyCost
 from experiments.study.measures import read_measures
-from experiments.study.power import Wanted, plan_power
+from experiments.study.power import MIN_POOL, Wanted, _eta_squared, plan_power
 from experiments.trials.table import read_rows, write_tables
 
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
@@ -223,6 +223,24 @@ def test_power_of_the_pools_own_effect():
     assert plan == plan_power(cells, table, Wanted("distance", "assistance"), StudyCost())
 
 
+def test_people_drawn_from_a_pool_have_the_effect_of_the_pool_on_average():
+    """Their means differ by the chance of the pool and by their own: both are taken off."""
+    rng, wanted = np.random.default_rng(0), Wanted("ipl")
+    pool = {(name, 6): rng.normal(mean, 1, 30) for name, mean in zip("abc", (0.0, 0.3, 0.6), strict=True)}
+
+    def ratio(eta_squared):
+        return eta_squared / (1 - eta_squared)
+
+    drawn = [{cell: rng.choice(v, 30) for cell, v in pool.items()} for _ in range(2000)]
+    found = []
+    for one in drawn:
+        try:
+            found.append(ratio(_eta_squared(one, wanted, draws=2)))
+        except StatisticsError:
+            found.append(0.0)
+    assert np.median(found) == pytest.approx(ratio(_eta_squared(pool, wanted)), rel=0.15)
+
+
 def test_power_says_what_it_cannot_know():
     cells = [(name, 6) for name in ("none", "highlight", "optimal")]
     table = table_of(made_up_people(dict.fromkeys(cells, 20)))
@@ -235,6 +253,12 @@ def test_power_says_what_it_cannot_know():
     for wrong in ({"difference": -1.0}, {"eta_squared": 1.5}, {"power": 0.0}, {"effect": "gravity"}):
         with pytest.raises(ConfigError):
             Wanted("ipl", **wrong)
+
+
+def test_the_power_commands_help_names_the_smallest_pool(capsys):
+    with pytest.raises(SystemExit):
+        main(["study", "power", "--help"])
+    assert f"{MIN_POOL} in each or more" in " ".join(capsys.readouterr().out.split())
 
 
 def test_the_power_command(tmp_path, capsys):
