@@ -25,7 +25,9 @@ def made_up_people(sizes=SIZES, seed=0, **same):
                     "nd_feasible": float(deviations),
                     "nd_strict_2n": round(deviations * 2 * objects) / (2 * objects),
                     "ipl_locations": float(1.1 - 0.5 * MEANS[assistance] + rng.normal(0, 0.15)),
-                    "task_distance_m": float(objects * (5 + 4 * MEANS[assistance]) + rng.normal(0, 12)),
+                    "task_distance_m": max(
+                        0.0, float(objects * (5 + 4 * MEANS[assistance]) + rng.normal(0, 12))
+                    ),
                     "completion_time_s": float(30 * objects + rng.normal(0, 40)),
                 }
                 | same

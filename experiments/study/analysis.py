@@ -69,6 +69,8 @@ class Analysis:
             "people": len(self.table.rows),
             "cells": sizes,
             "notes": list(self.table.notes),
+            "left_out": [asdict(person) for person in self.table.left_out],
+            "gaps": [asdict(gap) for gap in self.table.gaps],
             "columns": dict(self.table.sources),
             "descriptions": [asdict(d) for d in self.descriptions],
             "results": [vars(r) | {"value": _plain(r.value)} for r in self.results],
@@ -91,7 +93,7 @@ def analyse(table: StudyTable, measures: Measures) -> Analysis:
     for name in (n for n in table.columns if not n.startswith(LIKERT_PREFIX)):
         results += [r for objects in table.levels() for r in _one_way(table, measures, name, objects)]
         if len(table.levels()) > 1:
-            results += _two_way(table, name)
+            results += two_way_tests(table, name)
         if name in measures.objective:
             results.append(_attempt(name, "mixed model", None, partial(_mixed, table, name)))
     results += _acceptance(table)
@@ -109,11 +111,7 @@ def _attempt(measure: str, kind: str, objects: int | None, work: Callable[[], An
 
 def _one_way(table: StudyTable, measures: Measures, name: str, objects: int) -> list[Result]:
     groups = table.groups(name, objects)
-    results = [
-        _attempt(name, "one-way", objects, partial(one_way, groups)),
-        _attempt(name, "welch", objects, partial(welch, groups)),
-        _attempt(name, "brown-forsythe", objects, partial(brown_forsythe, groups)),
-    ]
+    results = one_way_tests(table, name, objects)
     if name in measures.objective:
         results.append(
             _attempt(name, "pairs", objects, partial(compare_pairs, groups, measures.equivalence.pair))
@@ -130,7 +128,18 @@ def _one_way(table: StudyTable, measures: Measures, name: str, objects: int) -> 
     return results
 
 
-def _two_way(table: StudyTable, name: str) -> list[Result]:
+def one_way_tests(table: StudyTable, name: str, objects: int) -> list[Result]:
+    """F tests of a measure at a number of objects."""
+    groups = table.groups(name, objects)
+    return [
+        _attempt(name, "one-way", objects, partial(one_way, groups)),
+        _attempt(name, "welch", objects, partial(welch, groups)),
+        _attempt(name, "brown-forsythe", objects, partial(brown_forsythe, groups)),
+    ]
+
+
+def two_way_tests(table: StudyTable, name: str) -> list[Result]:
+    """F tests of a measure over all numbers of objects."""
     known = ~np.isnan(table.columns[name])
     factors = table.columns[name][known], table.assistance[known], table.objects[known]
     return [
@@ -149,16 +158,16 @@ def _mixed(table: StudyTable, name: str) -> Any:
 
 
 def _acceptance(table: StudyTable) -> list[Result]:
-    """Mixtures by condition; every visit of the task counts, 2n of them."""
+    """Mixtures by condition, over the visits that each person made."""
     if STRICT not in table.columns:
         return [Result(STRICT, "acceptance", None, None, f"{STRICT} is not known")]
     results = []
     for condition in table.conditions():
-        here = (table.assistance == condition) & ~np.isnan(table.columns[STRICT])
-        visits = 2 * table.objects[here]
-        deviations = np.rint(table.columns[STRICT][here] * visits).astype(int)
-        # A person who drops objects makes more visits than the task has.
-        accepted = np.clip(visits - deviations, 0, visits)
+        made = table.visits()
+        here = (table.assistance == condition) & ~np.isnan(table.columns[STRICT]) & (made > 0)
+        visits = made[here]
+        deviations = np.rint(table.columns[STRICT][here] * 2 * table.objects[here]).astype(int)
+        accepted = np.clip(visits - deviations, 0, visits)  # without `visits`, drops count as deviations only
         kind = f"acceptance, {condition}"
         results.append(_attempt(STRICT, kind, None, partial(fit_mixtures, accepted, visits)))
     return results

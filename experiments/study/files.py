@@ -33,10 +33,10 @@ def check_files(folder: Path, *, replace: bool) -> None:
         check_file(folder / name, replace=replace)
 
 
-def write_analysis(folder: Path, analysis: Analysis, report: str) -> None:
-    """Write all files, each whole or not at all; `report` is the page."""
+def write_analysis(folder: Path, analysis: Analysis, report: str, further: Mapping[str, Any]) -> None:
+    """Write all files, each whole or not at all; `report` is the page, `further` more entries of the statistics."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / STATISTICS, analysis.as_json())
+    write_json(folder / STATISTICS, {**analysis.as_json(), **further})
     table = people_table(analysis.table)
     with replacing(folder / f"{PEOPLE}.parquet") as temporary:
         pa.parquet.write_table(table, temporary)

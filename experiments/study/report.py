@@ -14,6 +14,7 @@ from experiments.study.figures import answers, by_condition, interactions, varia
 from experiments.study.files import f_tests
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.study.paths import paths_figure
+from experiments.study.robustness import Selection
 from mjsim.errors import MjsimError
 
 TITLE = "Study of assistance and difficulty"
@@ -35,10 +36,11 @@ PAIR_HEAD = (
 PAIR_HEAD_MORE = ("g", "95 % interval", "equivalence p", "verdict")
 
 
-def report(analysis: Analysis, folder: Path) -> str:
+def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
     """The page; paths are drawn where `folder` holds run directories."""
     parts = (
         ("People", _people(analysis)),
+        *selection.sections(analysis.table),
         ("Measures by condition", _figures(analysis)),
         ("Answers", _answers(analysis)),
         ("Analyses of variance", _tests(analysis)),

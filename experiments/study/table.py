@@ -1,9 +1,8 @@
 """The people of a study: one row each of trials.parquet, as plain columns."""
 
 import difflib
-import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,22 @@ from experiments.record.origin import RECORDED, origin_of
 from experiments.session.endings import ALL_DELIVERED
 from experiments.study.measures import FILE, LIKERT_PREFIX, Measures, resolve
 from experiments.trials.design import confounded_rows, counted
+from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_name
 from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
 
 REQUIRED = ("assistance", "objects", "user")
 CONDITIONS = ("none", "highlight", "optimal")  # of the paper, in its order
 ANSWERS = (1, 5)  # of Likert items, from and to
+
+
+@dataclass(frozen=True)
+class Gap:
+    """People without a finite value of a measure; its tests leave them out."""
+
+    measure: str
+    value: str  # `missing` or `infinite`
+    people: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -37,6 +46,8 @@ class StudyTable:
     sources: Mapping[str, str]  # column of the file by short name
     origin: str  # whether people were simulated: `Simulated`, `Partly simulated` or `Recorded from people`
     notes: tuple[str, ...]  # remarks about the table, a sentence each
+    left_out: tuple[LeftOut, ...]  # people of the file who are no people of this table
+    gaps: tuple[Gap, ...]  # values that are not known
 
     def conditions(self) -> list[str]:
         """Assistance conditions, those of the paper first and in its order."""
@@ -65,6 +76,15 @@ class StudyTable:
         found = {c: values[here & (self.assistance == c)] for c in self.conditions()}
         return {c: v for c, v in found.items() if len(v)}
 
+    def visits(self) -> NDArray[np.int64]:
+        """Visits that each made, (n,): two per object for who delivered everything, where the table lacks `visits`."""
+        told = zip(self.rows, (2 * self.objects).tolist(), strict=True)
+        whole = [
+            (row.get("visits"), usual * (row.get("ended", ALL_DELIVERED) == ALL_DELIVERED))
+            for row, usual in told
+        ]
+        return np.array([usual if made is None else made for made, usual in whole])
+
     def sizes(self) -> dict[tuple[str, int], int]:
         """People by condition and number of objects, empty cells included."""
         count = Counter(zip(self.assistance.tolist(), self.objects.tolist(), strict=True))
@@ -72,22 +92,45 @@ class StudyTable:
 
 
 def read_study(folder: Path, measures: Measures) -> StudyTable:
-    """Read the people of a study or a batch; a RecordError names a missing column or an invalid value."""
-    path = folder / f"{NAME}.parquet"
+    """Read the people of a study or a batch who finished; a RecordError names a missing column or an invalid value."""
+    return study_table(read_people(folder), measures, people_path(folder))
+
+
+def people_path(folder: Path) -> Path:
+    """The table of a study or a batch."""
+    return folder / f"{NAME}.parquet"
+
+
+def read_people(folder: Path) -> Sequence[Mapping[str, Any]]:
+    """The rows of a study or a batch; a RecordError names a missing column."""
+    path = people_path(folder)
     rows = read_rows(path)
     if not rows:
         raise RecordError(f"{path} has no rows; there are no participants yet")
     missing = [name for name in REQUIRED if name not in rows[0]]
     if missing:
         raise RecordError(f"{path} has no column {', '.join(missing)}; it is not a table of people")
-    return study_table(rows, measures, path)
+    return rows
 
 
-def study_table(rows: Sequence[Mapping[str, Any]], measures: Measures, path: Path) -> StudyTable:
-    """People by their rows; a RecordError names `path` and a value that is invalid."""
-    _check_design(rows, path)
-    _check_answer_columns(rows[0], measures, path)
-    numbers = {column: _numbers(rows, column, path) for column in _candidates(measures) if column in rows[0]}
+def study_table(
+    everybody: Sequence[Mapping[str, Any]],
+    measures: Measures,
+    path: Path,
+    exclusions: Exclusions = Exclusions(),  # noqa: B008 - frozen
+) -> StudyTable:
+    """People by their rows, but for those who are left out; a RecordError names `path` and a value that is invalid."""
+    _check_design(everybody, path)
+    _check_answer_columns(everybody[0], measures, path)
+    absent = left_out(exclusions, everybody, path)
+    kept = {k: row for k, row in enumerate(everybody) if k not in absent}
+    rows = list(kept.values())
+    if not rows:
+        rules = Counter(rule for person in absent.values() for rule in person.rules)
+        each = ", ".join(f"{count} by {rule}" for rule, count in rules.items())
+        raise RecordError(f"{path}: all {counted(len(absent), 'row')} are left out: {each}")
+    read = {column: _numbers(kept, column, path) for column in _candidates(measures) if column in rows[0]}
+    numbers = {column: np.where(np.isinf(values), np.nan, values) for column, values in read.items()}
     known = {column for column, values in numbers.items() if not np.isnan(values).all()}
     sources = {}
     for name, measure in measures.objective.items():
@@ -103,7 +146,7 @@ def study_table(rows: Sequence[Mapping[str, Any]], measures: Measures, path: Pat
     answers = [name for name in columns if name.startswith(LIKERT_PREFIX)]
     if origin != RECORDED and answers:
         raise RecordError(f"{path} has answers of simulated people ({answers[0]}); nothing simulates answers")
-    _check_ranges(rows, numbers, measures, path)
+    _check_ranges(kept, numbers, measures, path)
     for name in answers:
         _check_answers(columns[name], name, path)
     return StudyTable(
@@ -114,7 +157,9 @@ def study_table(rows: Sequence[Mapping[str, Any]], measures: Measures, path: Pat
         columns,
         sources,
         origin,
-        tuple(_notes(rows, columns)),
+        tuple(_notes(rows)),
+        tuple(absent.values()),
+        tuple(_gaps(kept, read, sources)),
     )
 
 
@@ -138,7 +183,7 @@ def _check_answer_columns(row: Mapping[str, Any], measures: Measures, path: Path
 
 
 def _check_ranges(
-    rows: Sequence[Mapping[str, Any]],
+    rows: Mapping[int, Mapping[str, Any]],
     numbers: Mapping[str, NDArray[np.float64]],
     measures: Measures,
     path: Path,
@@ -147,10 +192,11 @@ def _check_ranges(
         low, high = measure.range
         for name in (measure.column, *filter(None, [measure.without]), *measure.others):
             values = numbers.get(name, np.empty(0))
-            for k in np.flatnonzero((values < low) | (values > high)).tolist():
+            for place in np.flatnonzero((values < low) | (values > high)).tolist():
+                k = list(rows)[place]
                 raise RecordError(
-                    f"{path}: row {k} (person seed {rows[k].get('person_seed')}) has the {name} {values[k]:g}, not a "
-                    f"number from {low:g} to {high:g}; correct it, or leave the person out"
+                    f"{path}: row {k} (person seed {rows[k].get('person_seed')}) has the {name} {values[place]:g}, "
+                    f"not a number from {low:g} to {high:g}; correct it, or leave the person out by --exclude"
                 )
 
 
@@ -166,15 +212,13 @@ def _candidates(measures: Measures) -> list[str]:
     return [*objective, *_likert_columns(measures)]
 
 
-def _numbers(rows: Sequence[Mapping[str, Any]], column: str, path: Path) -> NDArray[np.float64]:
+def _numbers(rows: Mapping[int, Mapping[str, Any]], column: str, path: Path) -> NDArray[np.float64]:
     """A column (n,), with NaN for unknown values."""
-    for k, row in enumerate(rows):
+    for k, row in rows.items():
         value = row.get(column)
         if value is not None and (isinstance(value, str | bool) or not isinstance(value, int | float)):
             raise RecordError(f"{path}: row {k} has the {column} {value!r}, which is no number")
-        if value is not None and math.isinf(value):
-            raise RecordError(f"{path}: row {k} has an infinite {column}")
-    return np.array([np.nan if row.get(column) is None else row[column] for row in rows], float)
+    return np.array([np.nan if row.get(column) is None else row[column] for row in rows.values()], float)
 
 
 def _check_answers(values: NDArray[np.float64], name: str, path: Path) -> None:
@@ -184,7 +228,20 @@ def _check_answers(values: NDArray[np.float64], name: str, path: Path) -> None:
         raise RecordError(f"{path}: {name} has the answer {bad[0]:g}; answers are whole numbers from 1 to 5")
 
 
-def _notes(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, NDArray[np.float64]]) -> list[str]:
+def _gaps(
+    rows: Mapping[int, Mapping[str, Any]], read: Mapping[str, NDArray[np.float64]], sources: Mapping[str, str]
+) -> Iterator[Gap]:
+    """Who lacks a measure; a column that is infinite for everybody else is named as well, though it is not analysed."""
+    names = {column: name for name, column in sources.items()}
+    everybody = [person_name(row, k) for k, row in rows.items()]
+    for column, values in read.items():
+        for value, lacking in (("infinite", np.isinf(values)), ("missing", np.isnan(values))):
+            if lacking.any() and (column in names or np.isinf(values).any()):
+                people = tuple(everybody[k] for k in np.flatnonzero(lacking))
+                yield Gap(names.get(column, column), value, people)
+
+
+def _notes(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     notes = []
     unfinished = sum(row.get("ended", ALL_DELIVERED) != ALL_DELIVERED for row in rows)
     if unfinished:
@@ -192,10 +249,6 @@ def _notes(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, NDArray[np.f
             f"{counted(unfinished, 'trial')} ended before everything was delivered; times and distances of these are "
             "smaller than those of the whole task."
         )
-    for name, values in columns.items():
-        gaps = int(np.isnan(values).sum())
-        if gaps:
-            notes.append(f"{name} is not known for {gaps} of {len(values)}; tests of it leave these out.")
     cells = Counter(
         cell for _, cell in {_person_and_cell(row) for row in rows if row.get("person_seed") is not None}
     )

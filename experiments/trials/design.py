@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import msgspec
 
 from experiments.errors import ConfigError
+from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import (
     CONFOUNDERS,
     PATHS,
@@ -34,6 +35,7 @@ class Design:
     """
 
     trials: tuple[TrialConfig, ...]
+    exclusions: Exclusions | None = None  # who will be left out of the analysis, where the file says it
 
     def __post_init__(self) -> None:
         if not self.trials:
@@ -103,24 +105,45 @@ _IN_A_CELL = {*SETTINGS, "people", *_SEEDS} - {"live", *SEEDS}
 class _File(msgspec.Struct, forbid_unknown_fields=True):
     cells: Annotated[list[dict[str, Any]], msgspec.Meta(min_length=1)]
     all_cells: dict[str, Any] = msgspec.field(default_factory=dict)
+    exclusions: Exclusions | None = None
 
 
 def read_design(path: Path) -> Design:
     """Read a design from a TOML file; a ConfigError names the file and a value that is unusable."""
     trials: list[TrialConfig] = []
     reached = None
+    content = _content(path, "design")
     try:
-        file = msgspec.convert(tomllib.loads(read_text(path)), _File)
+        file = msgspec.convert(content, _File)
         for reached, cell in enumerate(file.cells):  # noqa: B007 - for errors
             trials += _cell_trials({**file.all_cells, **cell}, path.parent)
         reached = None
-        return Design(tuple(trials))
-    except OSError as error:
-        raise ConfigError(f"cannot read design {path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ConfigError(f"{path} is not TOML: {error}") from error
+        return Design(tuple(trials), file.exclusions)
     except (msgspec.ValidationError, ConfigError) as error:
         raise ConfigError(f"{path}: {_located(str(error), reached)}") from error
+
+
+def read_exclusions(path: Path) -> Exclusions:
+    """Read who is left out: a TOML file of rules and people, or the `exclusions` of a design; errors name the file."""
+    content = _content(path, "rules")
+    if "cells" in content:
+        found = read_design(path).exclusions
+        if found is None:
+            raise ConfigError(f"{path} has no table [exclusions]; it leaves nobody out")
+        return found
+    try:
+        return msgspec.convert(content, Exclusions)
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"{path}: {error}; docs/study.md says how rules are written") from error
+
+
+def _content(path: Path, what: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(read_text(path))
+    except OSError as error:
+        raise ConfigError(f"cannot read {what} {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise ConfigError(f"{path} is not TOML: {error}") from error
 
 
 def _located(message: str, cell: int | None) -> str:

@@ -16,6 +16,9 @@ cell of assistance x number of objects. Writes
   people.parquet, .csv    a row per person
   tests.csv               a row per F test
 
+Who did not finish is left out, and so are those whom --exclude names, by rules over columns or one by one; the report
+says who, why, and how results change without each rule.
+
 Which column stands for which measure is fixed in experiments/study/designs/metrics.toml. docs/study.md explains how
 to read it. All output from simulated people is marked as such."""
 
@@ -27,6 +30,18 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study or a batch")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: DIR/analysis)")
+    parser.add_argument(
+        "--exclude",
+        type=Path,
+        metavar="RULES.toml",
+        help="who is left out: rules and people, or a study file",
+    )
+    parser.add_argument(
+        "--preregistration",
+        type=Path,
+        metavar="FILE",
+        help="ZIP of `mjsim study preregister`: its exclusions apply, and the report says what departs from it",
+    )
     add_force(parser, "replace an earlier analysis")
 
 
@@ -36,13 +51,31 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.study.analysis import analyse
     from experiments.study.files import FOLDER, REPORT, check_files, write_analysis
     from experiments.study.measures import read_measures
+    from experiments.study.preregistration import departures, read_preregistration
     from experiments.study.report import report
-    from experiments.study.table import read_study
+    from experiments.study.robustness import Selection, leave_one_out
+    from experiments.study.table import people_path, read_people, study_table
+    from experiments.trials.design import read_exclusions
+    from experiments.trials.exclusions import Exclusions
 
     out = arguments.folder / FOLDER if arguments.out is None else arguments.out
     check_files(out, replace=arguments.force)
-    measures = read_measures()
-    analysis = analyse(read_study(arguments.folder, measures), measures)
-    write_analysis(out, analysis, report(analysis, arguments.folder))
-    print(f"{analysis.table.origin}: {len(analysis.table.rows)} people. {out / REPORT}")
+    frozen = None if arguments.preregistration is None else read_preregistration(arguments.preregistration)
+    exclusions = Exclusions() if frozen is None else frozen.exclusions
+    if arguments.exclude is not None:
+        exclusions = read_exclusions(arguments.exclude)
+    measures, path, everybody = read_measures(), people_path(arguments.folder), read_people(arguments.folder)
+    analysis = analyse(study_table(everybody, measures, path, exclusions), measures)
+    without = leave_one_out(everybody, measures, path, exclusions)
+    selection = Selection(without)
+    if frozen is not None:
+        departing = departures(frozen, exclusions, everybody, arguments.folder)
+        selection = Selection(without, frozen.sha256, departing)
+    write_analysis(out, analysis, report(analysis, arguments.folder, selection), selection.as_json())
+    print(
+        f"{analysis.table.origin}: {len(analysis.table.rows)} people, {len(analysis.table.left_out)} left out. "
+        f"{out / REPORT}"
+    )
+    if frozen is not None:
+        print(f"departures from the preregistration: {len(selection.departures)}")
     return 0

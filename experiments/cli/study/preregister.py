@@ -1,0 +1,35 @@
+"""`mjsim study preregister`: freeze a study before there are data."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.options import add_command, add_force
+from experiments.cli.requirements import require_extra
+
+DESCRIPTION = """\
+Freeze a study before there are data: its design, measures, exclusions ([exclusions] in STUDY.toml, docs/study.md), the
+code of the analysis and all versions, as one ZIP. Equal studies give equal bytes. Deposit the file, or the SHA-256 that
+is printed; `mjsim study analyze DIR --preregistration FILE` applies its exclusions and reports what departs from it."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands, "preregister", run, summary="freeze a study before there are data", description=DESCRIPTION
+    )
+    parser.add_argument("study", type=Path, metavar="STUDY.toml", help="study file, or `paper`")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ZIP to write")
+    add_force(parser, "replace a file that exists")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Freeze, say the hash."""
+    require_extra("study")
+    from experiments.record.run_directory import check_file
+    from experiments.study.preregistration import write_preregistration
+    from experiments.study.simulate import study_path
+
+    check_file(arguments.out, replace=arguments.force)
+    print(f"{write_preregistration(study_path(arguments.study), arguments.out)}  {arguments.out}")
+    return 0

@@ -1,0 +1,154 @@
+"""Who is left out of a study and why: rules over the columns of its table, and people by name (docs/study.md)."""
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from experiments.errors import RecordError
+from experiments.session.endings import ALL_DELIVERED
+
+Row = Mapping[str, Any]
+Comparison = Literal["<", "<=", ">", ">=", "==", "!=", "missing", "infinite"]
+Reason = Annotated[str, msgspec.Meta(min_length=1, max_length=200, pattern=r"^[^\r\n]*\S[^\r\n]*\Z")]
+IDS = ("participant", "fingerprint", "person_seed")  # columns that name a person, the best first
+BY_NAME = "people by name"
+
+
+class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """People are left out whose value in a column compares so; a missing value is only ever `missing`."""
+
+    column: str
+    comparison: Comparison
+    reason: Reason
+    value: bool | int | float | str | None = None
+
+    def __post_init__(self) -> None:
+        takes_value = self.comparison not in ("missing", "infinite")
+        if takes_value != (self.value is not None):
+            raise ValueError(f"{self.comparison!r} takes {'a' if takes_value else 'no'} `value`")
+        if isinstance(self.value, float) and not math.isfinite(self.value):
+            raise ValueError(
+                f"`value` is {self.value}; for that, write comparison = 'infinite' or 'missing', and no value"
+            )
+        if isinstance(self.value, str | bool) and self.comparison not in ("==", "!="):
+            raise ValueError(f"{self.value!r} has no order; compare it by '==' or '!='")
+
+    def __str__(self) -> str:
+        given = "" if self.value is None else f" {self.value!r}"
+        return f"{self.column} {self.comparison}{given}"
+
+    def holds(self, row: Row) -> bool:
+        """Whether a row is left out; a TypeError where its value cannot be compared."""
+        found = row.get(self.column)
+        unknown = found is None or (isinstance(found, float) and math.isnan(found))
+        if unknown or self.comparison == "missing":
+            return unknown and self.comparison == "missing"
+        if self.comparison == "infinite":
+            return isinstance(found, float) and math.isinf(found)
+        if _kind(found) is not _kind(self.value):
+            raise TypeError(f"{found!r} cannot be compared with {self.value!r}")
+        return bool(_COMPARED[self.comparison](found, self.value))
+
+
+_COMPARED: Mapping[str, Any] = {
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    ">": lambda a, b: a > b,
+    ">=": lambda a, b: a >= b,
+    "==": lambda a, b: a == b,
+    "!=": lambda a, b: a != b,
+}
+UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
+
+
+class Person(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Somebody who is left out by name, and why."""
+
+    id: str | int  # in one of the columns `IDS`
+    reason: Reason
+
+
+class Exclusions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Rules and people; those who did not finish are left out as well unless they are kept."""
+
+    rules: tuple[Rule, ...] = ()
+    people: tuple[Person, ...] = ()
+    unfinished: Literal["leave out", "keep"] = "leave out"
+
+    def __post_init__(self) -> None:
+        rules, people = [str(rule) for rule in self.rules], [str(person.id) for person in self.people]
+        for what, names in (("rule", rules), ("person", people)):
+            if twice := next((name for name in names if names.count(name) > 1), None):
+                raise ValueError(f"the {what} {twice} is there twice; leave one out")
+
+    def all_rules(self) -> tuple[Rule, ...]:
+        """The rules, and the one on those who did not finish."""
+        implied = self.unfinished == "leave out" and str(UNFINISHED) not in map(str, self.rules)
+        return (*self.rules, *([UNFINISHED] if implied else []))
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Somebody who is left out."""
+
+    person: str
+    assistance: str
+    objects: int
+    rules: Mapping[str, str]  # each that leaves them out, with its reason
+
+
+def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[int, LeftOut]:
+    """Those who are left out of a table, by row; a RecordError names a rule or a person that does not fit it."""
+    found: dict[int, dict[str, str]] = {}
+    for number, rule in enumerate(exclusions.all_rules(), start=1):
+        if rule is UNFINISHED and not any(rule.column in row for row in rows):
+            continue
+        label = f"rule {number} ({rule})"
+        _check_column(rule.column, rows, f"{path}: {label}")
+        for k, row in enumerate(rows):
+            try:
+                holds = rule.holds(row)
+            except TypeError as error:
+                raise RecordError(f"{path}: {label} does not fit {person_name(row, k)}: {error}") from error
+            if holds:
+                found.setdefault(k, {})[str(rule)] = rule.reason
+    for person in exclusions.people:
+        by_column = (
+            [k for k, row in enumerate(rows) if str(row.get(name)) == str(person.id)] for name in IDS
+        )
+        theirs = next(filter(None, by_column), None)
+        if theirs is None:
+            raise RecordError(
+                f"{path}: there is no person {person.id!r} to leave out; names are in {', '.join(IDS)}, such as "
+                f"{person_name(rows[0], 0)!r}"
+            )
+        for k in theirs:
+            found.setdefault(k, {})[BY_NAME] = person.reason
+    return {
+        k: LeftOut(person_name(rows[k], k), rows[k]["assistance"], rows[k]["objects"], found[k])
+        for k in sorted(found)
+    }
+
+
+def person_name(row: Row, number: int) -> str:
+    """The name of a person: their id, or the number of their row where they have none."""
+    return str(next((row[name] for name in IDS if row.get(name) is not None), f"row {number}"))
+
+
+def _kind(value: object) -> type:
+    if isinstance(value, bool | str):
+        return type(value)
+    return float if isinstance(value, int | float) else type(value)
+
+
+def _check_column(column: str, rows: Sequence[Row], where: str) -> None:
+    known = list(dict.fromkeys(name for row in rows for name in row))
+    if column not in known:
+        near = difflib.get_close_matches(column, known, 1)
+        advice = f"did you mean {near[0]}?" if near else "docs/data.md lists them"
+        raise RecordError(f"{where}: the table has no column {column!r}; {advice}")
