@@ -85,6 +85,14 @@ def own_module(tmp_path, monkeypatch):
     sys.modules.pop("own_code", None)
 
 
+@pytest.fixture(scope="module")
+def frequent_checkpoints():
+    """Every 2 s instead of every 10 s, so that short runs have several. A replay takes them from the record."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.record.writer.CHECKPOINT_PERIOD", 2.0)
+        yield
+
+
 @pytest.fixture
 def step_singly():
     """Makes a world take one control step per action, as for a viewer."""

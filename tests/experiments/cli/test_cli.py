@@ -15,6 +15,14 @@ from experiments.cli.main import COMMANDS, main, parser
 from experiments.cli.options import frame_size, int_list, seconds, text_list
 from mjsim.episode import Episode
 
+ROOT = Path(__file__).parents[3]
+DESIGN = str(ROOT / "docs" / "designs" / "two_houses.toml")
+DEFAULTS = {  # some that the help of a command names
+    "run": ["objects, 1 to --points (default: 6)", "(default: optimal)", "size, px (default: 640x480)"],
+    "batch": ["(default: 0:10)", "(default: none,highlight,optimal)", "(default: apartment)"],
+    "replay": ["(default: 0.0)", "(default: first-person)", "a free camera, m (default: it circles"],
+}
+
 
 @pytest.mark.parametrize(
     ("read", "text", "value"),
@@ -44,12 +52,14 @@ def test_values_that_are_none(read, texts):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_explains_itself(command, capsys):
+def test_every_command_explains_itself_and_its_defaults(command, capsys):
     with pytest.raises(SystemExit) as stop:
         main([command, "--help"])
     assert stop.value.code == 0
-    text = capsys.readouterr().out
-    assert len(text.splitlines()) > 5
+    lines = capsys.readouterr().out.splitlines()
+    text = " ".join(word for line in lines for word in line.split())
+    assert len(lines) > 5 and "None" not in text and "False" not in text
+    assert all(default in text for default in DEFAULTS.get(command, []))
 
 
 def test_the_overview_names_every_command():
@@ -72,6 +82,7 @@ def test_the_overview_names_every_command():
         (["play", "--film", "nothing.mp4"], "there is no film"),
         (["play", "--public-url", "ftp://x"], "must be of the form"),
         (["play", "--host", "no.such.host.invalid"], "name another --port (0 for any) or --host"),
+        (["batch", DESIGN, "--user", "searcher", "--seeds", "1"], "leave out --seeds, --user"),
         (["batch", "--seeds", "1,1"], "--seeds names a value twice"),
         (["batch", "--seeds", "0", "--workers", "0"], "at least one worker, got 0"),
         (["batch", "--assistance", ","], "at least one value for --assistance"),
@@ -84,22 +95,6 @@ def test_bad_input_is_named_in_one_line_and_leaves_nothing(arguments, fault, tmp
     assert message.startswith("mjsim: ")
     assert fault in message
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("command", "defaults"),
-    [
-        ("run", ["objects, 1 to --points (default: 6)", "(default: optimal)", "size, px (default: 640x480)"]),
-        ("batch", ["(default: 0:10)", "(default: none,highlight,optimal)", "(default: apartment)"]),
-        ("replay", ["(default: 0.0)", "(default: first-person)", "a free camera, m (default: it circles"]),
-    ],
-)
-def test_the_help_names_the_default_of_every_option(command, defaults, capsys):
-    with pytest.raises(SystemExit):
-        main([command, "--help"])
-    text = " ".join(capsys.readouterr().out.split())
-    assert all(default in text for default in defaults)
-    assert "None" not in text and "False" not in text
 
 
 def test_a_house_for_stock_mujoco(tmp_path, capsys):
@@ -126,16 +121,6 @@ def test_the_version_is_told(capsys):
     assert capsys.readouterr().out.startswith("mjsim ")
 
 
-def test_a_design_takes_no_options_of_trials_beside_it(tmp_path, capsys):
-    design = tmp_path / "design.toml"
-    design.write_text("[[cells]]\npeople = 1\nobjects = 1\nassistance = 'none'")
-    assert (
-        main(["batch", str(design), "--user", "searcher", "--seeds", "1", "--out", str(tmp_path / "b")]) == 2
-    )
-    assert "leave out --seeds, --user" in capsys.readouterr().err
-    assert not (tmp_path / "b").exists()
-
-
 def test_modules_in_the_current_folder_are_found(tmp_path):
     """By the installed command, whose own folder is elsewhere: participant and planner of one's own."""
     (tmp_path / "mine.py").write_text(
@@ -146,7 +131,7 @@ def test_modules_in_the_current_folder_are_found(tmp_path):
     subprocess.run(
         [sys.executable, "-P", "-m", "mjsim", *words.split(), *own.split()],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
         check=True,
         capture_output=True,
         timeout=120,

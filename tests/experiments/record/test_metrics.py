@@ -54,11 +54,8 @@ def test_deviations_over_all_visits_of_the_task_and_over_those_with_a_choice():
     assert metrics.nd_strict_2n == pytest.approx(1 / 4)
     assert metrics.nd_feasible == pytest.approx(1 / 3)
     assert measured(CHOICES[0], objects=6).nd_strict_2n == pytest.approx(1 / 12), "also of an unfinished task"
-
-
-def test_without_any_choice_there_are_no_deviations():
-    metrics = measured(visit(alternatives=0))
-    assert (metrics.nd_feasible, metrics.nd_bin_tied, metrics.nd_strict_2n) == (0.0, 0.0, 0.0)
+    nothing = measured(visit(alternatives=0))
+    assert (nothing.nd_feasible, nothing.nd_bin_tied, nothing.nd_strict_2n) == (0.0, 0.0, 0.0)
 
 
 def test_who_makes_no_visit_has_neither_the_best_score_nor_any():

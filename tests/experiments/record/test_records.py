@@ -86,20 +86,16 @@ def test_a_run_appears_whole_and_replaces_an_earlier_one_unless_it_fails(tmp_pat
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
-def test_a_truncated_log_is_named_with_its_line(tmp_path):
-    path = tmp_path / "events.jsonl"
-    path.write_text(json.dumps({"t": 0, "event": "start"}) + '\n{"t": 1, "ev')
-    with pytest.raises(RecordError, match=r"events\.jsonl, line 2 is not JSON"):
-        read_events(path)
-
-
-@pytest.mark.parametrize(("text", "fault"), [(None, "cannot read"), ("{", "is not JSON")])
-def test_unreadable_json_is_named(tmp_path, text, fault):
+def test_unreadable_files_are_named(tmp_path):
     path = tmp_path / "metrics.json"
-    if text is not None:
-        path.write_text(text)
-    with pytest.raises(RecordError, match=f"metrics.json.*{fault}|{fault}.*metrics.json"):
+    with pytest.raises(RecordError, match=r"cannot read.*metrics\.json"):
         read_json(path)
+    path.write_text("{")
+    with pytest.raises(RecordError, match=r"metrics\.json.*is not JSON"):
+        read_json(path)
+    path.write_text(json.dumps({"t": 0, "event": "start"}) + '\n{"t": 1, "ev')
+    with pytest.raises(RecordError, match=r"metrics\.json, line 2 is not JSON"):
+        read_events(path)
 
 
 def test_a_trajectory_round_trips_and_repeats_byte_for_byte(tmp_path):

@@ -30,6 +30,7 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.errors import PhysicsError
 
+pytestmark = pytest.mark.usefixtures("frequent_checkpoints")
 DT = 0.04
 SMALL = FilmConfig(320, 240, "draft")
 FEW = settings(
@@ -39,14 +40,6 @@ FEW = settings(
 )
 COLUMNS = [(records.RECORDING, "state_hash"), *((records.TRAJECTORY, name) for name in TRAJECTORY_COLUMNS)]
 FAULTS = {"state_hash": "the state differs", "action": "trajectory.npz: the action"}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def frequent_checkpoints():
-    """Every 2 s instead of every 10 s, so that short runs have several. A replay takes them from the record."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.record.writer.CHECKPOINT_PERIOD", 2.0)
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -116,16 +116,15 @@ def test_numbers(text, values):
 
 def start_of(house, **seeds):
     config = TrialConfig(objects=6, assistance="none", time_limit=2.0, regret=False, **seeds)
-    session, _, log = prepared(house, config)
-    return log.events[0], session
+    return prepared(house, config)[2].events[0]
 
 
 def test_each_seed_decides_one_thing(house):
-    same, _ = start_of(house, seed=3)
+    same = start_of(house, seed=3)
     assert (same["house_seed"], same["person_seed"], same["order_seed"]) == (3, 3, 3)
-    other_house, _ = start_of(house, seed=3, house_seed=4)
-    other_order, _ = start_of(house, seed=3, order_seed=4)
-    other_person, _ = start_of(house, seed=3, person_seed=4)
+    other_house = start_of(house, seed=3, house_seed=4)
+    other_order = start_of(house, seed=3, order_seed=4)
+    other_person = start_of(house, seed=3, person_seed=4)
     assert other_house["episode_sha256"] != same["episode_sha256"]
     assert (other_house["order"], other_house["person_seed"]) == (same["order"], 3)
     assert other_order["episode_sha256"] == same["episode_sha256"]

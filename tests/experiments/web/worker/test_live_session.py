@@ -13,14 +13,8 @@ from experiments.trials.trial_config import TrialConfig
 from experiments.web.controls import Input
 from experiments.web.worker.live_session import LiveSession, journal_of, open_journal, save_run
 
+pytestmark = pytest.mark.usefixtures("frequent_checkpoints")
 CONFIG = TrialConfig(objects=6, assistance="guided", seed=3, user="human", live=True, fidelity="event")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def frequent_checkpoints():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("experiments.record.writer.CHECKPOINT_PERIOD", 2.0)
-        yield
 
 
 def wandering(seed: int, steps: int):
