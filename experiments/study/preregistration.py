@@ -38,7 +38,6 @@ ANALYSIS = (
     "experiments/trials/exclusions.py",
 )
 CELL = ("assistance", "objects")
-MAX_FILES = 1000
 _DATE = (1980, 1, 1, 0, 0, 0)  # of every file, as a ZIP must have one
 
 Files = dict[str, bytes]
@@ -58,6 +57,8 @@ class Preregistration:
 def write_preregistration(study: Path, out: Path) -> str:
     """Freeze a study file as a ZIP; its SHA-256."""
     design = read_design(study)
+    if out.exists() and out.samefile(study):
+        raise ConfigError(f"{out} is the study file itself; name another file to write")
     files = _frozen(design.exclusions or Exclusions())
     files[STUDY] = study.read_bytes()
     files[DESIGN] = _json([_comparable(trial.settings()) for trial in design.trials])
@@ -108,40 +109,41 @@ def read_preregistration(path: Path) -> Preregistration:
     """Read a preregistration; a ConfigError says why it is none, or not as it was written."""
     try:
         data = read_bytes(path)
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            entries = archive.infolist()
-            if len(entries) > MAX_FILES or any(e.compress_type != zipfile.ZIP_STORED for e in entries):
-                raise ConfigError(
-                    f"{path} was not written by `mjsim study preregister`: its files are packed otherwise"
-                )
-            files = {entry.filename: archive.read(entry) for entry in entries}
+        files = _unpacked(data)
         told = msgspec.json.decode(files.pop(MANIFEST), type=dict[str, str])
         sums = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
         if changed := sorted(name for name in {**told, **sums} if told.get(name) != sums.get(name)):
             raise ConfigError(
-                f"{path} was changed after it was written: {changed[0]} is not what its manifest says"
+                f"it was changed after it was written: {changed[0]} is not what its manifest says"
             )
         exclusions = msgspec.json.decode(files[EXCLUSIONS], type=Exclusions)
         versions = msgspec.json.decode(files[VERSIONS], type=dict[str, str])
         design = msgspec.json.decode(files[DESIGN], type=list[dict[str, Any]])
-        if any(set(trial) != set(SETTINGS) for trial in design):
-            raise ConfigError(
-                f"{path}: {DESIGN} does not hold the settings of each trial; another version wrote it"
-            )
+        for trial in design:
+            if set(trial) != set(SETTINGS) or not isinstance(trial["assistance"], str):
+                raise ConfigError(
+                    f"{DESIGN} does not hold the settings of each trial; another version wrote it"
+                )
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror}") from error
     except KeyError as error:
         raise ConfigError(f"{path} is no preregistration: it has no {error}") from error
-    except (
-        zipfile.BadZipFile,
-        msgspec.MsgspecError,
-        UnicodeDecodeError,
-        EOFError,
-        NotImplementedError,
-        RuntimeError,
-    ) as error:
-        raise ConfigError(f"{path} is no preregistration: {error}") from error
+    except Exception as error:  # zipfile raises a dozen types on damaged files
+        raise ConfigError(f"{path} is no preregistration that can be used: {error}") from error
     return Preregistration(files, hashlib.sha256(data).hexdigest(), exclusions, versions, design)
+
+
+def _unpacked(data: bytes) -> Files:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        entries = archive.infolist()
+        files = {}
+        for entry in entries:
+            if entry.compress_type != zipfile.ZIP_STORED or entry.filename in files:
+                raise ConfigError(
+                    "`mjsim study preregister` did not write it: files are packed, or there twice"
+                )
+            files[entry.filename] = archive.read(entry)
+    return files
 
 
 def departures(

@@ -21,6 +21,7 @@ from experiments.trials.trial_config import SEEDS
 
 REQUIRED = ("assistance", "objects", "user")
 CONDITIONS = ("none", "highlight", "optimal")  # of the paper, in its order
+SHOWN = 20  # people in a line
 ANSWERS = (1, 5)  # of Likert items, from and to
 
 
@@ -84,6 +85,14 @@ class StudyTable:
             for row, usual in told
         ]
         return np.array([usual if made is None else made for made, usual in whole])
+
+    def absent(self) -> list[str]:
+        """A line that names those who are left out, if any."""
+        names = [person.person for person in self.left_out]
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        return (
+            [f"left out, as not everything was delivered: {', '.join(names[:SHOWN])}{more}"] if names else []
+        )
 
     def sizes(self) -> dict[tuple[str, int], int]:
         """People by condition and number of objects, empty cells included."""

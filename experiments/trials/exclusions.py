@@ -15,6 +15,7 @@ from experiments.session.endings import ALL_DELIVERED
 Row = Mapping[str, Any]
 Comparison = Literal["<", "<=", ">", ">=", "==", "!=", "missing", "infinite"]
 Reason = Annotated[str, msgspec.Meta(min_length=1, max_length=200, pattern=r"^[^\r\n]*\S[^\r\n]*\Z")]
+Name = Annotated[str, msgspec.Meta(max_length=200)]
 IDS = ("participant", "fingerprint", "person_seed")  # columns that name a person, the best first
 BY_NAME = "people by name"
 
@@ -22,10 +23,10 @@ BY_NAME = "people by name"
 class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """People are left out whose value in a column compares so; a missing value is only ever `missing`."""
 
-    column: str
+    column: Name
     comparison: Comparison
     reason: Reason
-    value: bool | int | float | str | None = None
+    value: bool | int | float | Name | None = None
 
     def __post_init__(self) -> None:
         takes_value = self.comparison not in ("missing", "infinite")
@@ -69,7 +70,7 @@ UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 class Person(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Somebody who is left out by name, and why."""
 
-    id: str | int  # in one of the columns `IDS`
+    id: Name | int  # in one of the columns `IDS`
     reason: Reason
 
 

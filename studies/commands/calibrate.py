@@ -95,4 +95,6 @@ def run(arguments: argparse.Namespace) -> int:
         )
     write_calibration(out, found, study_path(arguments.study))
     print(f"{found.origin}: {out / PAGE}")
+    for line in (line for pool in pools for line in pool.absent()):
+        print(line)
     return 0

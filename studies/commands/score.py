@@ -53,8 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
     for name in FILES:
         check_file(out / name, replace=arguments.force)
     published = read_published()
-    found = score(read_study(arguments.folder, read_measures()), published, seed=arguments.seed)
+    people = read_study(arguments.folder, read_measures())
+    found = score(people, published, seed=arguments.seed)
     _show(found)
+    for line in people.absent():
+        print(line)
     write_score(out, found, published)
     return 0
 

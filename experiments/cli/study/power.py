@@ -80,6 +80,8 @@ def run(arguments: argparse.Namespace) -> int:
     pool = read_study(arguments.pool, read_measures())
     found = plan_power(cells, pool, wanted, cost, seed=arguments.seed)
     _show(found, wanted, pool.sources[wanted.measure])
+    for line in pool.absent():
+        print(line)
     if arguments.out is not None:
         write_json(arguments.out, {**asdict(wanted), **asdict(cost), **asdict(found)})
     return 0

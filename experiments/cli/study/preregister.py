@@ -18,7 +18,7 @@ def add_parser(commands: Any) -> None:
     parser = add_command(
         commands, "preregister", run, summary="freeze a study before there are data", description=DESCRIPTION
     )
-    parser.add_argument("study", type=Path, metavar="STUDY.toml", help="study file, or `paper`")
+    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ZIP to write")
     add_force(parser, "replace a file that exists")
 

@@ -193,6 +193,28 @@ def test_equal_studies_give_equal_bytes_wherever_they_are(study, tmp_path):
     assert first.read_bytes() == second.read_bytes()
 
 
+def test_the_study_file_is_never_replaced_by_its_preregistration(study, capsys):
+    assert main(["study", "preregister", str(study), "--out", str(study), "--force"]) == 2
+    assert "is the study file itself" in capsys.readouterr().err
+    assert study.read_text() == STUDY + RULES
+
+
+def test_any_damage_to_a_preregistration_is_a_refusal_in_one_line(study, tmp_path):
+    """Each of 100 bytes is changed in turn; what is still read is what was written."""
+    path = tmp_path / "p.zip"
+    write_preregistration(study, path)
+    written, whole = read_preregistration(path), path.read_bytes()
+    rng = np.random.default_rng(0)
+    for place in [*rng.integers(0, len(whole), 50), *rng.integers(len(whole) - 3000, len(whole), 50)]:
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << rng.integers(8)
+        path.write_bytes(damaged)
+        try:
+            assert read_preregistration(path).files == written.files
+        except ConfigError as error:
+            assert "\n" not in str(error)
+
+
 def people_as_planned():
     """A row for each trial of the study, with its settings."""
     rows = made_up_people(PLANNED)

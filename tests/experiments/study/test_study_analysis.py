@@ -250,7 +250,9 @@ def test_the_power_commands_help_names_the_smallest_pool(capsys):
 
 
 def test_the_power_command(tmp_path, capsys):
-    study(tmp_path, made_up_people(dict.fromkeys(SMALL, 30)))
+    people = made_up_people(dict.fromkeys(SMALL, 30))
+    people[4]["ended"] = "time limit"
+    study(tmp_path, people)
     cells = "".join(f'[[cells]]\nassistance = "{a}"\nobjects = {n}\npeople = 5\n' for a, n in SMALL)
     (tmp_path / "study.toml").write_text(cells)
     out = tmp_path / "power.json"
@@ -258,4 +260,6 @@ def test_the_power_command(tmp_path, capsys):
     assert main([*words, "--out", str(out)]) == 0
     found = json.loads(out.read_text())
     assert found["origin"] == SIMULATED
-    assert f"{found['per_cell']} [90 % interval" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert f"{found['per_cell']} [90 % interval" in told
+    assert "left out, as not everything was delivered: 4" in told
