@@ -75,14 +75,18 @@ def signals_as_in_a_terminal():
 def own_module(tmp_path, monkeypatch):
     """Makes a module of a user's own importable, here and in commands that run in the folder of the test."""
 
+    names = []
+
     def write(text, name="own_code"):
+        names.append(name)
         (tmp_path / f"{name}.py").write_text(text)
         monkeypatch.syspath_prepend(str(tmp_path))
         monkeypatch.delitem(sys.modules, name, raising=False)
         return name
 
     yield write
-    sys.modules.pop("own_code", None)
+    for name in names:
+        sys.modules.pop(name, None)
 
 
 @pytest.fixture(scope="module")

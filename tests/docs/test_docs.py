@@ -43,22 +43,6 @@ def blocks(name, language):
     return re.findall(rf"```{language}\n(.*?)```", page(name), re.DOTALL)
 
 
-@pytest.fixture
-def module_of(tmp_path, monkeypatch):
-    """Makes code of a page importable under a name."""
-    names = []
-
-    def write(name, code):
-        (tmp_path / f"{name}.py").write_text(code, encoding="utf-8")
-        monkeypatch.syspath_prepend(str(tmp_path))
-        names.append(name)
-        return name
-
-    yield write
-    for name in names:
-        sys.modules.pop(name, None)
-
-
 @pytest.mark.parametrize(
     "path", sorted([*DOCS.glob("*.md"), *TESTS.parent.glob("*.md")]), ids=lambda p: p.name
 )
@@ -76,9 +60,9 @@ def test_the_hud_page_names_every_condition_and_option():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 1.5, 3.1, -1.5])
-def test_the_arrow_of_the_hud_page_points_to_the_next_object_only(module_of, yaw):
+def test_the_arrow_of_the_hud_page_points_to_the_next_object_only(own_module, yaw):
     (code,) = [c for c in blocks("hud.md", "python") if "def hud_state" in c]
-    arrow = condition(f"{module_of('arrow_of_the_docs', code)}:hud_state")
+    arrow = condition(f"{own_module(code, 'arrow_of_the_docs')}:hud_state")
     view = dataclasses.replace(sample.task(6), camera=sample.camera(640, 480, yaw=yaw))
     state = arrow(view)
     assert dataclasses.replace(state, pointer=None) == condition("none")(view) and state.markers == ()
@@ -109,8 +93,8 @@ def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_participant_of_its_page_tidies_a_house_and_prefers_distant_objects(module_of, tmp_path):
-    own = f"{module_of('own', blocks('participants.md', 'python')[0])}:build"
+def test_the_participant_of_its_page_tidies_a_house_and_prefers_distant_objects(own_module, tmp_path):
+    own = f"{own_module(blocks('participants.md', 'python')[0], 'own')}:build"
     config = TrialConfig(objects=3, assistance="highlight", seed=0, user=own, fidelity="event", regret=False)
     far = run_trial(config, tmp_path / "far", topdown=False)
     near = run_trial(msgspec.structs.replace(config, user="nearest"), tmp_path / "near", topdown=False)

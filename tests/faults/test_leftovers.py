@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from mjsim.files import MAX_AGE, WORK, remove_leftovers, replacing, work_folder
+from mjsim.files import MAX_AGE, WORK, exchange, remove_leftovers, replacing, work_folder
 
 
 @pytest.mark.parametrize("name", ["house.xml", "trials/episode.json"])
@@ -37,3 +37,10 @@ def test_what_others_hide_is_kept(tmp_path):
     (tmp_path / ".mjsim-notes" / "note").touch()
     remove_leftovers(tmp_path, max_age=0)
     assert (tmp_path / ".mjsim-notes" / "note").exists()
+
+
+def test_an_exchange_with_nothing_is_an_error(tmp_path):
+    (tmp_path / "one").mkdir()
+    with pytest.raises(FileNotFoundError):
+        exchange(tmp_path / "one", tmp_path / "two")
+    assert (tmp_path / "one").is_dir()

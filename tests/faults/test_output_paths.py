@@ -147,14 +147,12 @@ def test_files_that_cannot_be(command, place, tmp_path, capsys, monkeypatch):
     refused([*words, place, "--force"], tmp_path, capsys)
 
 
-def test_the_episode_beside_a_house_is_kept_too(tmp_path, capsys):
-    (tmp_path / "out.episode.json").write_text("precious")
-    refused(["house", "--out", tmp_path / "out.xml"], tmp_path, capsys)
-
-
-def test_pictures_that_exist_are_kept(tmp_path, capsys):
-    (tmp_path / "none.png").write_text("precious")
-    assert "none.png" in refused(["gallery", "--out", tmp_path], tmp_path, capsys)
+@pytest.mark.parametrize(
+    ("command", "file"), [("house", "out.episode.json"), ("gallery", "out.xml/none.png")]
+)
+def test_what_lies_beside_or_inside_is_kept_too(command, file, tmp_path, capsys):
+    write(tmp_path / file)
+    assert file in refused([command, "--out", tmp_path / "out.xml"], tmp_path, capsys)
 
 
 def test_a_run_that_finds_its_place_taken_is_kept_beside_it(tmp_path):

@@ -16,6 +16,7 @@ from experiments.cli.options import frame_size, int_list, seconds, text_list
 from mjsim.episode import Episode
 
 ROOT = Path(__file__).parents[3]
+PLAY = ["play", "--no-open", "--port", "0"]
 DESIGN = str(ROOT / "docs" / "designs" / "two_houses.toml")
 DEFAULTS = {  # some that the help of a command names
     "run": ["objects, 1 to --points (default: 6)", "(default: optimal)", "size, px (default: 640x480)"],
@@ -71,17 +72,16 @@ def test_the_overview_names_every_command():
     ("arguments", "fault"),
     [
         (["run", "--objects", "0", "--no-video"], "objects is 0"),
-        (["run", "--assistance", "telepathy", "--no-video"], "no assistance condition 'telepathy'"),
         (["run", "--user", "ghost", "--no-video"], "no participant 'ghost'"),
         (["run", "--planner", "oracle", "--no-video"], "unknown solver 'oracle'"),
         (["run", "--house", "castle", "--no-video"], "no house 'castle'"),
         (["run", "--profile", "sepia"], "no render profile 'sepia'"),
-        (["play", "--user", "follower"], "belongs to `mjsim run`"),
-        (["play", "--assistance", "nonsense"], "no assistance condition"),
-        (["play", "--objects", "0"], "objects is 0"),
-        (["play", "--film", "nothing.mp4"], "there is no film"),
-        (["play", "--public-url", "ftp://x"], "must be of the form"),
-        (["play", "--host", "no.such.host.invalid"], "name another --port (0 for any) or --host"),
+        ([*PLAY, "--user", "follower"], "belongs to `mjsim run`"),
+        ([*PLAY, "--assistance", "nonsense"], "no assistance condition"),
+        ([*PLAY, "--objects", "0"], "objects is 0"),
+        ([*PLAY, "--film", "nothing.mp4"], "there is no film"),
+        ([*PLAY, "--public-url", "ftp://x"], "must be of the form"),
+        ([*PLAY, "--host", "no.such.host.invalid"], "name another --port (0 for any) or --host"),
         (["batch", DESIGN, "--user", "searcher", "--seeds", "1"], "leave out --seeds, --user"),
         (["batch", "--seeds", "1,1"], "--seeds names a value twice"),
         (["batch", "--seeds", "0", "--workers", "0"], "at least one worker, got 0"),

@@ -39,12 +39,6 @@ def test_the_problem_of_the_help_text(tmp_path, capsys, planner):
     assert answer["seconds"] >= 0
 
 
-def test_nothing_to_do_is_a_plan(tmp_path, capsys):
-    code, printed = plan(tmp_path, capsys, {"distances": [[0]], "shipments": []})
-    assert code == 0
-    assert json.loads(printed.out)["visits"] == []
-
-
 @pytest.mark.parametrize(
     ("words", "fault"),
     [

@@ -43,12 +43,9 @@ def test_everything_is_delivered_without_mishap(runs, assistance):
     assert metrics["renderer"] == "none: nothing was filmed"
 
 
-def test_help_shortens_the_walk(runs):
+def test_help_shortens_the_walk_every_visit_is_judged_and_following_costs_nothing(runs):
     walked = [read_json(runs / a / records.METRICS)["task_distance_m"] for a in ASSISTANCE]
     assert walked == sorted(walked, reverse=True)
-
-
-def test_every_visit_is_judged_and_following_costs_nothing(runs):
     for assistance in ASSISTANCE:
         metrics = read_json(runs / assistance / records.METRICS)
         visits = [e for e in read_events(runs / assistance / records.EVENTS) if e["event"] == "visit"]

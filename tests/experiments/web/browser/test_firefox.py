@@ -31,9 +31,8 @@ class Firefox:
     def __init__(self, socket):
         self._socket, self._count = socket, 0
         self._ask("session.new", capabilities={})
-        self._tab = self._ask("browsingContext.create", type="tab")[
-            "context"
-        ]  # the first one never has the focus
+        # The first one never has the focus.
+        self._tab = self._ask("browsingContext.create", type="tab")["context"]
 
     def goto(self, url):
         self._ask("browsingContext.navigate", context=self._tab, url=url, wait="complete")
