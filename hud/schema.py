@@ -4,15 +4,18 @@ Both follow from the annotations of the value types, so they cannot drift from t
 """
 
 import dataclasses
+import enum
 import re
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from hud.errors import SchemaError
 from hud.state import HudState
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
+LARGEST = 1e6  # of a coordinate, a size, a time
 
 
 def to_dict(state: HudState) -> dict[str, Any]:
@@ -33,6 +36,44 @@ def from_dict(raw: object) -> HudState:
         raise SchemaError(f"{error}; {_expected(str(error))}") from error
     _check_fields(raw, to_dict(state), "$")
     return state
+
+
+def check_state(state: object) -> None:
+    """Make sure that something is a HUD state which can be drawn and sent, whatever its annotations say.
+
+    Raises:
+        SchemaError: It is not; the message says what it is instead, or which value is of the wrong kind.
+    """
+    if not isinstance(state, HudState):
+        raise SchemaError(f"{_shown(state)}; it must be a HudState")
+    try:
+        msgspec.convert(_plain(state, "$"), HudState)
+    except msgspec.ValidationError as error:
+        raise SchemaError(f"a HudState that cannot be shown: {error}") from error
+
+
+def _plain(value: Any, where: str) -> Any:
+    """Dataclasses as objects, sequences as lists; no number out of bounds, no text that cannot be written."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {
+            f.name: _plain(getattr(value, f.name), f"{where}.{f.name}") for f in dataclasses.fields(value)
+        }
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist(), where)
+    if isinstance(value, tuple | list):
+        return [_plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
+    if isinstance(value, float) and not abs(value) <= LARGEST:
+        raise SchemaError(f"a HudState that cannot be shown: {value} is no usable number - at `{where}`")
+    if isinstance(value, str):
+        try:
+            value.encode()
+        except UnicodeEncodeError as error:
+            raise SchemaError(f"a HudState that cannot be shown: {error} - at `{where}`") from error
+    return value.value if isinstance(value, enum.Enum) else value
+
+
+def _shown(value: object) -> str:
+    return "None" if value is None else f"a {type(value).__name__}"
 
 
 def json_schema() -> dict[str, Any]:

@@ -44,9 +44,15 @@ class Pick:
 
     Attributes:
         object: Instance name, or None for the nearest object in reach.
+
+    Raises:
+        ActionError: The name is no text.
     """
 
     object: str | None = None
+
+    def __post_init__(self) -> None:
+        _check_name(self.object)
 
 
 @dataclass(frozen=True)
@@ -55,9 +61,20 @@ class Place:
 
     Attributes:
         object: Instance name, or None for the carried object whose receptacle is nearest.
+
+    Raises:
+        ActionError: The name is no text.
     """
 
     object: str | None = None
+
+    def __post_init__(self) -> None:
+        _check_name(self.object)
+
+
+def _check_name(name: str | None) -> None:
+    if name is not None and not (isinstance(name, str) and name.isprintable()):
+        raise ActionError(f"the name of an object must be printable text, or None, got {name!r:.200}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +91,7 @@ class FollowPath:
         tolerance: Distance from the path at which to stop, m.
 
     Raises:
-        ActionError: The points have another shape.
+        ActionError: The points or the goal have another shape, or a number is not finite.
     """
 
     points: NDArray[np.float64]
@@ -89,6 +106,11 @@ class FollowPath:
         shape = np.shape(self.points)
         if len(shape) != 2 or shape[1] != 2 or shape[0] < 1:
             raise ActionError(f"the points of a path must have the shape (n, 2) with n >= 1, got {shape}")
+        if np.shape(self.goal) != (2,):
+            raise ActionError(f"the goal of a path must have the shape (2,), got {np.shape(self.goal)}")
+        numbers = (*self.goal, self.stop_distance, self.tolerance, 0.0 if self.until is None else self.until)
+        if not (np.isfinite(self.points).all() and np.isfinite(numbers).all()):
+            raise ActionError("points, goal, distances and times of a path must be finite numbers")
 
 
 @dataclass(frozen=True)
@@ -97,9 +119,16 @@ class Wait:
 
     Attributes:
         until: Simulated time at which to stop, s; None for one control step.
+
+    Raises:
+        ActionError: The time is not a number.
     """
 
     until: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.until is not None and math.isnan(self.until):
+            raise ActionError(f"Wait.until must be a time or None, got {self.until!r}")
 
 
 StepAction = Move | Pick | Place  # takes one control step

@@ -36,7 +36,7 @@ def check(problem: RoutingProblem, plan: Plan) -> float:
 
 def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, Relaxation | None]:
     """As `check`, with a limit on the rows; also the relaxation, where it was filled."""
-    _check_numbers(plan, _replayed(problem, plan))
+    _check_numbers(plan, replayed(problem, plan))
     rounding, certificate = allowance(problem, plan), plan.certificate
     if len(problem.shipments) + len(problem.onboard) <= FEW:
         shortest = shortest_tour(problem, plan.cost)
@@ -103,7 +103,7 @@ def shortest_tour(
     return min(layer.values(), default=np.inf), states
 
 
-def _replayed(problem: RoutingProblem, plan: Plan) -> float:
+def replayed(problem: RoutingProblem, plan: Plan) -> float:
     """Length of the tour, m, every visit of which is feasible."""
     n = len(problem.shipments)
     loose, held = set(range(n)), set(range(n, len(problem.names)))

@@ -1,10 +1,13 @@
 """A plan: the order of visits, what it costs and how far from optimal it can be."""
 
 import enum
+import math
+import numbers
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from planner.certificate import Certificate
+from planner.errors import ProblemError
 
 
 class Status(enum.Enum):
@@ -40,6 +43,9 @@ class Plan:
         status: OPTIMAL exactly when cost equals lower_bound up to rounding.
         seconds: Wall time it took to find; never used in anything that must repeat.
         certificate: What proves the lower bound; None for a plan that was read from a record.
+
+    Raises:
+        ProblemError: A value is of another kind, or no finite number.
     """
 
     visits: tuple[Visit, ...]
@@ -48,6 +54,16 @@ class Plan:
     status: Status
     seconds: float
     certificate: Certificate | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("cost", "lower_bound", "seconds"):
+            value = getattr(self, name)
+            if not isinstance(value, numbers.Real) or not math.isfinite(value):
+                raise ProblemError(f"Plan.{name} must be a finite number, got {value!r}")
+        if not isinstance(self.visits, tuple) or not all(isinstance(visit, Visit) for visit in self.visits):
+            raise ProblemError(f"Plan.visits must be a tuple of Visit, got {self.visits!r:.200}")
+        if not isinstance(self.status, Status):
+            raise ProblemError(f"Plan.status must be a Status, got {self.status!r}")
 
     def improves_on(self, other: "Plan") -> bool:
         """Whether it is shorter, or known to be closer to the shortest, by more than rounding."""

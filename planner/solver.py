@@ -83,7 +83,7 @@ def solver(name: str) -> Solver:
         )
     try:
         found = pkgutil.resolve_name(name)()
-    except Exception as error:  # whatever the module does when it is imported
+    except (Exception, SystemExit) as error:  # whatever the module does when it is imported
         raise PlannerError(
             f"cannot make the planner {name!r}: {type(error).__name__}: {error}; "
             "modules are looked for in the current folder and among those installed"

@@ -5,7 +5,7 @@ def participant(statement, after=0):
     """A module with a participant that walks in circles; after so many control steps it does something else."""
     return f"""
 import os, signal, time
-from mjsim.actions import Move, Pick, Place
+from mjsim.actions import FollowPath, Move, Pick, Place, Wait
 class Own:
     needs = frozenset()
     count = 0
@@ -16,4 +16,21 @@ class Own:
         return Move(forward=0.5, turn=0.3)
 def build(house, rng):
     return Own()
+"""
+
+
+def planner(statement, after=0):
+    """A module with a planner that goes to the nearest first; after so many plans it does something else."""
+    return f"""
+import os, signal, sys, time
+from dataclasses import replace
+from planner.greedy_solver import GreedySolver
+from planner.plan import Plan, Status
+class Own:
+    count = 0
+    def solve(self, problem, *, seed=0, limit=None):
+        plan, self.count = GreedySolver().solve(problem), self.count + 1
+        if self.count > {after}:
+            {statement}
+        return plan
 """

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from experiments.cli.options import add_call_limit
 from experiments.trials.design import Design
 from experiments.trials.workers import EXECUTORS, PROCESSES
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add `--workers` and `--executor`."""
+    """Add `--workers`, `--executor` and `--call-limit`."""
+    add_call_limit(parser)
     parser.add_argument(
         "--workers",
         type=int,

@@ -27,8 +27,10 @@ def end_with(error: Exception, words: Sequence[str]) -> int:
         drop_output()
         return BROKEN_PIPE
     _flush_output()
-    code, text = exit_code(error), message(error)
-    if code is None:
+    code, text, own = exit_code(error), message(error), _own_place(error)
+    if own:  # raised where a user's own code was loaded or called
+        code, text = FAILED, f"{text}{own}; traceback in {_report(error, words)}"
+    elif code is None:
         text = f"internal error ({type(error).__name__}: {text}); please send in the report {_report(error, words)}"
     elif _is_user_code(error):
         text += f"; traceback in {_report(error, words)}"
@@ -87,6 +89,13 @@ def _is_user_code(error: Exception) -> bool:
     from experiments.errors import UserCodeError
 
     return isinstance(error, UserCodeError)
+
+
+def _own_place(error: Exception) -> str:
+    """File and line of a user's own code that raised an error or its cause, unless the message holds them."""
+    from experiments.blame import place
+
+    return "" if _is_user_code(error) else place(error) or place(error.__cause__)
 
 
 def _report(error: Exception, words: Sequence[str]) -> str:

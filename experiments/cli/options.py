@@ -2,12 +2,14 @@
 
 import argparse
 import math
+import os
 import re
 import typing
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from experiments.blame import CALL_LIMIT
 from experiments.errors import ConfigError
 from experiments.participants import participant_names
 from experiments.participants.distribution import Distributions
@@ -98,6 +100,25 @@ def add_command(
 def add_force(parser: argparse.ArgumentParser, text: str = "replace files that exist") -> None:
     """Add `--force`."""
     parser.add_argument("--force", action="store_true", help=text)
+
+
+def add_call_limit(parser: argparse.ArgumentParser) -> None:
+    """Add `--call-limit`."""
+    parser.add_argument(
+        "--call-limit",
+        type=seconds,
+        action=_CallLimit,
+        metavar="S",
+        help="longest time that a call of a participant, condition or planner of your own may take, s; the trial then "
+        f"ends with an error (default: {CALL_LIMIT}, else no limit)",
+    )
+
+
+class _CallLimit(argparse.Action):
+    """Workers take the limit from the environment, as it is no property of a trial."""
+
+    def __call__(self, _parser: Any, _namespace: Any, value: Any, _option: Any = None) -> None:
+        os.environ[CALL_LIMIT] = str(value)
 
 
 def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> None:

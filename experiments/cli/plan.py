@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
     started, seconds = time.perf_counter(), arguments.time_limit
     if seconds is not None:
         SolveLimit(seconds=seconds)  # refuses what is no limit
-    problem, planner = _read(arguments.file, problem_from_json), solver(arguments.planner)
+    problem, planner = _read(arguments.file, problem_from_json), _planner(arguments.planner)
     search = _Search(planner, problem, started, seconds)
     try:
         plan = search.wait()
@@ -104,6 +104,14 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"mjsim: planned by OR-Tools, not proven optimal: {reason}", file=sys.stderr)
     _publish(problem, plan, arguments.certificate)
     return 0
+
+
+def _planner(name: str) -> Solver:
+    if name in SOLVERS:
+        return solver(name)
+    from experiments.session.own_planner import planner_named  # loaded only where it is needed
+
+    return planner_named(name, exact=False)
 
 
 class _Search(threading.Thread):

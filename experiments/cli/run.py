@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import (
+    add_call_limit,
     add_command,
     add_force,
     add_frame,
@@ -74,6 +75,7 @@ def add_parser(commands: Any) -> None:
         "--no-floor-plan", action="store_true", help="draw no floor plan; without video, no OpenGL is needed"
     )
     add_frame(parser)
+    add_call_limit(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

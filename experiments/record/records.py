@@ -40,8 +40,21 @@ class EventLog:
         self._lines: list[dict[str, Any]] = []
 
     def append(self, time: float, event: str, **fields: Any) -> None:
-        """Log `event` at simulated `time` s, with JSON-ready fields."""
-        self.reserve().update(t=round(time, 6), event=event, **fields)
+        """Log `event` at simulated `time` s, with JSON-ready fields; `RecordError` as `fill`."""
+        self.fill(self.reserve(), time, event, **fields)
+
+    def fill(self, line: dict[str, Any], time: float, event: str, **fields: Any) -> None:
+        """Fill in a reserved place.
+
+        Raises:
+            RecordError: A value could not be read back, such as NaN.
+        """
+        entry = {"t": round(time, 6), "event": event, **fields}
+        try:
+            json.dumps(entry, allow_nan=False)
+        except (TypeError, ValueError, RecursionError) as error:
+            raise RecordError(f"{event!r} at {time:.2f} s cannot be logged: {error}") from error
+        line.update(entry)
 
     def reserve(self) -> dict[str, Any]:
         """The place of an event that is filled in later, `t` and `event` included; left empty, it is no event."""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 from experiments.errors import ReplayError
 from experiments.record.records import Event
+from planner.errors import ProblemError
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.route import PlanSource, Route, TaskState
 
@@ -66,5 +67,5 @@ def _route(event: Event, state: TaskState) -> Route:
                 raise ValueError(f"nothing to {kind} is called {name!r}")
             visits.append(Visit(VisitKind(kind), name))
         return Route(tuple(visits), plan)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, ProblemError) as error:
         raise ReplayError(f"the plan logged at t = {event['t']} s is malformed: {error!r}") from error

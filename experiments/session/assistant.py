@@ -12,7 +12,7 @@ from experiments.record.records import EventLog
 from experiments.session.shown_path import TOLERANCE, PathsToNext
 from experiments.session.task_board import PlanView, TaskBoard
 from experiments.session.task_log import TaskLog
-from experiments.session.user_code import shown_by
+from experiments.session.user_code import is_own, shown_by
 from hud.conditions import condition
 from hud.markers import BREADCRUMB, GOAL
 from hud.projection import CameraView
@@ -43,6 +43,7 @@ class Assistant:
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
         shows_plan: Whether the condition shows the plan or where it leads next.
+        shows_own: Whether the condition is a user's own.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class Assistant:
         self._path_from: Observation | None = None  # where the paths to the next visit will start
         self.shown_roles: frozenset[str] = frozenset()
         self.shows_plan = self._rerouted = False
+        self.shows_own = is_own(self._show)
 
     def begin(self, observation: Observation) -> None:
         """Plan for the start of the task."""

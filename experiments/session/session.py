@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from experiments.blame import describe
 from experiments.errors import RecordError, SessionError, UserCodeError
 from experiments.participants.base import Participant
 from experiments.record.reader import Record
@@ -11,7 +12,7 @@ from experiments.session.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSI
 from experiments.session.perception import SessionPercept
 from experiments.session.recorded_events import EXTERNAL_EVENTS, catch_up
 from experiments.session.signals import signal_of
-from experiments.session.user_code import decide, describe, needs_of
+from experiments.session.user_code import decide, needs_of
 from experiments.session.viewer import OnProgress, Progress, Viewer
 from hud.state import HudState
 from mjsim.actions import IDLE, Action, ActionResult, StepAction, WorldEvent
@@ -145,6 +146,8 @@ class Session:
             PhysicsError: The physics failed.
         """
         self._observe()
+        if self.assistant.shows_own:
+            self._hud_state()  # what cannot be shown ends a session that is not filmed as well
         world = self._world
         percept = SessionPercept(
             self._now, self._answer, world, self.assistant, self._hud_state, blocked=world.blocked

@@ -1,6 +1,5 @@
 """Logs the plans of a session and its visits, with what was suggested and what each visit costs."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -57,10 +56,11 @@ class TaskLog:
 
         def fill(route: Route, new: bool) -> None:
             if new:
-                line.update(_fields(time, "plan", _plan_fields(route)))
-            if first:
-                bound = reach_bound(round(route.plan.lower_bound, 6), self._house, self._episode)
-                line["reach_bound_m"] = round(bound, 6)
+                fields = _plan_fields(route)
+                if first:
+                    bound = reach_bound(round(route.plan.lower_bound, 6), self._house, self._episode)
+                    fields["reach_bound_m"] = round(bound, 6)
+                self._log.fill(line, time, "plan", **fields)
 
         self._planner.ask(state, shown=shown, then=fill)
 
@@ -98,7 +98,7 @@ class TaskLog:
                 "geodesic_m": round(walk.geodesic_distance, 6),
                 "location_m": round(location, 6),
             }
-            line.update(_fields(time, "visit", fields))
+            self._log.fill(line, time, "visit", **fields)
 
         self._planner.do(fill)
         self._visits += 1
@@ -145,10 +145,6 @@ class TaskLog:
             regret = 0.0 if known else _rounded(self._planner.judge(visit, (number, keys)))
             fields |= dict.fromkeys(keys, regret)
         return fields
-
-
-def _fields(time: float, event: str, fields: Mapping[str, Any]) -> dict[str, Any]:
-    return {"t": round(time, 6), "event": event, **fields}
 
 
 def _plan_fields(route: Route) -> dict[str, Any]:

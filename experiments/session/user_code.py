@@ -1,70 +1,94 @@
 """Calls user-supplied participants, conditions and planners, and names the culprit of an error."""
 
+import os
+import signal
+import threading
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any, get_args
 
 import numpy as np
 
-from experiments.errors import ExperimentError, UserCodeError
+from experiments.blame import CALL_LIMIT, PACKAGES, definition, describe, place, shown
+from experiments.errors import ConfigError, UserCodeError
 from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Participant, Percept
 from hud.conditions import Condition
-from hud.errors import HudError
+from hud.errors import SchemaError
+from hud.schema import check_state
 from hud.state import HudState
 from hud.task import TaskView
 from mjsim.actions import Action
-from mjsim.errors import MjsimError
-from planner.errors import PlannerError
+from mjsim.errors import PhysicsError, RenderError
+from planner.errors import UnreachableError
 
-OUR_ERRORS = (ExperimentError, HudError, MjsimError, PlannerError)
-PACKAGES = ("experiments", "hud", "mjsim", "planner")
+LONGEST_LIMIT = 1e6  # s
+PASSED_ON = (KeyboardInterrupt, GeneratorExit, UserCodeError, UnreachableError, PhysicsError, RenderError)
+
+
+class _Overdue(BaseException):
+    """A call took too long; no `except Exception` of the code that was called stops it."""
 
 
 @contextmanager
 def user_code(code: object, what: str) -> Iterator[None]:
-    """Wrap exceptions of user-supplied `code` in a `UserCodeError`; errors of this project pass through.
+    """Wrap whatever user-supplied `code` raises in a `UserCodeError`, `SystemExit` included, and limit its time.
 
     Args:
         code: A function, or an object with methods.
         what: Names it in the message.
 
     Raises:
-        UserCodeError: `code` is not part of this project and raised something other than this project's errors.
+        UserCodeError: `code` is not part of this project, and raised or took longer than `CALL_LIMIT` says.
     """
+    if not is_own(code):
+        yield
+        return
+    limit = _call_limit()
+    try:
+        with _time_limit(limit):
+            yield
+    except PASSED_ON:
+        raise
+    except _Overdue as error:
+        raise UserCodeError(f"{what} {error}; --call-limit allows more{place(error)}") from error
+    except BaseException as error:  # user code must not end the process and lose the run
+        raise UserCodeError(f"{what} raised {describe(error)}{place(error)}") from error
+
+
+def _call_limit() -> float:
+    text = os.environ.get(CALL_LIMIT) or "0"
+    try:
+        return min(abs(float(text)), LONGEST_LIMIT)
+    except ValueError:
+        raise ConfigError(f"{CALL_LIMIT} is {text!r}; give a number of seconds") from None
+
+
+@contextmanager
+def _time_limit(limit: float) -> Iterator[None]:
+    """Interrupt the block after a time, s, 0 for none; signals reach the main thread alone."""
+    if not limit or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        raise _Overdue(f"did not answer within {limit:g} s")
+
+    handler = signal.signal(signal.SIGALRM, interrupt)
+    before = signal.setitimer(signal.ITIMER_REAL, limit)
     try:
         yield
-    except OUR_ERRORS:
-        raise
-    except (Exception, SystemExit) as error:  # user code must not end the process and lose the run
-        if _is_of_this_project(code):
-            raise
-        raise UserCodeError(f"{what} raised {describe(error)}{_place(error)}") from error
+    finally:
+        if signal.getsignal(signal.SIGALRM) is interrupt:  # else a signal came, and its timer runs
+            signal.setitimer(signal.ITIMER_REAL, *before)
+            signal.signal(signal.SIGALRM, handler)
 
 
-def describe(error: BaseException) -> str:
-    """An error as one line: its message, preceded by its type unless it is one of this project's errors."""
-    message = " ".join(str(error).split())
-    if isinstance(error, OUR_ERRORS):
-        return message
-    return f"{type(error).__name__}: {message}" if message else type(error).__name__
-
-
-def _is_of_this_project(code: object) -> bool:
-    module = getattr(code, "__module__", None) or ""
-    return module.partition(".")[0] in PACKAGES
-
-
-def _place(error: BaseException) -> str:
-    """File and line of the innermost frame outside this project."""
-    trace, found = error.__traceback__, ""
-    while trace is not None:
-        code, module = trace.tb_frame.f_code, str(trace.tb_frame.f_globals.get("__name__", ""))
-        if module.partition(".")[0] not in PACKAGES:
-            found = f" ({code.co_filename}, line {trace.tb_lineno})"
-        trace = trace.tb_next
-    return found
+def is_own(code: object) -> bool:
+    """Whether a function or an object is a user's own."""
+    return str(getattr(code, "__module__", None) or "").partition(".")[0] not in PACKAGES
 
 
 def make_participant(
@@ -79,8 +103,10 @@ def make_participant(
     make = participant(name)
     with user_code(make, f"participant {name!r}"):
         made = make(house, rng, behaviour) if behaviour else make(house, rng)  # type: ignore[call-arg]
-    if not callable(getattr(made, "act", None)):
-        raise UserCodeError(f"participant {name!r} is {made!r}, which has no method act(percept)")
+    with user_code(made, f"participant {name!r}"):
+        acts = callable(getattr(made, "act", None))
+    if not acts:
+        raise UserCodeError(f"participant {name!r} is {shown(made)}, which has no method act(percept)")
     needs_of(made)
     return made
 
@@ -91,11 +117,12 @@ def needs_of(participant: Participant) -> frozenset[str]:
     Raises:
         UserCodeError: `needs` is not a set of names.
     """
-    needs: Any = getattr(participant, "needs", frozenset())
+    name = f"participant {type(participant).__qualname__}"
+    with user_code(participant, name):
+        needs: Any = getattr(participant, "needs", frozenset())
     if not isinstance(needs, Set) or not all(isinstance(role, str) for role in needs):
         raise UserCodeError(
-            f"participant {type(participant).__qualname__} needs {needs!r}; "
-            'it must be a set of marker roles, such as frozenset({"flagpole"})'
+            f'{name} needs {shown(needs)}; it must be a set of marker roles, such as frozenset({{"flagpole"}})'
         )
     return frozenset(needs)
 
@@ -112,7 +139,8 @@ def decide(participant: Participant, percept: Percept) -> Action:
     if not isinstance(decision, Action):
         kinds = ", ".join(kind.__name__ for kind in get_args(Action))
         raise UserCodeError(
-            f"participant {name} answered {decision!r} at {percept.time:.2f} s; act returns one of {kinds}"
+            f"participant {name} answered {shown(decision)} at {percept.time:.2f} s; act returns one of {kinds}"
+            f"{definition(participant.act)}"
         )
     return decision
 
@@ -121,10 +149,15 @@ def shown_by(condition: Condition, name: str, view: TaskView) -> HudState:
     """The HUD state of an assistance condition.
 
     Raises:
-        UserCodeError: A user-supplied condition failed, or returned something other than a `HudState`.
+        UserCodeError: A user-supplied condition failed, or returned something that cannot be shown.
     """
     with user_code(condition, f"assistance condition {name!r}"):
         state = condition(view)
-    if not isinstance(state, HudState):
-        raise UserCodeError(f"assistance condition {name!r} returned {state!r}; it must return a HudState")
+    if is_own(condition) or not isinstance(state, HudState):
+        try:
+            check_state(state)
+        except SchemaError as error:
+            raise UserCodeError(
+                f"assistance condition {name!r} returned {error}{definition(condition)}"
+            ) from error
     return state

@@ -3,9 +3,9 @@
 import dataclasses
 import functools
 import gc
-import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,7 +63,7 @@ def run_batch(
     Raises:
         ConfigError: `workers` is below 1, or there is no such executor, or it cannot be had.
         ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run; nothing was run.
-        OSError: A table cannot be written, or a worker was killed.
+        OSError: A table cannot be written.
     """
     if workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
@@ -94,13 +94,11 @@ def _run_missing(
     on_progress(progress)
     if not plan.missing:
         return
-    workers = min(workers, len(plan.missing))
-    with EXECUTORS[executor](workers) as pool:
-        for failure in _results(pool, iter(plan.missing.items()), workers):
-            field = "done" if failure is None else "failed"
-            count = getattr(progress, field) + 1
-            progress = dataclasses.replace(progress, failure=failure, **{field: count})
-            on_progress(progress)
+    for failure in _results(plan.missing, workers, executor):
+        field = "done" if failure is None else "failed"
+        count = getattr(progress, field) + 1
+        progress = dataclasses.replace(progress, failure=failure, **{field: count})
+        on_progress(progress)
 
 
 def _write_rows(
@@ -125,17 +123,51 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
     return [settings[name] for name in ("objects", "assistance", "user", "house", *SEEDS)]
 
 
-def _results(pool: Executor, jobs: Iterator[tuple[Path, TrialConfig]], workers: int) -> Iterator[str | None]:
-    """Submit a few trials at a time; yield None for each one that succeeds, else what went wrong."""
-    running: dict[Future[str | None], Path] = {}
+def _results(missing: Mapping[Path, TrialConfig], workers: int, executor: str) -> Iterator[str | None]:
+    """Yield None for each trial that succeeds, else what went wrong; those whose process may die go last and alone."""
+    left = {path: config for path, config in missing.items() if not _died(path).exists()}
+    alone = {path: config for path, config in missing.items() if path not in left}
+    while left:
+        with EXECUTORS[executor](min(workers, len(left))) as pool:
+            yield from _together(pool, left, alone, workers)
+    for path, config in alone.items():
+        with EXECUTORS[executor](1) as pool:
+            again: dict[Path, TrialConfig] = {}
+            yield from _together(pool, {path: config}, again, 1)
+        if again:
+            yield f"{path.name}: its process died: killed, out of memory, or ended by code of your own"
+        else:
+            _died(path).unlink(missing_ok=True)
+
+
+def _died(path: Path) -> Path:
+    """Is there if a process died while it ran this trial, perhaps of another one that ran beside."""
+    return path.with_name(f".{path.name}.died")
+
+
+def _together(
+    pool: Executor, left: dict[Path, TrialConfig], alone: dict[Path, TrialConfig], workers: int
+) -> Iterator[str | None]:
+    """Take trials from those left, a few at a time; where a process dies, all that were begun are to run alone."""
+    running: dict[Future[str | None], tuple[Path, TrialConfig]] = {}
+    whole = True
     while True:
-        for path, config in itertools.islice(jobs, workers * QUEUED_PER_WORKER - len(running)):
-            running[pool.submit(_run, config, path)] = path
+        while whole and left and len(running) < workers * QUEUED_PER_WORKER:
+            path, config = next(iter(left.items()))
+            del left[path]
+            try:
+                running[pool.submit(_run, config, path)] = path, config
+            except BrokenProcessPool:
+                left[path], whole = config, False
         if not running:
             return
         finished, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in finished:
-            path, error = running.pop(future), future.exception()
+            (path, config), error = running.pop(future), future.exception()
+            if isinstance(error, BrokenProcessPool):
+                whole, alone[path] = False, config
+                _died(path).touch()
+                continue
             failure = future.result() if error is None else _failure(error)
             if failure is None and not path.exists():
                 failure = "its run directory is not here; all machines must share the folder of the batch"

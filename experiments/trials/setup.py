@@ -16,6 +16,7 @@ from experiments.record.journal import Journal
 from experiments.record.records import EventLog
 from experiments.record.writer import RecordWriter, provenance
 from experiments.session.assistant import Assistant, deliveries
+from experiments.session.own_planner import planner_named
 from experiments.session.session import Session
 from experiments.session.task_board import TaskBoard
 from experiments.session.user_code import make_participant
@@ -32,7 +33,6 @@ from planner.exact.solver import ExactSolver
 from planner.regret import RegretEvaluator
 from planner.route import TaskState
 from planner.service import Mode, Planner
-from planner.solver import solver
 from planner.solver_source import SolverSource
 
 _SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
@@ -85,7 +85,7 @@ def simulated_user(config: TrialConfig, house: House) -> Participant:
 
 def solver_source(config: TrialConfig, house: House) -> SolverSource:
     """Plans of the planner that a trial names."""
-    return SolverSource(house.geodesics, solver(config.planner), capacity=config.capacity)
+    return SolverSource(house.geodesics, planner_named(config.planner), capacity=config.capacity)
 
 
 def regret_evaluator(config: TrialConfig, house: House) -> RegretEvaluator:
@@ -99,7 +99,7 @@ def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Pla
     With the exact planner it works in a thread, as its kernels run without the interpreter's lock. For a live trial all
     that takes long is done before the clock starts.
     """
-    mode = Mode.THREAD if isinstance(solver(config.planner), ExactSolver) else Mode.INLINE
+    mode = Mode.THREAD if isinstance(planner_named(config.planner), ExactSolver) else Mode.INLINE
     mode = Mode.LIVE if config.live else mode
     planner = Planner(solver_source(config, house), regret_evaluator(config, house), mode)
     if mode is not Mode.INLINE:

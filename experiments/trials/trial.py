@@ -4,11 +4,12 @@ import dataclasses
 import os
 import time
 from collections.abc import Callable
-from contextlib import closing, nullcontext
+from contextlib import chdir, closing, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.blame import describe
 from experiments.errors import UserCodeError
 from experiments.house import House
 from experiments.procedure.familiarise import Familiarisation, familiarise
@@ -23,7 +24,6 @@ from experiments.record.topdown import draw_topdown
 from experiments.session.endings import INTERRUPTED
 from experiments.session.film_config import FilmConfig
 from experiments.session.signals import Stopped, signals_postponed
-from experiments.session.user_code import describe
 from experiments.session.viewer import OnProgress, Progress
 from experiments.trials.setup import (
     draw_person,
@@ -77,7 +77,7 @@ def run_trial(
         Stopped: A signal came when the session was over.
     """
     started = time.perf_counter()
-    with signals_postponed() as signals:
+    with chdir("."), signals_postponed() as signals:  # a user's own code may go elsewhere
         with run_directory(out, replace=replace) as folder:
             person = draw_person(config)
             house = (house or House.load(config.house)).for_person(person)

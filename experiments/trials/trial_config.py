@@ -145,6 +145,9 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             raise ConfigError(str(error)) from error
 
     def __post_init__(self) -> None:
+        for name in ("assistance", "user", "house", "planner", "fidelity", "phases"):
+            if not isinstance(getattr(self, name), str):
+                raise ConfigError(f"{name} must be text, got {getattr(self, name)!r}")
         seed = self.seed
         for name in SEEDS:
             if getattr(self, name) is None:

@@ -6,7 +6,6 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
 from multiprocessing.connection import Connection, wait
 from multiprocessing.synchronize import Semaphore
@@ -37,10 +36,6 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
         pool.shutdown()
-    except BrokenProcessPool as error:
-        raise ChildProcessError(
-            "a worker was killed (out of memory?); run the command again to continue, with fewer --workers"
-        ) from error
     finally:
         work.close()  # all workers see it
         pool.shutdown(cancel_futures=True)

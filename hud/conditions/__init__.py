@@ -47,7 +47,7 @@ def _plain_condition(name: str) -> Condition:
         raise ConditionError(f"no assistance condition {name!r}; available: {_available()}")
     try:
         found = pkgutil.resolve_name(name)
-    except Exception as error:  # whatever the module does when it is imported
+    except (Exception, SystemExit) as error:  # whatever the module does when it is imported
         raise ConditionError(
             f"cannot load condition {name!r} ({type(error).__name__}: {error}); modules are looked for in the current "
             f"folder and among those installed; available: {_available()}"

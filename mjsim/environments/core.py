@@ -1,5 +1,6 @@
 """The task itself: reset, step, observe. The dm_env and the Gymnasium environment are thin adapters of it."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,10 +12,10 @@ from numpy.typing import NDArray
 from mjsim.actions import EventKind
 from mjsim.environments.control import Control
 from mjsim.environments.episodes import CompiledEpisode, EpisodeCache
-from mjsim.environments.errors import EnvironmentStateError
+from mjsim.environments.errors import EnvironmentConfigError, EnvironmentStateError
 from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.rewards import RewardFunction
-from mjsim.environments.sensors import Sensor, SensorInput
+from mjsim.environments.sensors import SENSORS, Sensor, SensorInput
 from mjsim.environments.sensors.vision import visible_pixels
 from mjsim.errors import PhysicsError, SamplingError
 from mjsim.observation import ObjectStatus, Observation
@@ -61,6 +62,7 @@ class Rearrangement:
         self._episodes = episodes
         self._reward = reward
         self._truncate_on_error = truncate_on_physics_error
+        self._own_sensors = [s for s in self.sensors if SENSORS.get(s.name) is not s]
         self._images = frozenset[str]().union(*(s.images for s in sensors))
         self._episode: CompiledEpisode | None = None
         self._seed = 0
@@ -145,7 +147,7 @@ class Rearrangement:
         return Transition(
             # The state in which the physics failed cannot be observed: repeat the last observation.
             observation=self._observe(inputs) if error is None else _copied(self._last_observation),
-            reward=float(self._reward(world.scene, before, after)),
+            reward=self._rewarded(world, before, after),
             terminated=terminated,
             truncated=self._is_over and not terminated,
             info=self._info(inputs, steps, error),
@@ -199,8 +201,32 @@ class Rearrangement:
     def _sensor_input(self, state: Observation) -> SensorInput:
         return SensorInput(self.layout, self.episode, state, self._images)
 
+    def _rewarded(self, world: World, before: Observation, after: Observation) -> float:
+        given = self._reward(world.scene, before, after)
+        try:
+            reward = math.nan if isinstance(given, str) else float(given)
+        except (TypeError, ValueError):
+            reward = math.nan
+        if not math.isfinite(reward):
+            raise EnvironmentConfigError(
+                f"the reward is {given!r:.200}; it must be a finite number{_place(self._reward)}"
+            )
+        return reward
+
     def _observe(self, inputs: SensorInput) -> ObservationDict:
         arrays = {s.name: s.read(inputs) for s in self.sensors}
+        for sensor in self._own_sensors:
+            try:
+                array = arrays[sensor.name] = sensor.spec(self.layout).validate(arrays[sensor.name])
+                finite = np.isfinite(array).all()
+            except (TypeError, ValueError) as error:
+                raise EnvironmentConfigError(
+                    f"sensor {sensor.name!r}: {error}{_place(sensor.read)}"
+                ) from error
+            if not finite:
+                raise EnvironmentConfigError(
+                    f"sensor {sensor.name!r}: not all is finite{_place(sensor.read)}"
+                )
         if self._truncate_on_error:
             self._last_observation = _copied(arrays)
         return arrays
@@ -227,6 +253,12 @@ class Rearrangement:
         elif "segmentation" in self._images:
             info["visible"] = visible_pixels(inputs)
         return info
+
+
+def _place(code: object) -> str:
+    """File and line of a user's own function, empty where it has none."""
+    found = getattr(code, "__code__", None)
+    return f" ({found.co_filename}, line {found.co_firstlineno})" if found is not None else ""
 
 
 def _copied(observation: ObservationDict) -> ObservationDict:

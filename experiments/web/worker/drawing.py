@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from experiments.blame import describe
 from experiments.house import House
 from experiments.session.film_config import FilmConfig
 from experiments.session.first_person import FirstPersonRenderer
-from experiments.session.user_code import describe
 from experiments.web.protocol import Frame, View
 from experiments.web.state import Trigger
 from experiments.web.worker.clock import Send

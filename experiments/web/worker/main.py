@@ -10,10 +10,10 @@ from queue import SimpleQueue
 
 import msgspec
 
+from experiments.blame import describe
 from experiments.record import records
 from experiments.record.run_directory import is_run
 from experiments.session.endings import INTERRUPTED
-from experiments.session.user_code import describe
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
 from experiments.web.protocol import (

@@ -164,6 +164,14 @@ def test_a_reward_of_your_own(open_floor):
     assert core.step(np.zeros(4)).reward == 7.0
 
 
+@pytest.mark.parametrize("reward", [math.nan, math.inf, None, "1", np.zeros(2)])
+def test_a_reward_is_a_finite_number(open_floor, reward):
+    core = core_of(open_floor, reward=lambda *_: reward)
+    core.reset(0)
+    with pytest.raises(EnvironmentConfigError, match=r"the reward is .*test_parts.py, line"):
+        core.step(np.zeros(4))
+
+
 @pytest.fixture(scope="module")
 def draw(catalogue, navmesh):
     """Seed -> episode of one object in the apartment."""

@@ -268,6 +268,15 @@ def test_a_sensor_of_your_own_joins_in(small_episode):
     env.close()
 
 
+@pytest.mark.parametrize("value", [np.full(1, np.nan, np.float32), np.zeros(2, np.float32), None, "x"])
+def test_a_sensor_that_does_not_keep_to_its_spec_is_named(value, small_episode):
+    own = Sensor("own", lambda _: specs.Array((1,), np.float32), lambda _: value)
+    env = mjsim.make(house=small_episode.house, episodes=[small_episode], observations=(own,))
+    with pytest.raises(EnvironmentConfigError, match=r"sensor 'own': .*test_sensors.py, line"):
+        env.reset()
+    env.close()
+
+
 def test_two_sensors_of_one_name_are_refused():
     other = Sensor("gps", lambda _: specs.Array((1,), np.float32), lambda _: np.zeros(1))
     with pytest.raises(EnvironmentConfigError, match="gps"):

@@ -1,0 +1,120 @@
+"""Planners by name; of a user's own one, no plan is used before it was checked, and no claim is believed."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from experiments.blame import definition, describe, shown
+from experiments.errors import UserCodeError
+from experiments.session.user_code import is_own, user_code
+from planner.checker import check, replayed
+from planner.errors import ProblemError
+from planner.exact.solver import ExactSolver
+from planner.plan import Plan, Status, Visit, VisitKind
+from planner.problem import RoutingProblem
+from planner.solver import SolveLimit, Solver, solver
+
+SAME = 1e-6  # share of its length by which what is said of a tour may be rounded
+
+
+def planner_named(name: str, *, exact: bool = True) -> Solver:
+    """The planner of this name; a user's own one is checked, and with `exact` the exact planner bounds its tours.
+
+    Raises:
+        PlannerError: There is none.
+    """
+    found = solver(name)
+    return OwnPlanner(name, found, ExactSolver() if exact else None) if is_own(found) else found
+
+
+class OwnPlanner:
+    """A planner of a user's own.
+
+    Its plans are replayed. Length, bound and status of what this gives are worked out here; a wrong length is an error,
+    and what it claims of bound and status is dropped.
+
+    Args:
+        name: Names it in records and messages.
+        planner: What the user wrote.
+        exact: Bounds the tours; None where nothing does but the check.
+    """
+
+    def __init__(self, name: str, planner: Solver, exact: ExactSolver | None) -> None:
+        self.name, self._planner, self._exact = name, planner, exact
+        self._what = f"planner {name!r}"
+
+    def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
+        """The plan that it gives; raises `UserCodeError` where it fails, or its plan is not what it says."""
+        return self._with_bound(problem, self._asked(problem, seed, limit))
+
+    def improve(
+        self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
+    ) -> Iterator[Plan]:
+        """The plans that it gives, one by one, and the last with its bound; raises as `solve`."""
+        plan = None
+        if hasattr(self._planner, "improve"):
+            with user_code(self._planner, self._what):
+                plans = iter(self._planner.improve(_copied(problem), seed=seed, limit=limit))
+            while (given := self._next(plans)) is not None:
+                plan = self._checked(problem, given)
+                yield plan
+        else:
+            plan = self._asked(problem, seed, limit)
+            yield plan
+        if plan is None:
+            raise UserCodeError(f"{self._what} gave no plan{definition(self._planner.improve)}")
+        bounded = self._with_bound(problem, plan)
+        if bounded.improves_on(plan):
+            yield bounded
+
+    def _next(self, plans: Iterator[Plan]) -> object | None:
+        with user_code(self._planner, self._what):
+            for plan in plans:
+                return plan if plan is not None else "None"
+        return None
+
+    def _asked(self, problem: RoutingProblem, seed: int, limit: SolveLimit | None) -> Plan:
+        with user_code(self._planner, self._what):
+            given = self._planner.solve(_copied(problem), seed=seed, limit=limit)
+        return self._checked(problem, given)
+
+    def _checked(self, problem: RoutingProblem, given: Any) -> Plan:
+        """The tour of a plan, with its true length; its bound is what the planner claims."""
+        where = definition(self._planner.solve)
+        if not isinstance(given, Plan):
+            raise UserCodeError(f"{self._what} answered {shown(given)}; it must be a Plan{where}")
+        try:
+            visits = tuple(Visit(VisitKind(kind), name) for kind, name in given.visits)
+            said = Plan(visits, given.cost, given.lower_bound, given.status, given.seconds)
+            cost = replayed(problem, said)
+            close = problem.tolerance(cost) + SAME * cost
+            if abs(cost - said.cost) > close:
+                raise ProblemError(f"the tour is {cost:.6f} m long, not {said.cost:.6f} m")
+            if said.lower_bound > cost + close:
+                raise ProblemError(
+                    f"the lower bound of {said.lower_bound:.6f} m exceeds the cost of {cost:.6f} m"
+                )
+            bound = check(problem, Plan(visits, cost, 0.0, Status.FEASIBLE, said.seconds))
+        except Exception as error:  # whatever the plan holds
+            raise UserCodeError(
+                f"{self._what} gave a plan that does not hold: {describe(error)}{where}"
+            ) from error
+        return _bounded(problem, said, cost, bound)
+
+    def _with_bound(self, problem: RoutingProblem, plan: Plan) -> Plan:
+        """The plan with the bound of the exact planner."""
+        if self._exact is None or plan.status is Status.OPTIMAL or not self._exact.applies(problem):
+            return plan
+        return _bounded(problem, plan, plan.cost, self._exact.solve(problem).lower_bound)
+
+
+def _copied(problem: RoutingProblem) -> RoutingProblem:
+    """What a user's own code may change without harm."""
+    return replace(problem, distances=problem.distances.copy())
+
+
+def _bounded(problem: RoutingProblem, plan: Plan, cost: float, bound: float) -> Plan:
+    """A plan with this length and the bound that was found for it, m."""
+    optimal = cost - bound <= problem.tolerance(cost)
+    status = Status.OPTIMAL if optimal else Status.FEASIBLE
+    return Plan(plan.visits, cost, cost if optimal else bound, status, float(plan.seconds))
