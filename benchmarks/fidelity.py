@@ -78,7 +78,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     """The result as text: a table in Markdown, then the requirements."""
     yield f"{result['seeds']} houses of each difficulty; differences from `full`: of the mean (largest of any trial)"
     yield ""
-    yield "| participant | objects | fidelity | same deliveries | time | distance | IPL | deviations |"
+    yield "| participant | objects | fidelity | same deliveries | time | distance | `ipl_stand` | `nd_feasible` |"
     yield "|---|---|---|---|---|---|---|---|"
     for row in result["rows"]:
         yield "| " + " | ".join(_cells(row)) + " |"

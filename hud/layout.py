@@ -192,10 +192,9 @@ class _Grid:
         rows: tuple[ListRow, ...] = ()
         for lines in (3, 2, 1, 0):
             places = [
-                self._typeface.paragraph(b.place, theme.DETAIL, width, lines) if lines else ()
-                for b in entries
+                self._typeface.wrap(b.place, theme.DETAIL, width, lines) if lines else () for b in entries
             ]
-            heights = [px(max(theme.BIN_TILE, theme.LINE * (1 + len(p))) + theme.GAP) for p in places]
+            heights = [px(max(theme.BIN_TILE, theme.BIN_LINE * (1 + len(p))) + theme.BIN_GAP) for p in places]
             rows = tuple(ListRow(height, width, place) for height, place in zip(heights, places, strict=True))
             if fixed + sum(heights) <= room:
                 break

@@ -19,11 +19,8 @@ def in_sentence(label: str) -> str:
 
 
 def bins(view: TaskView) -> tuple[BinEntry, ...]:
-    """Every receptacle with picture and room: all conditions show these (PAPER section 5).
-
-    The place within the room stays out: it would widen the panel into the view.
-    """
-    return tuple(BinEntry(r.label, r.room, r.picture) for r in view.receptacles)
+    """Every receptacle with picture, room and place in the room: all conditions show these (PAPER sections 5 and 7)."""
+    return tuple(BinEntry(r.label, f"{r.room}, {r.place}", r.picture) for r in view.receptacles)
 
 
 def inventory(view: TaskView) -> tuple[InventorySlot | None, InventorySlot]:

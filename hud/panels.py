@@ -33,7 +33,7 @@ def draw_bins(
             text_x, top + px(12) + lift, canvas.typeface.fit(entry.label, face, width), face, theme.TEXT
         )
         for i, line in enumerate(row.detail):
-            canvas.text(text_x, top + px(12 + theme.LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
+            canvas.text(text_x, top + px(12 + theme.BIN_LINE * (i + 1)), line, theme.DETAIL, theme.QUIET)
         top += row.height
     return canvas.patch()
 

@@ -58,7 +58,10 @@ PANEL_RADIUS: Final = 8.0
 LINE: Final = 14  # height of a line of text
 TILE: Final = 30  # side of a picture; objects can be told apart
 
-BIN_TILE: Final = 30  # side of a picture in the list of bins, which has to fit above the mini-map
+# The list of bins: side of a picture, line and gap; six bins with three lines of place each fit.
+BIN_TILE: Final = 30
+BIN_LINE: Final = 13
+BIN_GAP: Final = 4
 
 CHIP_HEIGHT: Final = 28
 CHIP_WIDTH: Final = 76

@@ -16,7 +16,7 @@ from mjsim.files import replacing
 if TYPE_CHECKING:
     from experiments.analysis.comparison import Difference, Interval
 
-METRICS = ("completion_time_s", "task_distance_m", "ipl_stand", "nd_feasible", "total_regret_m")
+METRICS = ("completion_time_s", "task_distance_m", "ipl_locations", "nd_feasible", "total_regret_m")
 FORMATS = (".png", ".svg", ".pdf")  # of a figure
 WIDTH = 160  # characters, where there is no terminal
 

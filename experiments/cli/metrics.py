@@ -14,8 +14,9 @@ from experiments.errors import RecordError, ReplayError
 from mjsim.files import write_text_atomically
 
 DESCRIPTION = """\
-Compute the metrics of a run directory or of a batch folder anew, from event log and trajectory alone. A run is printed
-with a name and a value per line, a batch as CSV with a row per trial; --out writes CSV or JSON instead.
+Compute the metrics of a run directory, of a batch folder or of the folder of `mjsim play` anew, from event log and
+trajectory alone. A run is printed with a name and a value per line, others as CSV with a row per trial; --out writes
+CSV or JSON instead.
 
 Each file that is read must have the SHA-256 with which it was written (`mjsim replay` checks everything). Metrics that
 can be defined in several ways are shown side by side:
@@ -39,7 +40,9 @@ def add_parser(commands: Any) -> None:
         run,
         description=DESCRIPTION,
     )
-    parser.add_argument("directory", type=Path, metavar="DIR", help="run directory, or folder of a batch")
+    parser.add_argument(
+        "directory", type=Path, metavar="DIR", help="run directory, or folder of a batch or of mjsim play"
+    )
     parser.add_argument(
         "--out", type=_table_file, metavar="FILE", help=f"write to a file: {' or '.join(FORMATS)}"
     )
@@ -48,16 +51,28 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print or write the metrics; 1 if a trial of a batch cannot be measured."""
-    from experiments.record.run_directory import check_file, is_batch, is_run
+    from experiments.record.phases import TASK
+    from experiments.record.run_directory import TRIALS, check_file, is_batch, is_run, visit_folders
 
     if arguments.out is not None:
         check_file(arguments.out, replace=arguments.force)
     if is_run(arguments.directory):
         rows, failures = [_measured(arguments.directory)], 0
     elif is_batch(arguments.directory):
-        rows, failures = _measure_batch(arguments.directory)
+        runs = sorted(p for p in (arguments.directory / TRIALS).glob("[!.]*") if p.is_dir())
+        rows, failures = _measure_all({path: {} for path in runs})
+    elif found := visit_folders(arguments.directory):
+        rows, failures = _measure_all(
+            {
+                p / TASK: {"participant": str(p.relative_to(arguments.directory))}
+                for p in found
+                if is_run(p / TASK)
+            }
+        )
     else:
-        raise RecordError(f"{arguments.directory} is neither a run directory nor the folder of a batch")
+        raise RecordError(
+            f"{arguments.directory} is neither a run directory nor the folder of a batch or of `mjsim play`"
+        )
     if arguments.out is not None:
         write_text_atomically(arguments.out, _text(rows, arguments.out.suffix))
     elif is_run(arguments.directory):
@@ -86,13 +101,13 @@ def _measured(path: Path) -> Mapping[str, Any]:
     return trial.row
 
 
-def _measure_batch(folder: Path) -> tuple[list[Mapping[str, Any]], int]:
-    from experiments.record.run_directory import TRIALS
-
-    rows, failures = [], 0
-    for path in sorted(p for p in (folder / TRIALS).glob("[!.]*") if p.is_dir()):
+def _measure_all(runs: Mapping[Path, Mapping[str, Any]]) -> tuple[list[Mapping[str, Any]], int]:
+    """Metrics of runs, each after further columns, and how many cannot be measured."""
+    rows: list[Mapping[str, Any]] = []
+    failures = 0
+    for path, columns in runs.items():
         try:
-            rows.append(_measured(path))
+            rows.append({**columns, **_measured(path)})
         except (RecordError, ReplayError) as error:
             failures += 1
             print(f"mjsim: {error}", file=sys.stderr)

@@ -14,6 +14,7 @@ from mjsim.files import exchange, work_folder
 
 SHOWN_NAMES = 3  # of what is in the way
 TRIALS = "trials"  # folder of a batch
+VISIT = "visit.json"  # in the folder of each visit of `mjsim play`
 
 
 def is_run(directory: Path) -> bool:
@@ -30,6 +31,12 @@ def is_batch(directory: Path) -> bool:
     if not inside:  # a batch that was killed before its first trial was done has no table either
         return not list(directory.glob(f"{TRIALS}.*"))
     return all(is_run(path) for path in inside)
+
+
+def visit_folders(directory: Path) -> list[Path]:
+    """The visits in the folder of an `mjsim play`, or of several of these, by name."""
+    found = (path for depth in ("*", "*/*") for path in directory.glob(f"{depth}/{VISIT}"))
+    return sorted(path.parent for path in found)
 
 
 def check_run_directory(path: Path, *, replace: bool = False) -> Path:

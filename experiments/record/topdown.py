@@ -4,7 +4,7 @@ import contextlib
 import functools
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +49,34 @@ def draw_topdown(
         origin: Whether the participant is simulated (`experiments.record.origin`).
     """
     planned = planned_path(house, episode, plan)
+    lines = {
+        f"planned at the start, {_length(planned):.1f} m": (planned, PLANNED),
+        f"walked, {_length(walked):.1f} m": (walked, WALKED),
+    }
+    drawing = _drawn_task(house, episode, lines, walked[0])
+    drawing.text(origin, np.array([drawing.width - MARGIN - 30.0, MARGIN / 2]), Face(12, 500), ORIGIN)
+    with replacing(path) as temporary:
+        cv2.imwrite(str(temporary), cv2.cvtColor(drawing.image, cv2.COLOR_RGB2BGR))
+
+
+def task_picture(
+    house: House, episode: Episode, title: str, planned: _Points | None = None
+) -> NDArray[np.uint8]:
+    """What lies where at the start of a task, and the way to tidy it, m, shape (k, 2): RGB, (height, width, 3)."""
+    lines = {} if planned is None else {f"shortest way, {_length(planned):.1f} m": (planned, PLANNED)}
+    drawing = _drawn_task(house, episode, lines, np.array([episode.start.x, episode.start.y]))
+    drawing.text(title, np.array([drawing.width / 2, MARGIN / 2]), Face(17, 700), BLACK)
+    return drawing.image
+
+
+def _drawn_task(
+    house: House, episode: Episode, lines: Mapping[str, tuple[_Points, str]], start: _Points
+) -> "_Drawing":
+    """Ways (planned ones dashed) by what the legend says of them, the start, objects, receptacles, rooms, a legend."""
     drawing = _Drawing(house)
-    drawing.line(planned, PLANNED, dashed=True)
-    drawing.line(walked, WALKED)
-    drawing.star(drawing.pixels(walked[:1])[0])
+    for points, colour in lines.values():
+        drawing.line(points, colour, dashed=colour == PLANNED)
+    drawing.star(drawing.pixels(start)[0])
     kinds = list(zip(CATEGORY_COLOURS, house.catalogue.categories.values(), strict=False))
     for colour, category in kinds:
         for placed in (o for o in episode.objects if o.category == category.key):
@@ -61,14 +85,12 @@ def draw_topdown(
     for key, label in house.rooms.labels.items():
         centre = house.rooms.centers[house.rooms.keys.index(key)]
         drawing.text(label, drawing.pixels(centre)[0], Face(17, 700), LABEL, halo=True)
-    drawing.text(origin, np.array([drawing.width - MARGIN - 30.0, MARGIN / 2]), Face(12, 500), ORIGIN)
     present = {o.category for o in episode.objects}
     drawing.legend(
-        [f"planned at the start, {_length(planned):.1f} m", f"walked, {_length(walked):.1f} m"],
+        {label: colour for label, (_, colour) in lines.items()},
         [(colour, category.label) for colour, category in kinds if category.key in present],
     )
-    with replacing(path) as temporary:
-        cv2.imwrite(str(temporary), cv2.cvtColor(drawing.image, cv2.COLOR_RGB2BGR))
+    return drawing
 
 
 def planned_path(house: House, episode: Episode, plan: Event) -> _Points:
@@ -139,11 +161,10 @@ class _Drawing:
             self._cover(cv2.dilate(mask, np.ones((5, 5), np.uint8)), left, top, WHITE)
         self._cover(mask, left, top, colour)
 
-    def legend(self, lines: Sequence[str], categories: Sequence[tuple[str, str]]) -> None:
-        """Both paths, the start, and the colours of the categories, column by column."""
+    def legend(self, lines: Mapping[str, str], categories: Sequence[tuple[str, str]]) -> None:
+        """Colours of ways by label, the start, and the colours of the categories, column by column."""
         draws: list[tuple[Callable[[_Points], None], str]] = [
-            (lambda at: self._strokes(_dashes(at + _SAMPLE), PLANNED, 2), lines[0]),
-            (lambda at: self._strokes([at + _SAMPLE], WALKED, 2), lines[1]),
+            *((functools.partial(self._sample, colour=colour), label) for label, colour in lines.items()),
             (self.star, "start"),
             *((functools.partial(self.dot, colour=tone), label) for tone, label in categories),
         ]
@@ -153,6 +174,10 @@ class _Drawing:
             draw(at)
             mask, baseline = self._type.rasterise(label, Face(14, 400))
             self._cover(mask, at[0] + 28, at[1] - baseline + 5, BLACK)
+
+    def _sample(self, at: _Points, colour: str) -> None:
+        way = at + _SAMPLE
+        self._strokes(_dashes(way) if colour == PLANNED else [way], colour, 2)
 
     def _strokes(self, parts: Sequence[_Points], colour: str, thickness: int) -> None:
         cv2.polylines(self.image, _fixed(parts), False, _rgb(colour), thickness, cv2.LINE_AA, _SHIFT)

@@ -50,7 +50,7 @@ def people_table(table: StudyTable) -> pa.Table:
     """A row per person: seeds, cell, and all measures under the names of the analysis."""
     columns: dict[str, Any] = {
         "origin": [table.origin] * len(table.rows),
-        **{name: [row.get(name) for row in table.rows] for name in ("user", "house", *SEEDS)},
+        **{name: [row.get(name) for row in table.rows] for name in ("user", "participant", "house", *SEEDS)},
         "assistance": table.assistance,
         "objects": table.objects,
         **table.columns,

@@ -11,9 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
+from experiments.record.files import read_json
 from experiments.record.origin import RECORDED, origin_of
+from experiments.record.phases import TASK
+from experiments.record.run_directory import VISIT, is_run, visit_folders
 from experiments.session.endings import ALL_DELIVERED
 from experiments.study.measures import FILE, LIKERT_PREFIX, Measures, resolve
+from experiments.trials.batch_folder import read_trial
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_name
 from experiments.trials.table import NAME, read_rows
@@ -101,17 +105,19 @@ class StudyTable:
 
 
 def read_study(folder: Path, measures: Measures) -> StudyTable:
-    """Read the people of a study or a batch who finished; a RecordError names a missing column or an invalid value."""
+    """The people of a study, a batch or `mjsim play` who finished; a RecordError names what is missing or invalid."""
     return study_table(read_people(folder), measures, people_path(folder))
 
 
 def people_path(folder: Path) -> Path:
-    """The table of a study or a batch."""
-    return folder / f"{NAME}.parquet"
+    """The table of a study or a batch; `mjsim play` has none, but a folder of visits."""
+    return folder if visit_folders(folder) else folder / f"{NAME}.parquet"
 
 
 def read_people(folder: Path) -> Sequence[Mapping[str, Any]]:
-    """The rows of a study or a batch; a RecordError names a missing column."""
+    """The rows of a study, a batch or `mjsim play`; a RecordError names a missing column."""
+    if visits := visit_folders(folder):
+        return [{"participant": str(visit.relative_to(folder)), **_visitor(visit)} for visit in visits]
     path = people_path(folder)
     rows = read_rows(path)
     if not rows:
@@ -120,6 +126,17 @@ def read_people(folder: Path) -> Sequence[Mapping[str, Any]]:
     if missing:
         raise RecordError(f"{path} has no column {', '.join(missing)}; it is not a table of people")
     return rows
+
+
+def _visitor(visit: Path) -> Mapping[str, Any]:
+    """What the record of a task says, or what the task is where it is not over."""
+    if is_run(visit / TASK):
+        return read_trial(visit / TASK).row
+    stored = read_json(visit / VISIT)
+    try:
+        return {name: stored["trials"][TASK][name] for name in REQUIRED} | {"ended": "not over"}
+    except (KeyError, TypeError) as error:
+        raise RecordError(f"{visit / VISIT} names no task") from error
 
 
 def study_table(
@@ -275,7 +292,7 @@ def _notes(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _person_and_cell(row: Mapping[str, Any]) -> tuple[Any, Any]:
-    return (row["user"], *(row.get(s) for s in SEEDS if s != "house_seed")), (
+    return (row["user"], row.get("participant"), *(row.get(s) for s in SEEDS if s != "house_seed")), (
         row["assistance"],
         row["objects"],
     )

@@ -65,7 +65,7 @@ def test_all_conditions_show_bins_hands_progress_clock_and_message(name):
     view = sample.task(12, steps=6, message=text, clock=12.5)
     state = shown(name, view)
     assert [(b.label, b.picture, b.place) for b in state.bins] == [
-        (r.label, r.picture, r.room) for r in view.receptacles
+        (r.label, r.picture, f"{r.room}, {r.place}") for r in view.receptacles
     ]
     assert [slot.label for slot in state.inventory] == [view.object(name).label for name in view.hands]
     assert (state.delivered, state.total, state.clock, state.message) == (2, 12, 12.5, text)

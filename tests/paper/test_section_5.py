@@ -73,12 +73,14 @@ def likest(tile, pictures, kind):
 
 @sizes
 @pytest.mark.parametrize("assistance", CONDITIONS)
-def test_all_conditions_show_the_bins_with_picture_and_room(starts, house, pictures, size, assistance):
+def test_all_conditions_show_the_bins_with_picture_room_and_place(starts, house, pictures, size, assistance):
     _, _, state = starts[assistance]
     catalogue = house.catalogue
     assert [(b.label, b.place) for b in state.bins] == [
-        (r.label, house.rooms.label(r.room)) for r in catalogue.receptacles.values()
+        (r.label, f"{house.rooms.label(r.room)}, {r.place}") for r in catalogue.receptacles.values()
     ]
+    rows = Compositor(pictures).layout(state, *size).bin_rows
+    assert [" ".join(row.detail) for row in rows] == [b.place for b in state.bins], "read whole"
     found = list(tiles(state, pictures, size, "bins"))
     assert len(found) == 6
     assert all(likest(tile, pictures, "receptacle:") == entry.picture for entry, tile in found)

@@ -1,8 +1,30 @@
-"""The contact sheet holds every frame where its captions say."""
+"""The contact sheet holds every frame where its captions say; the levels are those of one house."""
 
+import itertools
+
+import cv2
 import numpy as np
 
+from experiments.cli.main import main
+from experiments.record.topdown import PLANNED, house_picture
 from tools.gallery import SITUATIONS, contact_sheet
+
+
+def test_the_four_levels_are_one_house_and_the_first_has_its_way(house, tmp_path):
+    """Objects cover ever more of the house, which is the same; the dashed way is in the first picture alone."""
+    assert main(["gallery", "levels", "--out", str(tmp_path)]) == 0
+    sheet = cv2.cvtColor(cv2.imread(str(tmp_path / "levels.png")), cv2.COLOR_BGR2RGB)
+    panels = [half for row in np.split(sheet, 2) for half in np.split(row, 2, axis=1)]
+    tidy = house_picture(house, 90)
+    inside = [panel[28 : 28 + len(tidy), 28 : 28 + tidy.shape[1]] for panel in panels]
+    way = np.array(list(bytes.fromhex(PLANNED[1:])))
+    dashes = [int((picture == way).all(axis=2).sum()) for picture in inside]
+    assert dashes[0] > 500 and dashes[1:] == [0, 0, 0]
+    changed = [np.abs(picture.astype(int) - tidy).max(axis=2) > 8 for picture in inside]
+    assert all(mask.mean() < 0.1 for mask in changed), "the same house"
+    for fewer, more in itertools.pairwise(changed[1:]):
+        assert fewer.sum() < more.sum()
+    assert main(["gallery", "levels", "--out", str(tmp_path)]) == 2, "what exists is kept"
 
 
 def test_every_frame_is_on_the_sheet_in_its_row_and_column():

@@ -8,8 +8,8 @@ from experiments.cli.options import add_command, add_force
 from experiments.cli.requirements import require_extra
 
 DESCRIPTION = """\
-Analyse a study, or a batch, of simulated people or real ones: a row of trials.parquet per person, each in one
-cell of assistance x number of objects. Writes
+Analyse a study, a batch or the folder of `mjsim play` (or of several): a row of trials.parquet, or a visit, per person,
+each in one cell of assistance x number of objects. Writes
 
   report.html             all of it in one file, with figures
   stats.json              every number
@@ -28,7 +28,7 @@ def add_parser(commands: Any) -> None:
     parser = add_command(
         commands, "analyze", run, summary="figures, tests and a report of a study", description=DESCRIPTION
     )
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study or a batch")
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study, a batch or mjsim play")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: DIR/analysis)")
     parser.add_argument(
         "--exclude",

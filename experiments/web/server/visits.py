@@ -17,9 +17,9 @@ from experiments.errors import RecordError
 from experiments.record import records
 from experiments.record.journal import sync_folder
 from experiments.record.phases import TASK, TRAINING
+from experiments.record.run_directory import VISIT
 from mjsim.files import write_text_atomically
 
-VISIT = "visit.json"
 JOURNALS = "journals"
 TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")
 RESULT = "result"  # follows the last phase

@@ -2,6 +2,7 @@
 
 import csv
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +18,13 @@ def run(tmp_path_factory):
     out = tmp_path_factory.mktemp("metrics") / "run"
     config = TrialConfig(objects=6, assistance="none", seed=3, time_limit=8.0, fidelity="event")
     run_trial(config, out, topdown=False)
+    return out
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    out = tmp_path_factory.mktemp("finished") / "run"
+    run_trial(TrialConfig(objects=1, assistance="optimal", seed=3, fidelity="event"), out, topdown=False)
     return out
 
 
@@ -68,6 +76,26 @@ def test_a_batch_gives_a_row_per_trial_and_names_those_that_cannot_be_measured(b
     assert main(["metrics", str(batch)]) == 1
     printed = capsys.readouterr()
     assert "one" in printed.err and len(printed.out.splitlines()) == 2
+
+
+@pytest.mark.parametrize("server", ["", "none"])
+def test_people_who_play_are_measured_and_get_into_a_study(finished, tmp_path, capsys, server):
+    folder = tmp_path / "play"
+    task = {name: read_json(finished / records.METRICS)[name] for name in ("assistance", "objects", "user")}
+    for name in ("a1", "b2", "c3"):
+        (folder / server / name).mkdir(parents=True)
+        write_json(folder / server / name / "visit.json", {"trials": {"task": task}})
+    for name in ("a1", "b2"):
+        shutil.copytree(finished, folder / server / name / "task")
+    assert main(["metrics", str(folder)]) == 0
+    rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    visits = [str(Path(server, name)) for name in ("a1", "b2")]
+    assert [(row["participant"], row["delivered"]) for row in rows] == [(name, "1") for name in visits]
+    assert main(["study", "analyze", str(folder)]) == 0
+    people = csv.DictReader((folder / "analysis" / "people.csv").read_text().splitlines())
+    assert [row["participant"] for row in people] == visits
+    report = (folder / "analysis" / "report.html").read_text()
+    assert str(Path(server, "c3")) in report, "who did not finish is named"
 
 
 def test_other_folders_are_refused_in_one_line(tmp_path, capsys):

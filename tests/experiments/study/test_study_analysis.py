@@ -11,6 +11,7 @@ import pytest
 from study_people import SIZES, made_up_people, table_of
 
 from experiments.analysis.statistics.power import people_per_cell
+from experiments.cli import compare, run
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError, StatisticsError
 from experiments.record.origin import RECORDED, SIMULATED
@@ -19,8 +20,23 @@ from experiments.study.cost import StudyCost
 from experiments.study.measures import read_measures
 from experiments.study.power import MIN_POOL, Wanted, _eta_squared, plan_power
 from experiments.trials.table import read_rows, write_tables
+from experiments.web.server.pages import CLIENT
 
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
+
+
+def test_a_measure_has_one_column_wherever_it_is_named():
+    """Normalized deviations and inverse path length: study, score, table of a run, comparison, result page."""
+    columns = {m.label.lower(): m.column for m in read_measures().objective.values()}
+    told = {label.partition(" (")[0]: (column, label) for column, label, _ in run.SHOWN_METRICS}
+    page = (CLIENT / "templates" / "result.html").read_text()
+    for name in ("normalized deviations", "inverse path length"):
+        assert told[name] == (columns[name], f"{name} ({columns[name]})")
+        assert columns[name] in compare.METRICS
+    assert (
+        f'<dt>Inverse path length</dt><dd>{{{{ "%.2f" | format(metrics.{columns["inverse path length"]})'
+        in page
+    )
 
 
 class Elements(HTMLParser):

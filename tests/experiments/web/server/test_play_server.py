@@ -32,7 +32,7 @@ METRICS = {
     "delivered": 6,
     "completion_time_s": 125.0,
     "task_distance_m": 70.2,
-    "ipl_stand": 0.93,
+    "ipl_locations": 0.93,
     "total_regret_m": 3.25,
     "regretful_visits": 2,
 }
@@ -199,14 +199,28 @@ def test_a_visit_from_the_story_to_the_result(client, pool):
     assert [opened.config["objects"] for opened in asked] == [1, 6]
 
 
-def test_who_did_nothing_has_a_result_without_a_path_efficiency(client, monkeypatch):
-    for name in ("ipl_stand", "total_regret_m"):
+def test_who_did_nothing_has_a_result_without_an_inverse_path_length(client, monkeypatch):
+    for name in ("ipl_locations", "total_regret_m"):
         monkeypatch.setitem(METRICS, name, None)
     link = new_visit(client)
     go_through(client, link)
     answer = client.get(link)
     assert answer.status_code == 200
-    assert "Your result" in answer.text and "Path efficiency" not in answer.text
+    assert "Your result" in answer.text and "Inverse path length" not in answer.text
+
+
+def test_the_first_page_says_the_same_under_all_conditions_but_what_they_show(tmp_path, pool, monkeypatch):
+    """What is said under none is said under all; what is shown in addition follows, and plans come last."""
+
+    def said(name):
+        monkeypatch.setitem(TASK, "assistance", name)
+        with serving(tmp_path, pool) as client:
+            (text,) = re.findall(r"<p>(A list names .*?)</p>", client.get("/").text, re.DOTALL)
+        return re.split(r"(?<=\.)\s+", text.strip())
+
+    none, highlight, optimal = (said(name) for name in ("none", "highlight", "optimal"))
+    assert len(none) == 2 and said("guided-minimap") == optimal
+    assert (highlight[:1] + highlight[2:], optimal[:2] + optimal[3:]) == (none, highlight)
 
 
 def test_a_film_comes_first_where_there_is_one(tmp_path, pool):
