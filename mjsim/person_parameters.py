@@ -68,7 +68,7 @@ class PersonParameters:
     field_of_view: float = _number(
         2.0 * math.atan(PICTURE_ASPECT * math.tan(math.radians(35.0))),
         math.radians(20.0),
-        math.radians(150.0),
+        2.618,  # 150 degrees, as it is printed
         "rad",
     )
     viewing_distance: float = _number(8.0, 0.5, 100.0, "m")

@@ -37,6 +37,7 @@ CIRCUMSTANCES = (
 )
 CONFIDENCE = 0.95
 SHOWN_SEEDS = 5
+HUGE = 1e12  # no metric reaches it
 
 Row = Mapping[str, Any]
 Interval = tuple[float, float] | None
@@ -75,6 +76,8 @@ def read_blocks(folder: Path) -> list[Block]:
     missing = [name for name in ("assistance", *SEEDS, *CIRCUMSTANCES) if rows and name not in rows[0]]
     if missing:
         raise RecordError(f"{path} was written by another version: it has no {', '.join(missing)}")
+    if not all(isinstance(row["assistance"], str) for row in rows):
+        raise RecordError(f"{path}: assistance is not a name in every row; correct it")
     if len({row["assistance"] for row in rows}) < 2:
         raise ConfigError(f"{folder} holds fewer than two assistance conditions; there is nothing to compare")
     # Two persons with the same seed are no pair.
@@ -119,8 +122,13 @@ def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
 def unknown_metrics(
     blocks: Sequence[Block], metrics: Sequence[str], differences: Sequence[Difference]
 ) -> Iterator[str]:
-    """A line for every metric that is unknown in all pairs of two conditions."""
+    """A line for every metric that is unknown in pairs of two conditions: in some, then in all."""
     shown = {(d.block, d.metric, d.conditions) for d in differences}
+    for d in differences:
+        block = next(block for block in blocks if block.label == d.block)
+        if gaps := len(_common(block, d.conditions)) - d.pairs:
+            where = f"{d.block}: " if d.block else ""
+            yield f"{where}{d.metric} is not known in {counted(gaps, 'pair')} of {' and '.join(d.conditions)}, left out"
     for block in blocks:
         where = f"{block.label}: " if block.label else ""
         for metric in metrics:
@@ -132,13 +140,13 @@ def unknown_metrics(
 
 def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]:
     """Every two conditions in every metric, on the pairs that are complete; a ConfigError where there are none."""
-    first = next(row for block in blocks for rows in block.rows.values() for row in rows.values())
+    rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
+    known = [name for name in rows[0] if all(_is_number(row[name]) for row in rows)]
     for name in metrics:
-        if name not in first or isinstance(first[name], str | bool):
-            known = ", ".join(
-                n for n, v in first.items() if isinstance(v, int | float) and not isinstance(v, bool)
-            )
-            raise ConfigError(f"no metric {name!r}; there are {known}")
+        if name not in known:
+            raise ConfigError(f"no metric {name!r}; there are {', '.join(known)}")
+        if huge := next((row[name] for row in rows if HUGE < abs(row[name] or 0) < math.inf), None):
+            raise ConfigError(f"{name} has the value {huge:g}, which cannot be; correct or remove that row")
     found = [
         difference
         for block in blocks
@@ -151,6 +159,11 @@ def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]
             f"there are no pairs to compare: {next(missing_pairs(blocks), 'no metric is known')}"
         )
     return found
+
+
+def _is_number(value: object) -> bool:
+    """Whether it is one, or not known."""
+    return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
 
 
 def _compare(block: Block, metric: str, conditions: tuple[str, str]) -> Difference | None:

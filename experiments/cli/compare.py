@@ -61,6 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     from experiments.record.run_directory import check_file
 
+    if arguments.plot is not None and arguments.plot == arguments.csv:
+        raise ConfigError(f"--plot and --csv both name {arguments.plot}; give two files")
     for path in (arguments.plot, arguments.csv):
         if path is not None:
             check_file(path, replace=arguments.force)

@@ -26,7 +26,7 @@ def end_with(error: Exception, words: Sequence[str]) -> int:
     if isinstance(error, BrokenPipeError):  # the reader of the output closed it
         drop_output()
         return BROKEN_PIPE
-    _flush_output()
+    flush_output()
     code, text, own = exit_code(error), message(error), _own_place(error)
     if own:  # raised where a user's own code was loaded or called
         code, text = FAILED, f"{text}{own}; traceback in {_report(error, words)}"
@@ -67,7 +67,9 @@ def message(error: Exception) -> str:
         text = "a path has a null character in it; correct the file that names it"
     else:
         text = str(error)
-    return " ".join(text.split())
+    from mjsim.errors import brief
+
+    return brief(text)
 
 
 def drop_output() -> None:
@@ -77,7 +79,8 @@ def drop_output() -> None:
     os.close(null)
 
 
-def _flush_output() -> None:
+def flush_output() -> None:
+    """Write what waits; where nothing takes it, drop it."""
     if sys.stdout is not None:
         try:
             sys.stdout.flush()

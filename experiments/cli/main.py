@@ -4,13 +4,15 @@ import argparse
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from experiments.cli.failures import USAGE_ERROR, drop_output, end_with
+from experiments.cli.failures import USAGE_ERROR, drop_output, end_with, flush_output
 from experiments.cli.requirements import add_checkout_command
 from experiments.session.signals import exit_code, signal_of, signals_raised
+from mjsim.errors import brief
 from mjsim.gl_choice import postpone_gl
 
 COMMANDS = {
@@ -99,18 +101,20 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End the process."""
-        text = " ".join(message.split())
-        self.exit(USAGE_ERROR, f"mjsim: {text}; `{self.prog} --help` lists the options\n")
+        self.exit(USAGE_ERROR, f"mjsim: {brief(message)}; `{self.prog} --help` lists the options\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; 0 done, 1 failed, 2 bad input, 70 a bug of ours, 128 + n stopped by signal n."""
     words = sys.argv[1:] if argv is None else list(argv)
-    if (here := str(Path.cwd())) not in sys.path:
-        sys.path.append(here)  # where a user's participants, conditions and planners may be
+    if argv is None and not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of libraries, about lines of code that users do not know
     postpone_gl()
     if sys.stderr is None:  # closed; messages must not go to standard output
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - as long as the process
+    if sys.stdout is None:  # closed; what is written there is lost, and must not seem to have arrived
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 1)
+        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the process
     with signals_raised():
         try:
             return _run(words)
@@ -124,7 +128,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     command = words[0] if words and words[0] in COMMANDS else None
-    arguments = parser(command).parse_args(words)
+    try:
+        here = str(Path.cwd())
+    except FileNotFoundError as error:
+        raise OSError(error.errno, "the current folder was removed; change to another one") from error
+    if here not in sys.path:
+        sys.path.append(here)  # where a user's participants, conditions and planners may be
+    commands = parser(command)
+    if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
+        commands.error(f"{bad} gives no value")  # argparse would take it for a list
+    try:
+        arguments = commands.parse_args(words)
+    except SystemExit:
+        flush_output()
+        raise
     if "numba" in sys.modules:
         from experiments.trials.compile_notice import announce_compiling
 

@@ -55,9 +55,9 @@ def frame_size(text: str) -> tuple[int, int]:
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, such as 640x480")
     width, height = int(match[1]), int(match[2])
-    if width % 2 or height % 2 or width < 160 or height < 120 or max(width, height) > MAX_SIDE:
+    if width % 2 or height % 2 or width < 320 or height < 240 or max(width, height) > MAX_SIDE:
         raise argparse.ArgumentTypeError(
-            f"{text} must be even in both directions, at least 160x120 and at most {MAX_SIDE}x{MAX_SIDE}"
+            f"{text} must be even in both directions, at least 320x240 and at most {MAX_SIDE}x{MAX_SIDE}"
         )
     return width, height
 

@@ -3,6 +3,7 @@
 import argparse
 import gc
 import json
+import math
 import sys
 import threading
 import time
@@ -79,14 +80,16 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read, solve, print; or check."""
     if arguments.check is not None:
+        if arguments.time_limit is not None:
+            raise ConfigError("--check plans nothing; leave out --time-limit")
         return _check(arguments.file, arguments.check)
     if arguments.certificate is not None:
         from experiments.record.run_directory import check_file  # loaded only where it is needed
 
         check_file(arguments.certificate, replace=arguments.force)
     started, seconds = time.perf_counter(), arguments.time_limit
-    if seconds is not None:
-        SolveLimit(seconds=seconds)  # refuses what is no limit
+    if seconds is not None and not 0 < seconds < math.inf:
+        raise ConfigError(f"--time-limit {seconds:g} must be positive and finite; give seconds")
     problem, planner = _read(arguments.file, problem_from_json), _planner(arguments.planner)
     search = _Search(planner, problem, started, seconds)
     try:

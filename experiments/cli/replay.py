@@ -1,6 +1,7 @@
 """`mjsim replay`: simulate a recorded run again, verify it, film it in another view."""
 
 import argparse
+import math
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -79,10 +80,12 @@ def point(text: str) -> tuple[float, float, float]:
     """Parse `1.5,2,8`.
 
     Raises:
-        argparse.ArgumentTypeError: It is not three numbers.
+        argparse.ArgumentTypeError: It is not three finite numbers.
     """
     try:
         x, y, z = (float(part) for part in text.split(","))
+        if not all(map(math.isfinite, (x, y, z))):
+            raise ValueError
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form X,Y,Z, such as 1.5,2,8") from None
     return x, y, z
@@ -103,6 +106,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     film = None
     if arguments.video is not None:
+        if arguments.video.suffix != ".mp4":
+            raise ConfigError(f"cannot film to {arguments.video}: name a file that ends in .mp4")
         check_file(arguments.video, replace=arguments.force)
         film = ReplayFilm(
             path=arguments.video,

@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
             **trial_options(arguments),
         },
     )
-    film = None if arguments.no_video else film_config(arguments)
+    film = film_config(arguments)  # refuses a profile that there is not, even where nothing is filmed
     console = error_console()
     warnings: list[str] = []
     columns = (
@@ -118,7 +118,7 @@ def run(arguments: argparse.Namespace) -> int:
         metrics = run_trial(
             config,
             arguments.out,
-            film=film,
+            film=None if arguments.no_video else film,
             topdown=not arguments.no_floor_plan,
             replace=arguments.force,
             on_progress=show,

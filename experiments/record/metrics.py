@@ -66,7 +66,8 @@ class Metrics:
         mean_regret_m: By how much a visit makes the rest of the task longer than the best one at that moment, m; the
             mean of all visits whose regret is known, None if there is none.
         total_regret_m: Their sum, m: how much longer the walk is for the order of visits alone; or None.
-        regretful_visits: Visits with a regret of more than 1 cm. The others are optimal or tie with the optimal one.
+        regretful_visits: Visits with a regret of more than 1 cm, None if none is known. The
+            others are optimal or tie with the optimal one.
         unjudged_visits: Visits whose regret is not known: the planner could not prove it, or it was not asked for.
         mean_suggestion_gap_m: Regret of what was suggested, m: the mean of all suggestions whose regret is known, None
             if there is none. It measures the planner, as `mean_regret_m` measures the person.
@@ -92,7 +93,7 @@ class Metrics:
     failures: int
     mean_regret_m: float | None
     total_regret_m: float | None
-    regretful_visits: int
+    regretful_visits: int | None
     unjudged_visits: int
     mean_suggestion_gap_m: float | None
     max_suggestion_gap_m: float | None
@@ -154,7 +155,7 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
         failures=_count(events, "pick_failed", "place_failed", "grip_lost"),
         mean_regret_m=sum(known) / len(known) if known else None,
         total_regret_m=sum(known) if known else None,
-        regretful_visits=sum(regret > REGRETFUL for regret in known),
+        regretful_visits=sum(regret > REGRETFUL for regret in known) if known else None,
         unjudged_visits=len(visits) - len(known),
         mean_suggestion_gap_m=sum(gaps.values()) / len(gaps) if gaps else None,
         max_suggestion_gap_m=max(gaps.values(), default=None),

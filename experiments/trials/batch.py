@@ -69,20 +69,28 @@ def run_batch(
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
     if executor not in EXECUTORS:
         raise ConfigError(f"no executor {executor!r}; there are {', '.join(EXECUTORS)}")
+    said: set[str] = set()
+
+    def note(line: str) -> None:
+        """Say it once, of the design or of the folder."""
+        if line not in said:
+            said.add(line)
+            on_note(line)
+
     out = out.absolute() if executor == RAY else out  # other machines have other current folders
     check_batch_folder(out)
     inputs = check_trials(design.trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     plan = plan_batch(design.trials, inputs, out)
-    for note in filter(None, (*plan.notes, confounded(design.trials))):
-        on_note(note)
+    for line in filter(None, (*plan.notes, confounded(design.trials))):
+        note(line)
     try:
         _run_missing(plan, workers, executor, on_progress)
     finally:
         with signals_postponed() as signals:
             signals.save()
             remove_leftovers(out / TRIALS)
-            rows = _write_rows(design.trials, out, on_note)
+            rows = _write_rows(design.trials, out, note)
     return rows
 
 

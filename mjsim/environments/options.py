@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
+from numbers import Real
 from typing import Any, Literal, TypeVar
 
 from mjsim.environments.control import CONTROLS, Control
@@ -68,6 +69,14 @@ class EnvironmentOptions:
     navigable: NavigableBuilder | None = None
 
     def __post_init__(self) -> None:
+        counts = self.objects if isinstance(self.objects, tuple | list) else (self.objects, self.objects)
+        others = [self.time_limit or 0, self.slots or 0, self.keep or 0]
+        whole = len(counts) == 2 and all(type(count) is int for count in counts)
+        if not whole or not all(isinstance(number, Real) for number in others):
+            raise EnvironmentConfigError(
+                "objects must be a whole number or (min, max), and time_limit, slots and keep numbers or None; got "
+                f"{self.objects!r}, {self.time_limit!r}, {self.slots!r} and {self.keep!r}"
+            )
         low, high = self.object_range
         limit, episodes = self.time_limit, self.episodes
         count = 1 if episodes is None else episodes if isinstance(episodes, int) else len(episodes)

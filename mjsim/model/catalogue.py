@@ -102,6 +102,10 @@ class Catalogue:
 
 
 _Text = Annotated[str, msgspec.Meta(pattern=r"\S")]  # not blank
+_SHOWN = r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]*"
+_Label = Annotated[
+    str, msgspec.Meta(pattern=rf"^{_SHOWN}\S{_SHOWN}\Z", max_length=80)
+]  # a line of text, not blank
 _Table = Annotated[dict[str, Any], msgspec.Meta(min_length=1)]
 
 
@@ -116,7 +120,7 @@ class _Tables(msgspec.Struct, forbid_unknown_fields=True):
 class _ModelEntry(msgspec.Struct):
     """An entry that names a model, such as [house]."""
 
-    label: _Text
+    label: _Label
     model: _Text
 
 
@@ -125,12 +129,12 @@ class _ObjectEntry(_ModelEntry):
 
 
 class _ReceptacleEntry(_ModelEntry):
-    place: _Text
+    place: _Label
     room: _Text
 
 
 class _CategoryEntry(msgspec.Struct):
-    label: _Text
+    label: _Label
     receptacle: _Text
     objects: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)]
 
@@ -142,7 +146,7 @@ class _Reader:
         self._path = path
         tables = self._convert(raw, _Tables, "catalogue")
         self._house = self._convert(tables.house, _ModelEntry, "house")
-        self._rooms = {k: self._convert(v, _Text, f"rooms.{k}") for k, v in tables.rooms.items()}
+        self._rooms = {k: self._convert(v, _Label, f"rooms.{k}") for k, v in tables.rooms.items()}
         self._categories = self._entries(tables.categories, _CategoryEntry, "categories")
         self._receptacles = self._entries(tables.receptacles, _ReceptacleEntry, "receptacles")
         self._objects = self._entries(tables.objects, _ObjectEntry, "objects")
@@ -176,7 +180,9 @@ class _Reader:
             if kind is _Tables:
                 remedy = f"the tables are {', '.join(_Tables.__struct_fields__)}, and none is empty"
             else:
-                remedy = f"got {value!r:.80}; no text may be blank, see docs/models.md"
+                remedy = (
+                    f"got {value!r:.80}; labels are one line of at most 80 characters; see docs/models.md"
+                )
             raise self._error(where, f"{error}; {remedy}") from error
 
     def _entries(self, table: dict[str, Any], kind: type[T], name: str) -> dict[str, T]:
@@ -242,11 +248,15 @@ class _Reader:
                         f"is in the categories {category_of[key]!r} and {category!r}; keep one",
                     )
                 category_of[key] = category
-        objects = {}
+        objects: dict[str, ObjectModel] = {}
         for key, entry in self._objects.items():
             where = f"objects.{key}"
             if key not in category_of:
                 known = f"one of [categories], {sorted(self._categories)},"
                 raise self._error(where, f"is in no category; list it in {known} or remove it")
+            if other := next((k for k, o in objects.items() if o.label == entry.label), None):
+                raise self._error(
+                    where, f"and [objects.{other}] have the same label {entry.label!r}; change one"
+                )
             objects[key] = ObjectModel(key, entry.label, category_of[key], self._file(entry, where))
         return objects

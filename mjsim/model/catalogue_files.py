@@ -8,6 +8,8 @@ from mjsim.errors import AssetError, brief
 from mjsim.files import is_file, read_text
 from mjsim.model.assets import models_root
 
+MAX_EXTENDS = 20  # catalogues, each of which extends the next
+
 
 def catalogue_path(house: str, folder: Path = Path()) -> Path:
     """File of a catalogue, given the name of a house, or a path from `folder`; `AssetError` where there is none."""
@@ -37,7 +39,7 @@ def read_tables(path: Path, extended: tuple[Path, ...] = ()) -> tuple[dict[str, 
     if "extends" not in tables:
         return tables, text
     name = tables.pop("extends")
-    if not isinstance(name, str) or path in extended:
+    if not isinstance(name, str) or path in extended or len(extended) > MAX_EXTENDS:
         raise AssetError(
             f"{path}: extends = {name!r} leads to no catalogue that stands by itself; name a house"
         )

@@ -20,7 +20,7 @@ from typing import Any
 import mujoco
 
 from mjsim.errors import RenderError
-from mjsim.gl_choice import BACKENDS, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
+from mjsim.gl_choice import BACKENDS, DEFAULT, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
 
 EGL_REMEDY = (
     f"install an EGL driver, on Debian or Ubuntu: apt-get install {' '.join(EGL_PACKAGES)}; "
@@ -224,7 +224,8 @@ def _backend() -> ModuleType:
     try:
         return importlib.import_module(f"mujoco.{name}")
     except Exception as error:  # a missing library surfaces as ImportError, AttributeError or OSError
-        raise RenderError(f"cannot load the OpenGL backend {name!r} ({error}); {EGL_REMEDY}") from error
+        remedy = EGL_REMEDY if name == DEFAULT else f"install it, or unset {VARIABLE} to draw with {DEFAULT}"
+        raise RenderError(f"cannot load the OpenGL backend {name!r} ({error}); {remedy}") from error
 
 
 # EGL keeps one display per process, and so the owner of the context is one object per process as well.

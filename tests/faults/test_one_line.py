@@ -2,6 +2,7 @@
 
 import errno
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -65,7 +66,19 @@ def test_a_report_says_what_is_needed_and_no_secrets(problem, tmp_path, capsys, 
 
 @pytest.mark.parametrize(
     "words",
-    ["", "--no-such", "run", "run --out", "plan a b", "fly", "play --port 70000", "play --sessions 0"],
+    [
+        "",
+        "--no-such",
+        "run --out=--",
+        "run --size 160x120",
+        "replay x --eye nan,0,0",
+        "run",
+        "run --out",
+        "plan a b",
+        "fly",
+        "play --port 70000",
+        "play --sessions 0",
+    ],
 )
 def test_a_command_line_that_is_none(words, capsys):
     with pytest.raises(SystemExit) as stop:
@@ -77,7 +90,7 @@ def test_a_command_line_that_is_none(words, capsys):
 
 @pytest.mark.parametrize(
     ("target", "code"),
-    [("/dev/full", 1), ("| true", 141), (">&-", 0), ("2>&-", 0)],
+    [("/dev/full", 1), ("| true", 141), (">&-", 1), ("2>&-", 0)],
     ids=["full", "no reader", "closed", "errors"],
 )
 def test_an_output_that_takes_nothing(target, code, problem, tmp_path):
@@ -88,4 +101,31 @@ def test_an_output_that_takes_nothing(target, code, problem, tmp_path):
         ["bash", "-c", command], capture_output=True, text=True, timeout=120, env=environment
     )
     assert done.returncode == code
-    assert "Traceback" not in done.stderr and len(done.stderr.splitlines()) == (target == "/dev/full")
+    assert "Traceback" not in done.stderr and len(done.stderr.splitlines()) == (code == 1)
+
+
+@pytest.mark.parametrize(
+    ("command", "code", "said"),
+    [
+        ("plan - <&-", 2, "standard input is closed"),
+        ("--version >&-", 0, ""),
+        ("study power nope.toml --pool .", 2, "no study 'nope.toml'"),
+        ("plan {problem} --check {problem} --time-limit 1", 2, "--check plans nothing"),
+        ("plan {problem} --time-limit 0", 2, "--time-limit 0 must be positive"),
+    ],
+)
+def test_clumsy_command_lines(command, code, said, problem, tmp_path):
+    line = f"{sys.executable} -m mjsim {command.format(problem=problem)}"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(line, shell=True, cwd=tmp_path, capture_output=True, text=True, env=environment)
+    assert done.returncode == code and said in done.stderr
+    assert len(done.stderr.splitlines()) == bool(said)
+
+
+def test_a_folder_that_is_gone(problem, tmp_path, capsys, monkeypatch):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert main(["plan", problem]) == 1
+    assert "the current folder was removed" in one_line(capsys.readouterr().err)
+    monkeypatch.undo()

@@ -23,9 +23,7 @@ def add_parser(commands: Any) -> None:
     parser = add_command(
         commands, "power", run, summary="how many people a study needs", description=DESCRIPTION
     )
-    parser.add_argument(
-        "study", type=Path, metavar="STUDY.toml", help="the study: its cells (docs/designs.md)"
-    )
+    parser.add_argument("study", metavar="STUDY.toml", help="the study: its cells (docs/designs.md)")
     parser.add_argument("--pool", type=Path, required=True, metavar="DIR", help="folder of simulated people")
     parser.add_argument(
         "--measure", default="deviations", metavar="NAME", help="deviations, ipl, distance or time"

@@ -45,7 +45,14 @@ def run(arguments: argparse.Namespace) -> int:
     rows, failed = run_with_progress(
         design, arguments.out, arguments.workers, arguments.executor, "simulated people"
     )
-    error_console().print(
+    console = error_console()
+    if (others := len(rows) + failed - len(design.trials)) > 0:
+        console.print(
+            f"mjsim: {arguments.out} holds {others} people beyond these {len(design.trials)}; the tables "
+            "hold all of them",
+            style="yellow",
+        )
+    console.print(
         f"{counted(len(rows), 'row')} of simulated people in {arguments.out}/trials.parquet and .csv; {failed} failed"
     )
     return 1 if failed else 0

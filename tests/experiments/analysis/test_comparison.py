@@ -50,6 +50,21 @@ def test_pairs_that_are_missing_are_named_and_left_out(tmp_path):
     assert (found.pairs, found.means, found.difference) == (2, (2.5, 5.0), 2.5)
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"completion_time_s": 1e308}, r"completion_time_s has the value 1e\+308"),
+        ({"completion_time_s": "long"}, "no metric 'completion_time_s'"),
+        ({"assistance": 3}, "assistance is not a name"),
+    ],
+)
+def test_values_that_cannot_be_are_named(change, said, tmp_path):
+    rows = [row("none", 1, 2.0), row("optimal", 2, 2.0)]
+    write_tables(tmp_path, [r | change for r in rows])
+    with pytest.raises((ConfigError, RecordError), match=said):
+        compare(read_blocks(tmp_path), ["completion_time_s"])
+
+
 def test_two_versions_of_a_trial_are_refused(tmp_path):
     twice = [row("none", 1, 2.0) | {"fingerprint": version} for version in ("old", "new")]
     write_tables(tmp_path, [*twice, row("optimal", 1, 2.0)])
@@ -134,3 +149,12 @@ def test_the_command_shows_and_writes_both_and_replaces_nothing(tmp_path, capsys
 def test_what_cannot_be_compared_is_named(tmp_path, values, metrics, fault):
     with pytest.raises(ConfigError, match=fault):
         compare(read_blocks(batch(tmp_path, values)), metrics)
+
+
+def test_pairs_in_which_a_metric_is_unknown_are_counted(tmp_path, capsys):
+    batch(tmp_path, {"none": [1.0, 2.0, 4.0], "optimal": [2.0, 3.0, np.nan]})
+    assert main(["compare", str(tmp_path)]) == 0
+    assert "ipl_stand is not known in 1 pair of none and optimal, left out" in capsys.readouterr().err
+    both = str(tmp_path / "both.svg")
+    assert main(["compare", str(tmp_path), "--plot", both, "--csv", both]) == 2
+    assert "--plot and --csv both name" in capsys.readouterr().err

@@ -424,6 +424,8 @@ def test_a_replay_that_fails_leaves_no_film(film, house, tmp_path):
         (["--camera", "free"], "a camera needs a film"),
         (["--video", "x.mp4", "--camera", "top-down", "--eye", "1,2,3"], "only --camera free takes --eye"),
         (["--video", "x.mp4", "--profile", "sepia"], "no render profile 'sepia'"),
+        (["--video", "x.txt"], "cannot film to x.txt: name a file that ends in .mp4"),
+        (["--from", "1e9"], "s; start earlier than 1e+09 s"),
         (["--assistance", "telepathy"], "no assistance condition 'telepathy'"),
     ],
 )
