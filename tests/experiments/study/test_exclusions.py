@@ -244,6 +244,18 @@ def test_nothing_departs_from_a_study_that_was_run_as_planned_and_each_change_is
         assert part in found
 
 
+def test_settings_that_are_no_columns_are_read_from_the_logs(study, tmp_path):
+    write_preregistration(study, tmp_path / "p.zip")
+    frozen = read_preregistration(tmp_path / "p.zip")
+    for k, trial in enumerate(read_design(study).trials):
+        run = tmp_path / "trials" / str(k)
+        run.mkdir(parents=True)
+        behaviour = {"decision": {"temperature": 9.0}} if k == 0 else {}
+        (run / "events.jsonl").write_text(json.dumps({**trial.settings(), "behaviour": behaviour}) + "\n")
+    [found] = departures(frozen, frozen.exclusions, people_as_planned(), tmp_path)
+    assert found.startswith("behaviour is not as preregistered in 1 trial, such as none, 6 objects: ")
+
+
 def rewritten(path, change):
     """The ZIP with other files."""
     with zipfile.ZipFile(path) as archive:
