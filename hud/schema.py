@@ -45,7 +45,8 @@ def check_state(state: object) -> None:
         SchemaError: It is not; the message says what it is instead, or which value is of the wrong kind.
     """
     if not isinstance(state, HudState):
-        raise SchemaError(f"{_shown(state)}; it must be a HudState")
+        kind = "None" if state is None else f"a value of type {type(state).__name__}"
+        raise SchemaError(f"{kind}; it must return a HudState")
     try:
         msgspec.convert(_plain(state, "$"), HudState)
     except msgspec.ValidationError as error:
@@ -70,10 +71,6 @@ def _plain(value: Any, where: str) -> Any:
         except UnicodeEncodeError as error:
             raise SchemaError(f"a HudState that cannot be shown: {error} - at `{where}`") from error
     return value.value if isinstance(value, enum.Enum) else value
-
-
-def _shown(value: object) -> str:
-    return "None" if value is None else f"a {type(value).__name__}"
 
 
 def json_schema() -> dict[str, Any]:

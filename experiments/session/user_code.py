@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any, get_args
+from typing import Any, NoReturn, get_args
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def user_code(code: object, what: str) -> Iterator[None]:
         return
     limit = _call_limit()
     try:
-        with _time_limit(limit):
+        with _time_limit(limit), _exit_raised():
             yield
     except PASSED_ON:
         raise
@@ -64,6 +64,23 @@ def _call_limit() -> float:
         return min(abs(float(text)), LONGEST_LIMIT)
     except ValueError:
         raise ConfigError(f"{CALL_LIMIT} is {text!r}; give a number of seconds") from None
+
+
+@contextmanager
+def _exit_raised() -> Iterator[None]:
+    """Let `os._exit` of this thread raise `SystemExit` in the block; other threads and processes end as they ask."""
+    leave, here = os._exit, (os.getpid(), threading.get_ident())
+
+    def refuse(status: int) -> NoReturn:
+        if here == (os.getpid(), threading.get_ident()):
+            raise SystemExit(status)
+        leave(status)
+
+    os._exit = refuse
+    try:
+        yield
+    finally:
+        os._exit = leave
 
 
 @contextmanager

@@ -53,6 +53,7 @@ def check_kept(house, out, fault):
         ("1 / 0", "raised ZeroDivisionError: division by zero"),
         ("raise KeyError('x')", "raised KeyError"),
         ("raise SystemExit(3)", "raised SystemExit"),
+        ("os._exit(0)", "raised SystemExit"),
         ("return None", "answered None"),
         ("return 'left'", "answered 'left'"),
         ("raise type('Odd', (BaseException,), {})()", "raised Odd"),
@@ -80,7 +81,7 @@ def test_a_participant_that_fails(after, fault, said, house, tmp_path, own_modul
     [
         ("1 / 0", "raised ZeroDivision"),
         ("raise SystemExit(0)", "raised SystemExit"),
-        ("return None", "returned None; it must be a HudState"),
+        ("return None", "returned None; it must return a HudState"),
         ("return replace(state, markers=None)", "Expected `array`, got `null` - at `$.markers`"),
         ("return replace(state, message=b'hi')", "got `bytes` - at `$.message`"),
         ("return replace(state, checklist_title='\\ud800')", "at `$.checklist_title`"),

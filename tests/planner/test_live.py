@@ -183,7 +183,7 @@ def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
     config = TrialConfig(objects=6, assistance="highlight", seed=3, live=True, regret=False)
     scene = compose(house.sample_episode(objects=6, seed=3), house.catalogue)
     planner.go.set()  # the familiarisation may wait
-    monkeypatch.setattr(setup, "solver", lambda _: planner)
+    monkeypatch.setattr(setup, "planner_named", lambda _: planner)
     with contextlib.closing(prepared_planner(config, house, scene.episode)) as guide:
         session, _ = prepare_session(config, house, scene, log, planner=guide)
         planner.go.clear()
