@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -19,13 +20,6 @@ def problem(tmp_path):
     path = tmp_path / "problem.json"
     path.write_text(json.dumps(PROBLEM))
     return str(path)
-
-
-def raising(error):
-    def solver(_name):
-        raise error
-
-    return solver
 
 
 @pytest.mark.parametrize(
@@ -42,7 +36,7 @@ def raising(error):
 )
 def test_an_error_is_one_line(error, code, said, problem, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr("experiments.cli.plan.solver", raising(error))
+    monkeypatch.setattr("experiments.cli.plan.solver", Mock(side_effect=error))  # of no user
     assert main(["plan", problem]) == code
     line = one_line(capsys.readouterr().err)
     assert said in line

@@ -8,6 +8,7 @@ import numpy as np
 
 from mjsim.errors import AssetError
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.house import TIMESTEP
 from mjsim.model.rooms import PREFIX, RoomMap
 from mjsim.model.validation.compiled import (
     Compiled,
@@ -25,6 +26,7 @@ GRAVITY_SLACK = 0.1  # m/s^2
 OVERLAP = 0.05  # m^2, between two rooms
 MOUNT = "mount:"
 RESERVED = "avatar"
+USUAL_TIMESTEP = 0.002  # s, of a file that names none
 
 
 def check_house_file(catalogue: Catalogue) -> list[Finding]:
@@ -46,6 +48,12 @@ def _options(compiled: Compiled) -> Iterator[Finding]:
         bits = mujoco.mjtDisableBit.__members__.items()
         flags = [name for name, bit in bits if int(bit) & option.disableflags]
         yield compiled.error("options", f"its <flag> disables {flags}", "remove <flag>")
+    if option.timestep not in (USUAL_TIMESTEP, TIMESTEP):
+        yield compiled.warning(
+            "options",
+            f"its timestep of {option.timestep:g} s is not used: a step takes {TIMESTEP:g} s",
+            "leave it out of <option>",
+        )
     if np.any(option.wind) or option.density or option.viscosity:
         yield compiled.warning(
             "options", "its <option> has wind, density or viscosity", "remove them: they move objects"

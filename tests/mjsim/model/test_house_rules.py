@@ -110,6 +110,7 @@ SURPRISING = {
     "rooms that overlap": ("house.xml", 'pos="1.5 2 1" size="1.5 2 1"', 'pos="1.6 2 1" size="1.6 2 1"',
         "rooms", "overlap"),
     "a mount for nothing": ("house.xml", END, '<site name="mount:sink"/>' + END, "mounts", "mount:sink"),
+    "a time step": ("house.xml", "<worldbody>", '<option timestep="0.01"/><worldbody>', "options", "is not used"),
     "wind": ("house.xml", "<worldbody>", '<option wind="5 0 0"/><worldbody>', "options", "wind"),
     "a bin in the air": ("house.xml", TRAY, TRAY.replace('3.6 0"', '3.6 0.5"'), "reach", "hangs 0.50 m"),
     "a bin that bounces": ("tray.xml", 'condim="6"', 'condim="3"', "container", "condim 3"),
