@@ -1,5 +1,6 @@
 """Live replanning: a plan at once, better ones later, and no change of mind without a reason."""
 
+import argparse
 import contextlib
 import json
 import threading
@@ -8,12 +9,14 @@ import planning_cases
 import pytest
 from planning_cases import SEARCH, Task, asked, planner_of, two_rooms
 
+from experiments.cli import play
 from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.records import EventLog
 from experiments.replay.log_source import LogSource
 from experiments.trials import setup
 from experiments.trials.setup import prepare_session, prepared_planner
+from experiments.trials.table import read_rows
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
 from planner.checker import check
@@ -214,6 +217,34 @@ def test_the_command_line_runs_live_and_its_replay_shows_the_logged_plans(tmp_pa
     monkeypatch.setattr(ExactSolver, "improve", lambda *_, **__: asked.append("improve"))
     assert main(["replay", run]) == 0
     assert asked == []
+
+
+@pytest.mark.parametrize(
+    "command", [["run", "--no-video", "--no-floor-plan"], ["run", "--live", "--no-video", "--no-floor-plan"]]
+)
+def test_or_tools_plans_where_it_is_chosen(tmp_path, monkeypatch, command):
+    """Neither tours nor better ones come from the exact planner; it still finds the regrets."""
+
+    def fail(*_args, **_options):
+        pytest.fail("planned by the exact planner")
+
+    monkeypatch.setattr(ExactSolver, "improve", fail)
+    words = ["--objects", "4", "--planner", "ortools", "--fidelity", "event", "--no-regret"]
+    assert main([*command, *words, "--out", str(tmp_path / "run")]) == 0
+    metrics = json.loads((tmp_path / "run" / records.METRICS).read_text())
+    assert (metrics["planner"], metrics["delivered"]) == ("ortools", 4)
+    assert json.loads((tmp_path / "run" / records.PLAN).read_text())
+
+
+def test_a_batch_and_play_take_or_tools(tmp_path):
+    words = ["--objects", "2", "--assistance", "optimal", "--seeds", "0:1", "--planner", "ortools"]
+    assert main(["batch", *words, "--fidelity", "event", "--out", str(tmp_path)]) == 0
+    (row,) = read_rows(tmp_path / "trials.parquet")
+    assert (row["planner"], row["delivered"]) == ("ortools", 2)
+    parser = argparse.ArgumentParser()
+    play.add_parser(parser.add_subparsers())
+    trials = play._trials(parser.parse_args(["play", "--planner", "ortools"]))
+    assert {trial["planner"] for trial in trials.values()} == {"ortools"}
 
 
 def test_a_better_plan_that_was_logged_is_handed_out_when_it_was_shown(geodesics, mirrored):
