@@ -27,8 +27,8 @@ def end_with(error: Exception, words: Sequence[str]) -> int:
         drop_output()
         return BROKEN_PIPE
     flush_output()
-    code, text, own = exit_code(error), message(error), _own_place(error)
-    if own:  # raised where a user's own code was loaded or called
+    code, text = exit_code(error), message(error)
+    if code == USAGE_ERROR and (own := _own_place(error)):  # a user's own code could not be loaded
         code, text = FAILED, f"{text}{own}; traceback in {_report(error, words)}"
     elif code is None:
         text = f"internal error ({type(error).__name__}: {text}); please send in the report {_report(error, words)}"
@@ -95,10 +95,10 @@ def _is_user_code(error: Exception) -> bool:
 
 
 def _own_place(error: Exception) -> str:
-    """File and line of a user's own code that raised an error or its cause, unless the message holds them."""
+    """File and line of a user's own code that raised the cause of an error, empty if there is none."""
     from experiments.blame import place
 
-    return "" if _is_user_code(error) else place(error) or place(error.__cause__)
+    return place(error.__cause__)
 
 
 def _report(error: Exception, words: Sequence[str]) -> str:
