@@ -1,5 +1,6 @@
 """Inputs that are none: every reader says in one line which file it is, and nothing is written."""
 
+import errno
 import json
 import os
 import signal
@@ -8,6 +9,7 @@ import pytest
 
 from experiments.cli.main import main
 from faults.conftest import FAST, PROBLEM, one_line
+from mjsim.files import replacing
 
 DEEP = 200_000  # brackets in brackets
 BAD_TEXTS = {
@@ -107,3 +109,14 @@ def test_a_byte_order_mark_is_no_fault(tmp_path, capsys):
     (tmp_path / "problem.json").write_text(json.dumps(PROBLEM), encoding="utf-8-sig")
     assert main(["plan", str(tmp_path / "problem.json")]) == 0
     assert json.loads(capsys.readouterr().out)["visits"] == [0, 1]
+
+
+def test_catalogues_that_extend_each_other_without_end(tmp_path, capsys):
+    for k in range(1500):
+        (tmp_path / f"{k:04}.toml").write_text(f'extends = "{k + 1:04}.toml"')
+    assert "leads to no catalogue" in told(READERS["catalogue.toml"], tmp_path, capsys)
+
+
+def test_a_full_disk_is_told_with_the_file(tmp_path):
+    with pytest.raises(OSError, match=r"No space.*there\.txt"), replacing(tmp_path / "there.txt"):
+        raise OSError(errno.ENOSPC, "No space left on device")

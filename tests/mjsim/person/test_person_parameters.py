@@ -296,3 +296,11 @@ def test_every_tier_carries_at_the_persons_height(small_catalogue, fidelity):
         if model.geom_bodyid[g] == body.id
     )
     assert low > 1.0
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_the_printed_limits_are_within_the_range(name):
+    for limit in RANGES[name][:2]:
+        assert getattr(PersonParameters(**{name: float(f"{limit:.4g}")}), name) == pytest.approx(
+            limit, rel=1e-3
+        )
