@@ -1,5 +1,6 @@
 """The published statistics: studies/published.toml."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -35,9 +36,9 @@ class PublishedTest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     p_fits: bool = True
 
     @property
-    def held_out(self) -> bool:
-        """Whether nothing may be fitted to it."""
-        return self.objects is None
+    def fitted(self) -> bool:
+        """Whether it may be fitted: over all numbers of objects, nothing is."""
+        return self.objects is not None
 
     @property
     def significant(self) -> bool:
@@ -149,3 +150,10 @@ class Published(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def read_published(path: Path = FILE) -> Published:
     """The committed numbers."""
     return msgspec.toml.decode(path.read_bytes(), type=Published)
+
+
+def inconsistencies(published: Published) -> Sequence[str]:
+    """What is inconsistent in the published numbers, a line each."""
+    return [
+        f"{t.measure}, {t.effect}: {line}" for t in published.tests if (line := t.inconsistency()) is not None
+    ]

@@ -6,7 +6,7 @@ published.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -19,8 +19,9 @@ from experiments.errors import StatisticsError
 from experiments.record.origin import RECORDED
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.study.table import StudyTable
+from studies.prediction import effect_found, log_score, population_interval, prediction_interval
 from studies.published import Direction, Published, PublishedTest
-from studies.score_population import population_eta_squared
+from studies.score_population import draw, population_eta_squared
 from studies.score_rules import (
     points,
     published_cells,
@@ -28,9 +29,10 @@ from studies.score_rules import (
     tests_of,
     varies_most,
 )
+from studies.truth import true_studies
 
 POOL = 200  # people in each cell that make a pool
-REPLICATES = 200  # studies drawn from it
+TRUTHS = 100  # studies of people who are as published on average
 EFFECT_SIZE, INFERENCE, DIRECTION, VARIANCE = "effect size", "inference", "direction", "variance order"
 NOT_SIMULATED = "not simulated"
 
@@ -46,12 +48,17 @@ class Row:
         measure: Short name of the measure.
         what: What is stated of it.
         objects: At which number of objects; None over all.
-        held_out: Whether nothing may be fitted to it.
+        fitted: Whether it may be fitted.
         published: As printed.
-        target: Effect sizes that go with it, or None.
+        target: Effect sizes of ours that go with it, or None: its prediction interval for a study of as many people,
+            or for a pool its confidence interval.
         ours: What was found, in words.
         agrees: Whether that is the same; None where it cannot be said.
         rate: Share of the studies drawn from a pool in which it is the same; None without a pool.
+        truth: Share of the studies of people who are as published on average in which it is the same.
+        predictive_p: Two-sided p of the published F if people were as ours; of a test without F, the probability
+            that it is not significant; or None.
+        log_score: Logarithm of the probability of the published F (a density) if people were as ours, or None.
         remark: Why nothing can be said, or what is inconsistent in the published numbers; or None.
     """
 
@@ -59,12 +66,15 @@ class Row:
     measure: str
     what: str
     objects: int | None
-    held_out: bool
+    fitted: bool
     published: str
     target: Interval | None = None
     ours: str = ""
     agrees: bool | None = None
     rate: float | None = None
+    truth: float | None = None
+    predictive_p: float | None = None
+    log_score: float | None = None
     remark: str | None = None
 
 
@@ -78,6 +88,7 @@ class Score:
         pool: Whether they are judged as a population.
         as_published: Whether every cell has as many people as in the published study.
         rows: The rows in the order of the published numbers.
+        truths: How many rows of each line of the summary agree in studies of people who are as published on average.
     """
 
     origin: str
@@ -85,23 +96,42 @@ class Score:
     pool: bool
     as_published: bool
     rows: tuple[Row, ...]
+    truths: tuple[tuple[int, ...], ...] = ()
 
-    def summary(self) -> Iterator[tuple[str, str, int, int]]:
-        """What, fitted or held out, how many agree, of how many; rows of which nothing can be said do not agree."""
-        for name, kinds in (
-            ("effect sizes and inferences", (EFFECT_SIZE, INFERENCE)),
-            ("directions", (DIRECTION,)),
-            ("variance orders", (VARIANCE,)),
-        ):
-            for held_out in (False, True):
-                rows = [r for r in self.rows if r.kind in kinds and r.held_out == held_out]
-                rows = [r for r in rows if r.ours != NOT_SIMULATED]
-                yield (
-                    name,
-                    "held out" if held_out else "fitted",
-                    sum(r.agrees is True for r in rows),
-                    len(rows),
-                )
+    def summary(self) -> Iterator[tuple[str, str, int, int, int, str]]:
+        """What, fitted or not fitted, how many agree, were judged, there are, and agree of the truth (5 to 95 %)."""
+        for k, (name, fitted, rows) in enumerate(_lines(self.rows)):
+            low, high = np.quantile(self.truths[k], [0.05, 0.95], method="nearest")
+            judged = [r for r in rows if r.agrees is not None]
+            agree = sum(r.agrees is True for r in rows)
+            yield (
+                name,
+                "fitted" if fitted else "not fitted",
+                agree,
+                len(judged),
+                len(rows),
+                f"{low} to {high}",
+            )
+
+    def log_score(self) -> float | None:
+        """Sum over all published F of measures that are known; None if there are none. Larger is better."""
+        known = [r.log_score for r in self.rows if r.log_score is not None]
+        return sum(known) if known else None
+
+
+def _lines(rows: Iterable[Row]) -> list[tuple[str, bool, list[Row]]]:
+    """Rows by line of the summary; answers that are not simulated are in none."""
+    known = [r for r in rows if r.ours != NOT_SIMULATED]
+    kinds = {
+        "effect sizes and inferences": (EFFECT_SIZE, INFERENCE),
+        "directions": (DIRECTION,),
+        "variance orders": (VARIANCE,),
+    }
+    return [
+        (name, fitted, [r for r in known if r.kind in of and r.fitted == fitted])
+        for name, of in kinds.items()
+        for fitted in (True, False)
+    ]
 
 
 def score(table: StudyTable, published: Published, *, seed: int = 0) -> Score:
@@ -125,18 +155,17 @@ def score(table: StudyTable, published: Published, *, seed: int = 0) -> Score:
     known = Counter(zip(inside.assistance.tolist(), inside.objects.tolist(), strict=True))
     is_pool = all(known[cell] >= POOL for cell in sizes)
     judge = _Judge(inside, published, tuple(draw(inside, published, seed)) if is_pool else ())
-    return Score(table.origin, len(inside.rows), is_pool, known == Counter(sizes), tuple(judge.rows()))
-
-
-def draw(pool: StudyTable, published: Published, seed: int, count: int = REPLICATES) -> Iterator[StudyTable]:
-    """Studies of the published size: people drawn from the same cell of a pool, with replacement."""
-    rng = np.random.default_rng(seed)
-    cells = [
-        (np.flatnonzero((pool.assistance == condition) & (pool.objects == objects)), size)
-        for (condition, objects), size in published.people.sizes().items()
+    true = [
+        tuple(_Judge(study, published, (), scores=False).rows())
+        for study in true_studies(inside, published, seed, TRUTHS)
     ]
-    for _ in range(count):
-        yield pool.take(np.concatenate([rng.choice(people, size) for people, size in cells]))
+    rows = tuple(
+        replace(row, truth=None if ours[0].agrees is None else sum(o.agrees is True for o in ours) / TRUTHS)
+        for row, *ours in zip(judge.rows(), *true, strict=True)
+    )
+    counts = [[sum(r.agrees is True for r in line) for *_, line in _lines(study)] for study in true]
+    truths = tuple(zip(*counts, strict=True))
+    return Score(table.origin, len(inside.rows), is_pool, known == Counter(sizes), rows, truths)
 
 
 @dataclass(frozen=True)
@@ -146,6 +175,7 @@ class _Judge:
     table: StudyTable
     published: Published
     replicates: tuple[StudyTable, ...]
+    scores: bool = True  # whether to work out log scores
     known: dict[tuple[str, int | None], list[dict[str, FTest]]] = field(default_factory=dict)
 
     def rows(self) -> Iterator[Row]:
@@ -156,13 +186,12 @@ class _Judge:
         order = self.published.variances
         for objects in self.published.people.objects:
             row = Row(
-                VARIANCE, order.measure, f"{order.largest} largest", objects, objects != 6, order.largest
+                VARIANCE, order.measure, f"{order.largest} largest", objects, objects == 6, order.largest
             )
             rule = partial(varies_most, measure=order.measure, condition=order.largest, objects=objects)
             yield self._judged(row, rule)
 
     def _test_rows(self, test: PublishedTest) -> Iterator[Row]:
-        people = self.published.people_of(test.objects)
         printed = f"F({test.df[0]},{test.df[1]}) " + (
             "n.s."
             if test.statistic is None
@@ -173,9 +202,8 @@ class _Judge:
             test.measure,
             test.effect,
             test.objects,
-            test.held_out,
+            test.fitted,
             printed,
-            test.interval(people),
             remark=test.inconsistency(),
         )
         if self._is_not_simulated(test.measure):
@@ -195,13 +223,22 @@ class _Judge:
         return measure.startswith(LIKERT_PREFIX) and self.table.origin != RECORDED
 
     def _effect_size(self, row: Row, test: PublishedTest, found: FTest) -> Row:
-        low, high = row.target or (0.0, 1.0)
+        people = self.published.people_of(test.objects)
+        low, high = target = prediction_interval(test, people, found.df2, found.people)
         size, ours = found.eta_squared, f"{found.eta_squared:.3f}"
+        effect = effect_found(found) if self.scores else np.zeros(1)
+        rate = None
         if self.replicates:
+            again = prediction_interval(test, people, test.df[1], people)
+            rate = self._rate([again[0] <= one.eta_squared <= again[1] for one in self._drawn(test)])
             size = population_eta_squared(self.table, self.published, test)
-            ours = f"{size:.3f} in the population"
-        rate = self._rate([low <= one.eta_squared <= high for one in self._drawn(test)])
-        return replace(row, ours=ours, agrees=low <= size <= high, rate=rate)
+            ours, effect = f"{size:.3f} in the population", np.array([size / (1 - size)])
+            low, high = target = population_interval(test, people)
+        row = replace(row, target=target, ours=ours, agrees=low <= size <= high, rate=rate)
+        if not self.scores:
+            return row
+        likely, p = log_score(test, people, effect)
+        return replace(row, predictive_p=p, log_score=likely)
 
     def _inference(self, row: Row, test: PublishedTest, found: FTest) -> Row:
         drawn = [one.p < ALPHA for one in self._drawn(test)]
@@ -220,15 +257,15 @@ class _Judge:
         return [found[test.effect] for found in self.known[key]]
 
     def _direction_row(self, direction: Direction) -> Row:
-        held_out = direction.objects is None
         label = direction.label()
         printed = label if direction.p is None else f"{label}, p {direction.p}"
-        row = Row(DIRECTION, direction.measure, label, direction.objects, held_out, printed)
+        row = Row(
+            DIRECTION, direction.measure, label, direction.objects, direction.objects is not None, printed
+        )
         if self._is_not_simulated(direction.measure):
             return replace(row, ours=NOT_SIMULATED)
         # A test's decision depends on how many people there are: studies of the published size decide.
-        decided = direction.pair is not None or direction.same is not None
-        return self._judged(row, partial(points, row=direction), by_rate=decided)
+        return self._judged(row, partial(points, row=direction), by_rate=True)
 
     def _judged(self, row: Row, rule: Rule, *, by_rate: bool = False) -> Row:
         try:
@@ -258,10 +295,3 @@ def _holds(rule: Rule, study: StudyTable) -> bool:
         return rule(study)
     except StatisticsError:
         return False
-
-
-def inconsistencies(published: Published) -> Sequence[str]:
-    """What is inconsistent in the published numbers, a line each."""
-    return [
-        f"{t.measure}, {t.effect}: {line}" for t in published.tests if (line := t.inconsistency()) is not None
-    ]

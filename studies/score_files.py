@@ -7,15 +7,25 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from experiments.analysis.page import Block, Paragraph, page, table
+from experiments.analysis.page import Block, Paragraph, p_value, page, table
 from experiments.record.files import write_json
 from mjsim.files import write_text_atomically
-from studies.published import Published
-from studies.score import REPLICATES, Row, Score, inconsistencies
+from studies.forest import FOREST, forest
+from studies.published import Published, inconsistencies
+from studies.score import POOL, TRUTHS, Row, Score
+from studies.score_population import REPLICATES
 
 PAGE, JSON, CSV = "score.html", "score.json", "score.csv"
 FILES = (PAGE, JSON, CSV)
-COLUMNS = ("what", "objects", "published", "partial η²", "ours", "agrees", "reproduced", "remark")
+COLUMNS = (
+    *("what", "objects", "published", "goes with η²", "ours", "agrees", "reproduced", "the truth"),
+    *("p of published F", "remark"),
+)
+SUMMARY = ("", "rows", "agree", "judged", "of", "the truth, 5 to 95 %")
+NOT_FITTED = (
+    "All numbers of objects, not fitted. These rows contain the people at 6 objects, and their authors had seen them: "
+    "they are no test on data that nobody knew."
+)
 TITLE = "Score against the published study"
 
 
@@ -29,47 +39,65 @@ def write_score(folder: Path, score: Score, published: Published) -> None:
 
 def as_json(score: Score, published: Published) -> dict[str, Any]:
     """All of it."""
-    names = ("what", "rows", "agree", "of")
+    names = ("what", "rows", "agree", "judged", "of", "truth")
     return {
         **asdict(score),
         "summary": [dict(zip(names, line, strict=True)) for line in score.summary()],
+        "log_score": score.log_score(),
         "inconsistent": inconsistencies(published),
     }
 
 
 def score_page(score: Score, published: Published) -> str:
-    """The page: a summary, then fitted and held-out rows apart."""
+    """The page: a summary, the forest plot, then rows that may be fitted and others apart."""
     return page(TITLE, score.origin, _sections(score, published))
 
 
 def _sections(score: Score, published: Published) -> Iterator[tuple[str, Iterable[Block]]]:
-    yield "Summary", (Paragraph(how(score)), table(("", "rows", "agree", "of"), score.summary()))
-    for held_out, title in ((False, "6 objects: may be fitted"), (True, "All numbers of objects: held out")):
-        rows = [cells(row) for row in score.rows if row.held_out == held_out]
-        yield title, (table(COLUMNS, rows),)
+    yield "Summary", (Paragraph(how(score)), table(SUMMARY, score.summary()))
+    yield "Published and ours", (forest(score, published), Paragraph(FOREST))
+    for fitted, title, about in (
+        (True, "6 objects: may be fitted", ()),
+        (False, "All numbers of objects: not fitted", (Paragraph(NOT_FITTED),)),
+    ):
+        yield title, (*about, table(COLUMNS, [cells(row) for row in score.rows if row.fitted == fitted]))
     yield "Inconsistent in the published numbers", map(Paragraph, inconsistencies(published))
 
 
 def how(score: Score) -> str:
     """How the study was judged."""
     if score.pool:
-        return (
+        judged = (
             f"A pool of {score.people} people, judged as a population; `reproduced` is the share of {REPLICATES} "
             "studies of the published size, drawn from it, that come out as published."
         )
-    judged = f"A study of {score.people} people, judged by its own tests."
-    if score.as_published:
-        return judged
-    return f"{judged} Its cells are not of the published sizes, on which decisions of tests depend."
+    else:
+        judged = (
+            f"A study of {score.people} people, judged by its own tests. It is one draw: what it decides differs from "
+            f"study to study; a pool of {POOL} people in each cell says what its people do."
+        )
+        if not score.as_published:
+            judged += " Its cells are not of the published sizes, on which decisions of tests depend."
+    likely = score.log_score()
+    return (
+        f"{judged} `The truth`: {TRUTHS} studies of the published size, of people whose F tests are as published on "
+        "average, judged likewise."
+        + (
+            ""
+            if likely is None
+            else f" Log score of the published F under ours: {likely:.1f} (larger is better)."
+        )
+    )
 
 
 def cells(row: Row) -> tuple[object, ...]:
     """A row of the table, as COLUMNS."""
     agrees = {None: None, True: "yes", False: "NO"}[row.agrees]
-    rate = None if row.rate is None else f"{row.rate:.0%}"
+    rate, truth = (None if share is None else f"{share:.0%}" for share in (row.rate, row.truth))
+    p = None if row.predictive_p is None else p_value(row.predictive_p)
     target = row.target if row.kind == "effect size" else None
     what = f"{row.measure}: {row.what} ({row.kind})"
-    return what, row.objects, row.published, target, row.ours, agrees, rate, row.remark
+    return what, row.objects, row.published, target, row.ours, agrees, rate, truth, p, row.remark
 
 
 def _csv(score: Score) -> str:

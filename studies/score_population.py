@@ -1,15 +1,16 @@
 """Effect sizes of a population of which a pool is known: what a study without chance would find."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from experiments.analysis.statistics.anova import Values, two_way_squares
+from experiments.analysis.statistics.anova import two_way_squares
 from experiments.errors import StatisticsError
 from experiments.study.table import StudyTable
 from studies.published import Published, PublishedTest
 
-Cells = Mapping[tuple[str, int], Values]
+Cell = tuple[str, int]
+REPLICATES = 200  # studies drawn from a pool
 
 
 def population_eta_squared(pool: StudyTable, published: Published, test: PublishedTest) -> float:
@@ -35,16 +36,29 @@ def population_eta_squared(pool: StudyTable, published: Published, test: Publish
     if variance <= 0.0:
         raise StatisticsError(f"{test.measure} does not vary within any cell")
     chance = test.df[0] * people / sum(map(len, cells.values()))
-    noncentrality = max(_squares(cells, sizes, test) / variance - chance, 0.0)
+    noncentrality = max(
+        effect_squares({c: float(v.mean()) for c, v in cells.items()}, sizes, test) / variance - chance, 0.0
+    )
     return noncentrality / (noncentrality + people)
 
 
-def _squares(cells: Cells, sizes: Mapping[tuple[str, int], int], test: PublishedTest) -> float:
+def effect_squares(means: Mapping[Cell, float], sizes: Mapping[Cell, int], test: PublishedTest) -> float:
     """Sum of squares of the effect if each person were as the mean of the cell."""
-    counts = [sizes[cell] for cell in cells]
-    means = np.repeat([float(v.mean()) for v in cells.values()], counts)
+    counts = [sizes[cell] for cell in means]
+    values = np.repeat(list(means.values()), counts)
     if test.objects is not None:
-        return float(((means - means.mean()) ** 2).sum())
-    first = np.repeat([condition for condition, _ in cells], counts)
-    second = np.repeat([objects for _, objects in cells], counts)
-    return two_way_squares(means, first, second)[test.effect]
+        return float(((values - values.mean()) ** 2).sum())
+    first = np.repeat([condition for condition, _ in means], counts)
+    second = np.repeat([objects for _, objects in means], counts)
+    return two_way_squares(values, first, second)[test.effect]
+
+
+def draw(pool: StudyTable, published: Published, seed: int, count: int = REPLICATES) -> Iterator[StudyTable]:
+    """Studies of the published size: people drawn from the same cell of a pool, with replacement."""
+    rng = np.random.default_rng(seed)
+    cells = [
+        (np.flatnonzero((pool.assistance == condition) & (pool.objects == objects)), size)
+        for (condition, objects), size in published.people.sizes().items()
+    ]
+    for _ in range(count):
+        yield pool.take(np.concatenate([rng.choice(people, size) for people, size in cells]))

@@ -1,13 +1,14 @@
 """Whether a study comes out as published: each row of studies/published.toml judged on one table."""
 
 import itertools
-from collections.abc import Callable, Sequence
+import math
 
 import numpy as np
+from scipy.stats import linregress
 
 from experiments.analysis.statistics.anova import Values, one_way, two_way
-from experiments.analysis.statistics.effects import FTest
-from experiments.analysis.statistics.pairs import tukey_differs
+from experiments.analysis.statistics.effects import ALPHA, FTest
+from experiments.analysis.statistics.pairs import tukey_differs, tukey_quantile
 from experiments.errors import StatisticsError
 from experiments.study.table import StudyTable
 from studies.published import Direction, Published
@@ -58,13 +59,40 @@ def points(table: StudyTable, row: Direction) -> bool:
     if row.same is not None:
         return not tukey_differs(table.groups(row.measure, row.objects), *row.same)
     if row.rising is not None:
-        return _rises([_mean(table, row.measure, row.rising, n) for n in _levels(table)])
+        return _trend(table, row.measure, row.rising)
     if row.lowest is not None:
-        return all(_is_largest(table, row.measure, n, row.lowest, _minus_mean) for n in _levels(table))
-    averages = [
-        np.mean([_mean(table, row.measure, name, n) for n in _levels(table)]) for name in row.falling or ()
+        others = [name for name in table.conditions() if name != row.lowest]
+        return all(_below(table, row.measure, row.lowest, other) for other in others)
+    return all(_below(table, row.measure, low, high) for high, low in itertools.pairwise(row.falling or ()))
+
+
+def _trend(table: StudyTable, measure: str, condition: str) -> bool:
+    """Whether a measure rises with the number of objects: a linear regression, one-sided at .05."""
+    levels = _levels(table)
+    groups = [table.groups(measure, n).get(condition) for n in levels]
+    if any(group is None for group in groups):
+        raise StatisticsError(f"no people in a cell of {condition}")
+    known = [
+        (n, float(v)) for n, group in zip(levels, groups, strict=True) if group is not None for v in group
     ]
-    return _rises([-float(average) for average in averages])
+    return bool(linregress(*zip(*known, strict=True), alternative="greater").pvalue < ALPHA)
+
+
+def _below(table: StudyTable, measure: str, low: str, high: str) -> bool:
+    """Whether Tukey's test of the means over all numbers of objects, each of the same weight, finds low below high."""
+    levels = _levels(table)
+    cells = {(c, n): v for n in levels for c, v in table.groups(measure, n).items()}
+    conditions = {condition for condition, _ in cells}
+    if len(cells) < len(conditions) * len(levels) or not {low, high} <= conditions:
+        raise StatisticsError("no people in a cell")
+    freedom = sum(map(len, cells.values())) - len(cells)
+    squares = sum(float(((v - v.mean()) ** 2).sum()) for v in cells.values())
+    if freedom < 1 or squares <= 0.0:
+        raise StatisticsError("the values do not vary within any cell")
+    gap = np.mean([cells[high, n].mean() - cells[low, n].mean() for n in levels])
+    weight = sum(1 / len(cells[c, n]) for c in (low, high) for n in levels) / len(levels) ** 2
+    error = math.sqrt(squares / freedom * weight)
+    return bool(gap > tukey_quantile(len(conditions), freedom) * error)
 
 
 def varies_most(table: StudyTable, measure: str, condition: str, objects: int) -> bool:
@@ -74,30 +102,16 @@ def varies_most(table: StudyTable, measure: str, condition: str, objects: int) -
         StatisticsError: A variance is not known.
     """
     _known(table, measure)
-    return _is_largest(table, measure, objects, condition, _variance)
-
-
-def _is_largest(
-    table: StudyTable, measure: str, objects: int, condition: str, value: Callable[[Values], float]
-) -> bool:
-    found = {name: value(values) for name, values in table.groups(measure, objects).items()}
+    found = {name: _variance(values) for name, values in table.groups(measure, objects).items()}
     if condition not in found or len(found) < 2:
         raise StatisticsError(f"no people in the cell {condition}, {objects}, or in any other one")
     return all(found[condition] > other for name, other in found.items() if name != condition)
-
-
-def _minus_mean(values: Values) -> float:
-    return -float(values.mean())
 
 
 def _variance(values: Values) -> float:
     if len(values) < 2:
         raise StatisticsError("a cell has one person only")
     return float(values.var(ddof=1))
-
-
-def _rises(values: Sequence[float]) -> bool:
-    return all(low < high for low, high in itertools.pairwise(values))
 
 
 def _known(table: StudyTable, measure: str) -> Values:
@@ -110,10 +124,3 @@ def _levels(table: StudyTable) -> list[int]:
     if len(table.levels()) < 2:
         raise StatisticsError(f"there is only one number of objects ({table.levels()[0]})")
     return table.levels()
-
-
-def _mean(table: StudyTable, measure: str, condition: str, objects: int) -> float:
-    values = table.groups(measure, objects).get(condition)
-    if values is None:
-        raise StatisticsError(f"no people in the cell {condition}, {objects}")
-    return float(values.mean())

@@ -12,8 +12,9 @@ WIDTH = 160  # characters, where there is no terminal
 
 DESCRIPTION = """\
 Score a study against the published one (studies/published.toml): effect sizes within the 90 %
-confidence intervals of the published ones, decisions of tests, directions, orders of variances. Rows at 6 objects may
-be fitted; rows over all numbers of objects are held out. Answers to survey questions are never simulated.
+prediction intervals of the published ones, decisions of tests, directions, orders of variances, beside what the truth
+would score. Rows at 6 objects may be fitted; rows over all numbers of objects are not. Answers to survey questions are
+never simulated.
 
 With 200 people or more in every cell, the people are a pool: effect sizes are those of the population, and 200 studies
 of the published size are drawn from it, to see how many come out as published."""
@@ -77,5 +78,6 @@ def _show(score: Any) -> None:
     for row in score.rows:
         rows.add_row(*("" if cell is None else shown(cell) for cell in cells(row)))
     console.print(rows)
-    for what, which, agree, of in score.summary():
-        console.print(f"{what}, {which}: {agree} of {of} agree")
+    for what, which, agree, judged, of, truth in score.summary():
+        found = f"{agree} of {judged} agree" if judged else "none judged"
+        console.print(f"{what}, {which}: {found}, {of} rows (the truth: {truth})")

@@ -1,10 +1,12 @@
 """`mjsim study score`: published numbers, rows that agree and that do not, pools."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy import stats
 from study_people import SIZES, made_up_people, table_of
 
@@ -12,8 +14,12 @@ from experiments.cli.main import main
 from experiments.errors import StatisticsError
 from experiments.study.measures import read_measures
 from experiments.trials.table import write_tables
-from studies.published import read_published
-from studies.score import DIRECTION, EFFECT_SIZE, INFERENCE, VARIANCE, draw, inconsistencies, score
+from studies import score_rules
+from studies.prediction import log_score, prediction_interval
+from studies.published import Direction, inconsistencies, read_published
+from studies.score import DIRECTION, EFFECT_SIZE, INFERENCE, VARIANCE, score
+from studies.score_population import draw
+from studies.truth import true_studies
 
 PUBLISHED = read_published()
 
@@ -26,6 +32,13 @@ def people():
 @pytest.fixture(scope="module")
 def pool():
     return table_of(made_up_people(dict.fromkeys(SIZES, 200), seed=5))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_truths():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("studies.score.TRUTHS", 3)
+        yield
 
 
 def rows_of(found, *kinds):
@@ -104,8 +117,8 @@ def test_a_study_is_judged_by_its_own_tests(people):
 
 def test_only_rows_at_6_objects_may_be_fitted_and_are_counted_apart(people):
     found = score(people, PUBLISHED)
-    assert all(row.held_out == (row.objects != 6) for row in found.rows)
-    assert [of for *_, of in found.summary()] == [8, 12, 7, 5, 1, 3]
+    assert all(row.fitted == (row.objects == 6) for row in found.rows)
+    assert [of for *_, of, _ in found.summary()] == [8, 12, 7, 5, 1, 3]
 
 
 def test_answers_are_not_simulated(people):
@@ -183,6 +196,78 @@ def test_the_score_command_writes_its_files(tmp_path, capsys):
     assert (found["origin"], len(found["rows"]), len(found["inconsistent"])) == ("Simulated", 58, 4)
     page = (tmp_path / "analysis" / "score.html").read_text()
     assert "http" not in page
-    assert page.count('<p class="origin">Simulated</p>') == 5
+    assert page.count('<p class="origin">Simulated</p>') == 6
     assert main(["study", "score", str(tmp_path)]) == 2
     assert main(["study", "score", str(tmp_path), "--force", "--seed", "-1"]) == 2
+
+
+def published(measure, effect, objects=None):
+    return next(t for t in PUBLISHED.tests if (t.measure, t.effect, t.objects) == (measure, effect, objects))
+
+
+@pytest.mark.parametrize("eta_squared", [0.0, 0.05, 0.3])
+def test_prediction_intervals_hold_nine_second_studies_in_ten(eta_squared):
+    rng, people = np.random.default_rng(0), 119
+    drawn = stats.ncf.rvs(
+        2, 116, max(eta_squared / (1 - eta_squared) * people, 1e-9), size=(150, 2), random_state=rng
+    )
+    hits = 0
+    for first, second in drawn:
+        test = structs.replace(published("ipl", "assistance", 6), statistic=float(first), p="=.010")
+        low, high = prediction_interval(test, people, 116.0, people)
+        hits += low <= 2 * second / (2 * second + 116) <= high
+    assert hits / 150 == pytest.approx(0.9, abs=3 * math.sqrt(0.09 / 150))
+
+
+@pytest.mark.parametrize("people", [60, 176, 447])
+@pytest.mark.parametrize("effect", ["objects", "interaction"])
+def test_small_studies_without_an_effect_agree_with_none(people, effect):
+    test = published("ipl", effect)
+    df1, df2 = test.df[0], people - 12
+    _, high = prediction_interval(test, 447, df2, people)
+    statistic = high / (1 - high) * df2 / df1
+    assert stats.f.cdf(statistic, df1, df2) > 0.95
+    assert stats.ncf.cdf(statistic, df1, df2, 0.5 * people) < 0.2  # a large effect does not
+
+
+def test_log_scores_are_of_the_noncentral_f():
+    test, null = published("ipl", "assistance"), published("ipl", "objects")
+    noncentrality = 447 * 0.1
+    likely, p = log_score(test, 447, np.array([0.1]))
+    below = stats.ncf.cdf(30.71, 2, 435, noncentrality)
+    assert (likely, p) == pytest.approx(
+        (stats.ncf.logpdf(30.71, 2, 435, noncentrality), 2 * min(below, 1 - below)), rel=1e-8
+    )
+    chance = stats.ncf.cdf(stats.f.ppf(0.95, 3, 435), 3, 435, 4.47)
+    assert log_score(null, 447, np.array([0.01])) == pytest.approx((math.log(chance), chance), rel=1e-8)
+
+
+def test_the_truth_has_the_published_f_on_average(people):
+    drawn = list(true_studies(people, PUBLISHED, 0, 60))
+    for test in (t for t in PUBLISHED.tests if not t.measure.startswith("likert_")):
+        found = [tests_of(study, test.measure, test.objects)[test.effect].statistic for study in drawn]
+        expected = test.df[1] / (test.df[1] - 2) if test.statistic is None else test.statistic
+        slack = 4 * np.std(found) / math.sqrt(60)
+        # What is smaller than chance alone gives has no effect.
+        assert np.mean(found) == pytest.approx(max(expected, 1.0), abs=slack)
+
+
+def test_rises_are_trends_and_orders_are_shown_by_tukeys_test(people):
+    """A step without a rise is no contradiction; means in order that chance explains are no order."""
+    level = np.minimum(people.objects, 18)
+    rng = np.random.default_rng(0)
+    noise, optimal = rng.normal(0, 0.1, 447), people.assistance == "optimal"
+    flat = replace(people, columns={"deviations": level / 20 + noise, "ipl": noise + 0.005 * optimal})
+    rising, falling = Direction("deviations", rising="none"), Direction("ipl", falling=("optimal", "none"))
+    assert score_rules.points(flat, rising)
+    assert not score_rules.points(replace(flat, columns={"deviations": -level / 20 + noise}), rising)
+    assert not score_rules.points(flat, falling)
+    assert score_rules.points(replace(flat, columns={"ipl": noise + 0.1 * optimal}), falling)
+
+
+def test_what_was_not_judged_is_not_called_wrong(tmp_path, capsys):
+    write_tables(tmp_path, [r for r in made_up_people() if r["objects"] == 12])
+    assert main(["study", "score", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    assert "effect sizes and inferences, fitted: none judged, 8 rows" in shown
+    assert "0 of" not in shown
