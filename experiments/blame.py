@@ -10,7 +10,7 @@ from mjsim.errors import MjsimError
 from planner.errors import PlannerError
 
 OUR_ERRORS = (ExperimentError, HudError, MjsimError, PlannerError)
-PACKAGES = ("experiments", "hud", "mjsim", "planner")
+PACKAGES = ("experiments", "hud", "mjsim", "planner", "studies")
 LIBRARIES = tuple({path + os.sep for path in sysconfig.get_paths().values()} | {"<frozen "})
 CALL_LIMIT = (
     "MJSIM_CALL_LIMIT"  # environment variable: longest call of a user's own code, s; workers inherit it

@@ -245,7 +245,9 @@ def test_log_scores_are_of_the_noncentral_f():
 def test_the_truth_has_the_published_f_on_average(people):
     drawn = list(true_studies(people, PUBLISHED, 0, 60))
     for test in (t for t in PUBLISHED.tests if not t.measure.startswith("likert_")):
-        found = [score_rules.tests_of(study, test.measure, test.objects)[test.effect].statistic for study in drawn]
+        found = [
+            score_rules.tests_of(study, test.measure, test.objects)[test.effect].statistic for study in drawn
+        ]
         expected = test.df[1] / (test.df[1] - 2) if test.statistic is None else test.statistic
         slack = 4 * np.std(found) / math.sqrt(60)
         # What is smaller than chance alone gives has no effect.
