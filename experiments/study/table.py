@@ -155,7 +155,8 @@ def study_table(
         rules = Counter(rule for person in absent.values() for rule in person.rules)
         each = ", ".join(f"{count} by {rule}" for rule, count in rules.items())
         raise RecordError(f"{path}: all {counted(len(absent), 'row')} are left out: {each}")
-    read = {column: _numbers(kept, column, path) for column in _candidates(measures) if column in rows[0]}
+    present = {name for row in rows for name in row}
+    read = {column: _numbers(kept, column, path) for column in _candidates(measures) if column in present}
     numbers = {column: np.where(np.isinf(values), np.nan, values) for column, values in read.items()}
     known = {column for column, values in numbers.items() if not np.isnan(values).all()}
     sources = {}
