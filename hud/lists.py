@@ -54,6 +54,7 @@ def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tu
             picture=o.picture,
             target_picture=view.receptacle(o.receptacle).picture,
             done=o.status != "loose",
+            carried=o.status == "carried",
         )
         for o in random_order(view)
     )

@@ -43,7 +43,14 @@ def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float =
     heights = chest + (BREADCRUMB_RADIUS - chest) * at / length if length > 0.0 else [BREADCRUMB_RADIUS]
     xs, ys = (np.interp(at, along, path[:, axis]) for axis in (0, 1))
     return tuple(
-        Marker("sphere", (float(x), float(y), float(z)), (BREADCRUMB_RADIUS, 0.0, 0.0), RED, BREADCRUMB)
+        Marker(
+            "sphere",
+            (float(x), float(y), float(z)),
+            (BREADCRUMB_RADIUS, 0.0, 0.0),
+            RED,
+            BREADCRUMB,
+            outlined=True,
+        )
         for x, y, z in zip(xs, ys, heights, strict=True)
     )
 

@@ -23,6 +23,7 @@ class Marker:
         role: What it is for: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal`, `bin`.
         x_ray: Whether it also shows, dimmed, through walls.
         object: Instance name of the object that it stands over, or None.
+        outlined: Whether a sphere has a dark outline.
     """
 
     shape: Shape
@@ -32,6 +33,7 @@ class Marker:
     role: str
     x_ray: bool = False
     object: str | None = None
+    outlined: bool = False
 
 
 class MessageKind(enum.Enum):
@@ -63,6 +65,7 @@ class ChecklistItem:
         target_picture: Key of the receptacle's picture, or None.
         number: Step number, or None where order means nothing.
         done: Crossed out.
+        carried: Crossed out, but in a hand: what the page of a person marks in another way.
         current: The step to do now.
     """
 
@@ -73,6 +76,7 @@ class ChecklistItem:
     number: int | None = None
     done: bool = False
     current: bool = False
+    carried: bool = False
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from experiments.web import protocol
 from experiments.web.state import TRANSITIONS, SessionPhase
 
 PATH = Path(__file__).parents[1] / "experiments" / "web" / "client" / "static" / "protocol.js"
-CONSTANTS = ("MAX_INPUTS", "BEAT_PERIOD", "MAX_SILENCE", "DISPLAY_PERIOD", "KEY_FLAG")
+CONSTANTS: tuple[str, ...] = ("MAX_INPUTS", "BEAT_PERIOD", "MAX_SILENCE", "DISPLAY_PERIOD", "KEY_FLAG")
 CONSTANTS += ("REFUSED", "REPLACED", "IDLE", "TOO_MUCH", "SLOW")
 ALIASES = {"Codec": protocol.Codec, "PauseReason": protocol.PauseReason, "Phase": SessionPhase}
 UNIONS = {"FromBrowser": protocol.FromBrowser, "ToBrowser": protocol.ToBrowser}

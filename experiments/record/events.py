@@ -207,6 +207,18 @@ class OverrunEvent(LoggedEvent, frozen=True):
     skipped: bool
 
 
+class StartedEvent(LoggedEvent, frozen=True):
+    """The person started the clock; nothing of the task was shown before.
+
+    Attributes:
+        waited_s: How long the session had waited for it, s of wall time.
+        wall: When, s since 1970.
+    """
+
+    waited_s: float
+    wall: float
+
+
 class PauseEvent(LoggedEvent, frozen=True):
     """The clock was stopped.
 

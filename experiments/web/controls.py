@@ -91,6 +91,11 @@ def _attempt(press: Press, seen: Observation, answer: Answer) -> Action:
     if press != "act":
         held = seen.hands[0 if press == "left hand" else 1]
         return Pick() if held is None else Place(held)
+    return act(answer)
+
+
+def act(answer: Answer) -> Pick | Place:
+    """What the action key attempts; `answer` is the world's answer to a pick or place."""
     place = answer(Place())
     at_another_receptacle = place.refusal is Refusal.NOT_THE_RECEPTACLE
     if place.applied or (at_another_receptacle and not answer(Pick()).applied):

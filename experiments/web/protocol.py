@@ -11,7 +11,7 @@ import msgspec
 
 from experiments.web.controls import Input
 from experiments.web.state import LOADING, TRANSITIONS, SessionPhase, Trigger
-from hud.state import HudState
+from hud.state import HudState, MiniMap, Pointer
 
 VERSION = 1  # of the head of a frame
 MAX_TEXT = 64 * 1024  # bytes of a message from the browser
@@ -182,13 +182,38 @@ class Snapshot(WireMessage, frozen=True):
     hud: HudState
 
 
-class Text(WireMessage, frozen=True):
-    """The HUD for screen readers: the message bar, the list's heading, its rows, the hands."""
+class Pictures(WireMessage, frozen=True):
+    """The pictures that a `hud` names, as data URLs, by their keys; sent once to a page."""
 
-    message: str
-    title: str
-    rows: list[str]
-    hands: list[str]
+    pictures: dict[str, str]
+
+
+class Hud(WireMessage, frozen=True):
+    """What is shown beside the picture: the state of the HUD without its markers, and without what a `moment` has."""
+
+    state: HudState
+
+
+class Reach(msgspec.Struct, frozen=True):
+    """What the action key would do: the object, the receptacle if it is put there, where it is in the frame.
+
+    `at` is in shares of the frame's width and height, or None where it is out of view.
+    """
+
+    object: str
+    receptacle: str | None
+    at: tuple[float, float] | None
+
+
+class Moment(WireMessage, frozen=True):
+    """What changes as the person moves: the clock in whole seconds, the room, what is in reach, pointer and map."""
+
+    step: int
+    clock: float | None
+    room: str
+    reach: Reach | None
+    pointer: Pointer | None
+    minimap: MiniMap | None
 
 
 class Busy(WireMessage, frozen=True):
@@ -223,9 +248,23 @@ class Error(WireMessage, frozen=True):
 
 
 FromBrowser = Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave
-ToBrowser = State | Taken | Snapshot | Text | Busy | Beat | Saved | Queue | Occupied | Replaced | Error
+ToBrowser = (
+    State
+    | Taken
+    | Snapshot
+    | Pictures
+    | Hud
+    | Moment
+    | Busy
+    | Beat
+    | Saved
+    | Queue
+    | Occupied
+    | Replaced
+    | Error
+)
 ToWorker = Open | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave
-FromWorker = State | Taken | Frame | Snapshot | Text | Busy | Saved
+FromWorker = State | Taken | Frame | Snapshot | Pictures | Hud | Moment | Busy | Saved
 
 decode_from_browser: Any = msgspec.json.Decoder(FromBrowser).decode
 encode_to_browser = msgspec.json.Encoder().encode

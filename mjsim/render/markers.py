@@ -20,6 +20,9 @@ _LIT = 0.32
 _HIDDEN_OPACITY = 0.3
 # Both passes draw a visible marker at the same depth up to rounding.
 _DEPTH_TOLERANCE = 1e-4
+# Of the dark sphere behind a sphere that is outlined: its radius, in those of the other, and its colour.
+_OUTLINE = 1.4
+_OUTLINE_RGBA = (0.03, 0.06, 0.20, 1.0)
 _NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _SHAPES = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -30,7 +33,7 @@ _SIZES = {"sphere": 1, "cylinder": 2, "box": 3}
 
 
 class MarkerLike(Protocol):
-    """What a marker must offer."""
+    """What a marker must offer; a sphere that has a true attribute `outlined` gets a dark outline in colour images."""
 
     @property
     def shape(self) -> str:
@@ -120,7 +123,20 @@ def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> l
     centres = np.array([_numbers(marker, "position", 3) for marker in markers])
     radii = np.array([np.linalg.norm(geom_size(marker)) for marker in markers])
     beside = outside(view, aspect, centres, radii)
-    return [marker for marker, away in zip(markers, beside, strict=True) if not away]
+    shown = [marker for marker, away in zip(markers, beside, strict=True) if not away]
+    return [*shown, *(_Outline(marker, view) for marker in shown if getattr(marker, "outlined", False))]
+
+
+class _Outline:
+    """A larger dark sphere that is seen behind a sphere from all around, whatever lies behind both."""
+
+    shape, rgba, x_ray = "sphere", _OUTLINE_RGBA, False
+
+    def __init__(self, marker: MarkerLike, view: ViewVolume) -> None:
+        centre, radius = np.array(_numbers(marker, "position", 3)), _OUTLINE * float(marker.size[0])
+        away = centre - view.position
+        self.size = (radius,)
+        self.position = centre + away * (radius / max(float(np.linalg.norm(away)), radius))
 
 
 def geom_size(marker: MarkerLike) -> NDArray[np.float64]:

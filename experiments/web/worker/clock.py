@@ -57,8 +57,7 @@ class Clock:
             due += late if late > MAX_LAG else 0.0
         self._acknowledger.check()
         self._live.step(self._control.take_inputs())
-        if self._live.end_reason is None:
-            session.show()  # now rather than in the next step: the browser sees it 40 ms earlier
+        session.show()  # now rather than in the next step: the browser sees it 40 ms earlier
         self._acknowledger.request(self._live.input, session.record.step)
         return due + self._live.world.control_timestep
 

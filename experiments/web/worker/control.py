@@ -9,7 +9,7 @@ import msgspec
 
 from experiments.web.controls import Input
 from experiments.web.protocol import State
-from experiments.web.state import PAUSED, RUNNING, SessionPhase, Trigger
+from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, Trigger
 
 Note = tuple[str, dict[str, Any]]  # name and fields of an event of the log
 
@@ -23,6 +23,7 @@ class SessionControl:
         self._inputs: list[Input] = []
         self._notes: list[Note] = []
         self._changed = threading.Condition()
+        self._ready = 0.0  # when the session could first be started, monotonic
 
     def apply(self, trigger: Trigger, reason: str = "", *, last: int | None = None) -> None:
         """Change the state as the table says; `last` is the number of the last input of a restored session."""
@@ -36,6 +37,10 @@ class SessionControl:
                 self._note("pause", reason=reason)
             elif (before.phase, after.phase) == (PAUSED, RUNNING):
                 self._note("resume")
+            elif after.phase is READY:
+                self._ready = time.monotonic()
+            elif (before.phase, after.phase) == (READY, RUNNING):
+                self._note("started", waited_s=round(time.monotonic() - self._ready, 3))
             self._announce(after)
             self._changed.notify_all()
 

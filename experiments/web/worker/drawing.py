@@ -1,27 +1,23 @@
 """Draws the person's view: the newest state, as large and as often as possible."""
 
 import dataclasses
-import math
 import threading
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from experiments.blame import describe
-from experiments.house import House
-from experiments.session.film_config import FilmConfig
-from experiments.session.first_person import FirstPersonRenderer
-from experiments.web.protocol import Frame, View
-from experiments.web.state import Trigger
+from experiments.web.protocol import Frame, Pictures, View
+from experiments.web.state import RUNNING, Trigger
 from experiments.web.worker.clock import Send
 from experiments.web.worker.control import SessionControl
-from experiments.web.worker.encoders import Encoder, H264Encoder, Image, JpegEncoder
+from experiments.web.worker.encoders import Encoder, H264Encoder, JpegEncoder
 from experiments.web.worker.frame_size import FIRST_SIZE, SIZES, FrameSize, pause_after
 from hud.projection import CameraView
-from hud.state import HudState
+from hud.state import HudState, Marker
 from mjsim.model.avatar import EYE
 from mjsim.model.scene import Scene
-from mjsim.render import FAST
+from mjsim.render import FAST, Renderer
 from mjsim.render.cameras import camera_pose
 from mjsim.world import World
 
@@ -31,17 +27,17 @@ MAX_IN_FLIGHT = 3  # frames sent that the browser has not yet shown
 
 
 class _Moment(NamedTuple):
-    """A state to draw: a copy of the simulator's data, the HUD, the control step, the last input."""
+    """A state to draw: a copy of the simulator's data, markers, the control step, the last input."""
 
     data: Any
-    hud: HudState
+    markers: tuple[Marker, ...]
     step: int
     input: int
+    hidden: bool  # nothing is shown while the clock does not run, so that nobody studies the plan for free
 
-    def content(self) -> tuple[bytes, HudState]:
-        """What a frame depends on; the clock shows whole seconds."""
-        clock = None if self.hud.clock is None else float(math.floor(self.hud.clock))
-        return self.data.qpos.tobytes(), dataclasses.replace(self.hud, clock=clock)
+    def content(self) -> object:
+        """What a frame depends on."""
+        return self.hidden or (self.data.qpos.tobytes(), self.markers)
 
 
 class _Job(NamedTuple):
@@ -59,12 +55,11 @@ class Drawer:
     def __init__(
         self,
         scene: Scene,
-        house: House,
-        pictures: Callable[[], dict[str, Image]],
+        pictures: Callable[[], dict[str, str]],
         send: Send,
         control: SessionControl,
     ) -> None:
-        self._scene, self._house, self._pictures = scene, house, pictures
+        self._scene, self._pictures = scene, pictures
         self._send, self._control = send, control
         self._changed = threading.Condition()
         self._view: View | None = None
@@ -73,7 +68,7 @@ class Drawer:
         self._sent = self._seen = 0
         self._key = self._closed = False
         self._spare: list[Any] = []  # copies of states that are not needed any more
-        self._renderers: dict[int, FirstPersonRenderer] = {}
+        self._renderers: dict[int, Renderer] = {}
         self._thread = threading.Thread(target=self._run, name="drawing", daemon=True)
         self._thread.start()
 
@@ -98,14 +93,19 @@ class Drawer:
             self._seen = max(self._seen, min(frame, self._sent))
             self._changed.notify()
 
-    def draw(self, world: World, state: HudState, step: int, number: int) -> None:
+    @property
+    def hidden(self) -> bool:
+        """Whether nothing is shown now: the clock does not run."""
+        return self._control.state.phase is not RUNNING
+
+    def draw(self, world: World, state: HudState, step: int, number: int, hidden: bool) -> None:
         """Take what is to be drawn next; what was not drawn yet is dropped."""
         if self._view is None or self._view.codec == "none":
             return
         with self._changed:
             self._drop(self._moment)
             data = world.copy_data(self._spare.pop() if self._spare else None)
-            self._moment = _Moment(data, state, step, number)
+            self._moment = _Moment(data, state.markers, step, number, hidden)
             self._changed.notify()
 
     def close(self) -> None:
@@ -125,6 +125,7 @@ class Drawer:
 
     def _draw_all(self) -> None:
         size = FrameSize()
+        shown_to: View | None = None
         encoder: Encoder = JpegEncoder()
         encoded_for: tuple[View, int] | None = None
         while (job := self._next()) is not None:
@@ -133,7 +134,12 @@ class Drawer:
             if encoded_for != (job.view, size.index):
                 encoder, encoded_for = _encoder(job.view, size.index), (job.view, size.index)
                 job = job._replace(key=True)
-            image = self._renderer(size.index).frame(job.moment.data, job.moment.hud)
+            if job.view is not shown_to:
+                self._send(Pictures(self._pictures()))
+                shown_to = job.view
+            image = self._renderer(size.index).rgb(job.moment.data, markers=job.moment.markers)
+            if job.moment.hidden:
+                image[:] = 0
             data, is_key = encoder.encode(image, key=job.key)
             took = time.perf_counter() - began
             self._send_frame(job, SIZES[size.index], data, is_key, took)
@@ -175,11 +181,11 @@ class Drawer:
                     return _Job(moment, view, key, waited)
         return None
 
-    def _renderer(self, size: int) -> FirstPersonRenderer:
+    def _renderer(self, size: int) -> Renderer:
         if size not in self._renderers:
             width, height = SIZES[size]
-            film = FilmConfig(width, height, FAST if size else COARSE)
-            self._renderers[size] = FirstPersonRenderer(self._scene, self._house, film, self._pictures())
+            profile = FAST if size else COARSE
+            self._renderers[size] = Renderer(self._scene.model, width=width, height=height, profile=profile)
         return self._renderers[size]
 
 

@@ -1,5 +1,6 @@
 """Frames compressed for a browser: JPEG, or H.264 with little delay."""
 
+import base64
 from typing import Any, Protocol
 
 import av
@@ -56,3 +57,11 @@ class H264Encoder:
         picture.pict_type = av.video.frame.PictureType.I if key else av.video.frame.PictureType.NONE
         packets = self._codec.encode(picture)
         return b"".join(bytes(packet) for packet in packets), any(packet.is_keyframe for packet in packets)
+
+
+def data_url(picture: Image) -> str:
+    """A picture, uint8 RGBA (h, w, 4), as the data URL of a WebP."""
+    _, data = cv2.imencode(
+        ".webp", cv2.cvtColor(picture, cv2.COLOR_RGBA2BGRA), [cv2.IMWRITE_WEBP_QUALITY, 85]
+    )
+    return f"data:image/webp;base64,{base64.b64encode(data.tobytes()).decode()}"

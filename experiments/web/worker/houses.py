@@ -7,8 +7,9 @@ from multiprocessing import get_context
 
 from experiments.house import House
 from experiments.trials import warmup
-from experiments.web.worker.encoders import Image
-from mjsim.render import render_pictures
+from experiments.web.worker.encoders import Image, data_url
+from hud.options.minimap import FLOORPLAN
+from mjsim.render import render_house_map, render_pictures
 
 DRAWING_TIMEOUT = 60.0  # s
 _pictures: dict[str, dict[str, Image]] = {}
@@ -25,6 +26,15 @@ def pictures(name: str) -> dict[str, Image]:
     if name not in _pictures:
         _pictures[name] = render_pictures(house(name).catalogue)
     return _pictures[name]
+
+
+@functools.cache
+def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
+    """The pictures of a house as data URLs, and its floor plan if that is needed; to be called where one draws."""
+    found = dict(pictures(name))
+    if floor_plan:
+        found[FLOORPLAN] = render_house_map(house(name).catalogue, house(name).bounds)
+    return {key: data_url(picture) for key, picture in found.items()}
 
 
 def preload(name: str) -> None:

@@ -98,8 +98,8 @@ class Worker:
         with open_journal(folder) as journal:
             if not is_over(journal):
                 live = LiveSession(journal, house, config, viewer, before=opened.before)
-                pictures = partial(houses.pictures, config.house)
-                with closing(Drawer(live.scene, live.house, pictures, self._send, control)) as drawer:
+                pictures = partial(houses.encoded_pictures, config.house, "minimap" in config.assistance)
+                with closing(Drawer(live.scene, pictures, self._send, control)) as drawer:
                     viewer.live, viewer.drawer = live, drawer
                     viewer.set_view(None)
                     if live.resumed:

@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -123,6 +124,30 @@ def test_walls_hide_breadcrumbs_as_they_hide_things(studio, golden_frame):
     assert not marker_pixels(studio, pose, behind).any()
     assert marker_pixels(studio, pose, crumbs).sum() > 100
     golden_frame(studio.small.rgb(studio.data, pose, crumbs), "breadcrumbs_and_wall")
+
+
+DEUTERANOPIA = (  # on linear RGB (Machado, Oliveira and Fernandes, 2009)
+    (0.367322, 0.860646, -0.227968), (0.280085, 0.672501, 0.047413), (-0.011820, 0.042940, 0.968881)
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("vision", [np.eye(3), np.array(DEUTERANOPIA)])
+def test_breadcrumbs_stand_out_from_parquet(studio, vision):
+    """3 : 1 between the edge of the breadcrumbs and the floor around them, in a frame as it is rendered."""
+
+    def luminance(frame):
+        linear = ((frame / 255.0 + 0.055) / 1.055) ** 2.4
+        return np.clip(linear @ vision.T, 0.0, 1.0) @ (0.2126, 0.7152, 0.0722)
+
+    crumbs = breadcrumbs(np.array([(6.8, 8.0), (8.2, 7.0)]), 0.1)  # near the floor of the living room
+    pose = eye_at((6.0, 9.6), (8.0, 7.0), 0.2)
+    bare, drawn = (studio.large.rgb(studio.data, pose, m) for m in ((), crumbs))
+    changed = np.any(bare != drawn, axis=2).astype(np.uint8)
+    kernel = np.ones((3, 3), np.uint8)
+    edge = cv2.erode(changed, kernel) - cv2.erode(changed, kernel, iterations=2)
+    around = cv2.dilate(changed, kernel, iterations=3) - cv2.dilate(changed, kernel)
+    dark, light = (np.median(luminance(drawn)[mask > 0]) for mask in (edge, around))
+    assert changed.sum() > 500 and (light + 0.05) / (dark + 0.05) >= 3.0
 
 
 def test_x_ray_flagpoles_show_faintly_through_walls(studio, golden_frame):

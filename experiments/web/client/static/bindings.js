@@ -88,8 +88,18 @@ export class Bindings {
   }
 }
 
+/** @type {ReadonlyMap<string, string>} */
+let layout = new Map(); // code of a key -> what it types on this keyboard
+
+/** Learns what the keys of this keyboard are called, where the browser tells it. */
+export async function learnLayout() {
+  const { keyboard } = /** @type {{ keyboard?: { getLayoutMap(): Promise<ReadonlyMap<string, string>> } }} */ (navigator);
+  layout = (await keyboard?.getLayoutMap().catch(() => undefined)) ?? layout;
+}
+
 /** @param {string} code */
-export const keyName = (code) => KEY_NAMES[code] ?? code.replace(/^(Key|Digit)/, "");
+export const keyName = (code) =>
+  KEY_NAMES[code] ?? layout.get(code)?.toUpperCase() ?? code.replace(/^(Key|Digit)/, "");
 
 /**
  * The sum of what is held on each axis.

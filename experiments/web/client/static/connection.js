@@ -19,6 +19,7 @@ export class Connection {
   #waiting = []; // inputs that are not taken yet
   #next = 1;
   #open = false; // whether the session takes inputs
+  #heard = performance.now();
   #hello;
   #on;
 
@@ -69,6 +70,11 @@ export class Connection {
     return this.#waiting.length;
   }
 
+  /** For how long nothing has come from the server, ms. */
+  get silence() {
+    return performance.now() - this.#heard;
+  }
+
   /** Closes the connection for good. */
   close() {
     const socket = this.#socket;
@@ -79,6 +85,7 @@ export class Connection {
   /** @param {string | ArrayBuffer} data */
   #take(data) {
     this.#wait = FIRST_WAIT;
+    this.#heard = performance.now();
     /** @type {Received} */
     const message = typeof data === "string" ? JSON.parse(data) : readFrame(data);
     if (message.type === "state") {

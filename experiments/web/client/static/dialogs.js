@@ -6,6 +6,7 @@
 const PAUSED = {
   asked: "The clock is stopped.",
   hidden: "Paused while the page was hidden.",
+  silent: "Paused while there was no connection.",
   disconnected: "Paused while there was no connection.",
   "taken over": "Paused while the session moved to this page.",
 };
@@ -59,9 +60,9 @@ export const ending = (trial) => ({
   buttons: [["Continue", "hide"], [`End the ${trial}`, "leave"]],
 });
 
-/** @param {boolean} saved @returns {Dialog} */
-export const over = (saved) => ({
-  title: "Done",
+/** @param {string} reason @param {boolean} saved @returns {Dialog} */
+export const over = (reason, saved) => ({
+  title: reason === "all delivered" ? "All done" : "This part is over",
   texts: ["The next page opens in a moment."],
   buttons: saved ? [["Continue", "reload"]] : [],
 });
@@ -90,7 +91,10 @@ export const REPLACED = {
 };
 
 /** @type {Dialog} */
-export const OFFLINE = { title: "No connection", texts: ["This page reconnects by itself. Nothing is lost."] };
+export const OFFLINE = {
+  title: "No connection",
+  texts: ["The clock stands. This page reconnects by itself. Nothing is lost."],
+};
 
 /** @type {Dialog} */
 export const CLOSED = {

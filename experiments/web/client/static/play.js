@@ -3,34 +3,37 @@
 /** @import { Codec, PauseReason, View } from "./protocol.js" */
 /** @import { Received } from "./connection.js" */
 
-import { Bindings } from "./bindings.js";
+import { Bindings, learnLayout } from "./bindings.js";
 import { Connection } from "./connection.js";
-import { Debug } from "./debug.js";
 import * as dialogs from "./dialogs.js";
 import { byId } from "./dom.js";
 import { connectGamepad } from "./gamepad.js";
 import { Help } from "./help.js";
+import { Hud } from "./hud.js";
 import { Inputs } from "./inputs.js";
 import { Keyboard } from "./keyboard.js";
+import { Meter } from "./meter.js";
 import { Panel } from "./panel.js";
 import { connectMouse, connectTouch } from "./pointer.js";
-import { TOO_MUCH } from "./protocol.js";
+import { BEAT_PERIOD, DISPLAY_PERIOD, MAX_SILENCE, TOO_MUCH } from "./protocol.js";
 import { Screen, bestCodec } from "./screen.js";
 import { Session } from "./session.js";
-import { showText } from "./texts.js";
 import { rememberVisit } from "./visit.js";
 
 const HIDDEN_GRACE = 5000; // ms that the page may be hidden before the session is paused
 const DONE = 1500; // ms for which the end of a trial is shown
 const RESIZED = 300; // ms after which a new size of the page is sent
 
-const { trial = "", objects = "" } = byId("play", HTMLElement).dataset;
+const page = byId("play", HTMLElement);
+const { trial = "", objects = "" } = page.dataset;
 const canvas = byId("screen", HTMLCanvasElement);
 const tab = Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16)).join("-");
 
 const session = new Session();
 /** @type {Codec} */
 let codec = "jpeg";
+let renderer = "";
+let silent = false; // whether the link was lost without being closed
 const panel = new Panel(
   byId("panel", HTMLDialogElement),
   {
@@ -42,12 +45,14 @@ const panel = new Panel(
   },
   () => canvas.focus(),
 );
-const debug = new Debug(byId("debug", HTMLElement), new URLSearchParams(location.search).has("debug"));
+const meter = new Meter();
 const screen = new Screen(
   canvas,
   (frame) => {
     connection.send({ type: "seen", frame: frame.number });
-    debug.shown(frame, connection.pending);
+    meter.shown(frame);
+    renderer = `frames of the server, ${frame.codec}, ${frame.width}x${frame.height}`;
+    hud.reached(frame.step);
   },
   () => {
     codec = "jpeg";
@@ -57,8 +62,9 @@ const screen = new Screen(
 /** @returns {View} */
 const view = () => ({ type: "view", ...screen.size, codec, snapshots: false });
 const connection = new Connection(() => ({ type: "hello", tab, trial, view: view() }), take);
-const inputs = new Inputs((input) => debug.sent(connection.input(input)));
+const inputs = new Inputs((input) => meter.sent(connection.input(input)));
 const bindings = new Bindings();
+const hud = new Hud(() => bindings.label("act"));
 const help = new Help(byId("help", HTMLDialogElement), bindings, () => canvas.focus());
 const commands = {
   help: () => (help.open ? help.hide() : openHelp()),
@@ -70,24 +76,35 @@ const keyboard = new Keyboard(bindings, inputs, commands, listens);
 
 /** @param {Received} message */
 function take(message) {
+  if (silent && message.type !== "closed") {
+    silent = false;
+    connection.send({ type: "pause", reason: "silent" }); // the state that follows lets the clock run again
+  }
   switch (message.type) {
     case "state":
       session.take(message);
       showState();
       break;
     case "frame":
+      meter.came(message);
       screen.show(message);
       if (session.phase === "ready") showInstructions(); // there is something to see now
       break;
-    case "text":
-      showText(message);
+    case "pictures":
+      hud.learn(message);
+      break;
+    case "hud":
+      hud.show(message.state);
+      break;
+    case "moment":
+      hud.expect(message);
       break;
     case "busy":
       byId("busy", HTMLElement).hidden = !message.busy;
       break;
     case "saved":
       connection.close();
-      panel.show(dialogs.over(true));
+      panel.show(dialogs.over(session.reason, true));
       setTimeout(() => location.reload(), DONE);
       break;
     case "queue":
@@ -105,14 +122,14 @@ function take(message) {
       break;
     case "closed":
       screen.reset();
-      if (!message.final) {
-        session.lose();
-        panel.show(dialogs.OFFLINE);
-      } else if (message.code === TOO_MUCH) panel.show(dialogs.CLOSED);
+      silent = false;
+      if (!message.final) lose();
+      else if (message.code === TOO_MUCH) panel.show(dialogs.CLOSED);
   }
 }
 
 function showState() {
+  page.dataset.phase = session.phase; // the style sheet hides what belongs to the task while the clock does not run
   switch (session.phase) {
     case "loading":
       panel.show(dialogs.loading(session.interrupted));
@@ -129,12 +146,38 @@ function showState() {
       }
       break;
     case "over":
-      panel.show(dialogs.over(false));
+      panel.show(dialogs.over(session.reason, false));
       break;
     case "failed":
       connection.close();
       panel.show(dialogs.failed(session.reason));
   }
+}
+
+function lose() {
+  release();
+  session.lose();
+  showState();
+  panel.show(dialogs.OFFLINE);
+}
+
+function beat() {
+  if (session.phase !== "running") return;
+  connection.send({ type: "beat" });
+  if (connection.silence < 1000 * MAX_SILENCE) return;
+  silent = true;
+  lose();
+}
+
+function report() {
+  const { kilobits, ...seen } = meter.take();
+  const { width, height } = canvas.getBoundingClientRect();
+  const size = { width: Math.max(1, Math.round(width)), height: Math.max(1, Math.round(height)) };
+  if (session.phase === "running" && renderer) {
+    connection.send({ type: "display", renderer, ...size, pixel_ratio: window.devicePixelRatio || 1, ...seen });
+  }
+  byId("debug", HTMLElement).textContent =
+    `${seen.latency_ms ?? "–"} ms · ${seen.frames_per_s} fps · ${kilobits} kbit/s · ${renderer} · ${connection.pending} not taken`;
 }
 
 function showInstructions() {
@@ -146,7 +189,7 @@ function showInstructions() {
 
 function run() {
   if (!session.run()) return;
-  panel.hide();
+  showState();
   connection.send({ type: "run" });
 }
 
@@ -207,11 +250,25 @@ byId("panel", HTMLDialogElement).addEventListener("keydown", (event) => {
 byId("help-button", HTMLElement).addEventListener("click", openHelp);
 byId("pause-button", HTMLElement).addEventListener("click", () => commands.pause());
 byId("end-button", HTMLElement).addEventListener("click", askToEnd);
-connectMouse(canvas, inputs, listens);
+byId("reach", HTMLElement).addEventListener("click", () => {
+  if (listens()) inputs.press("act");
+  canvas.focus();
+});
+const full = byId("full-button", HTMLElement);
+full.hidden = !document.fullscreenEnabled;
+full.addEventListener("click", () => {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else document.documentElement.requestFullscreen();
+});
+connectMouse(canvas, inputs, listens, () => hud.reach);
 connectTouch(canvas, byId("touch", HTMLElement), inputs, listens);
 connectGamepad(inputs, commands, listens);
 watchPage();
+setInterval(beat, 1000 * BEAT_PERIOD);
+setInterval(report, 1000 * DISPLAY_PERIOD);
+byId("debug", HTMLElement).hidden = !new URLSearchParams(location.search).has("debug");
 rememberVisit();
 panel.show(dialogs.loading(false));
+learnLayout();
 codec = await bestCodec();
 connection.open();

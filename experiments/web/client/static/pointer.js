@@ -12,13 +12,16 @@ const LINE = 40; // px of the wheel for one row
  * @param {HTMLCanvasElement} canvas
  * @param {Inputs} inputs
  * @param {() => boolean} listens whether inputs are for the view
+ * @param {() => boolean} reaches whether the action key would do something
  */
-export function connectMouse(canvas, inputs, listens) {
+export function connectMouse(canvas, inputs, listens, reaches) {
   canvas.addEventListener("click", (event) => {
     if ((event instanceof PointerEvent && event.pointerType === "touch") || !listens()) return;
     canvas.focus();
+    const locked = document.pointerLockElement === canvas;
+    if (locked || reaches()) inputs.press("act"); // the first click, which captures the mouse, tries nothing in vain
     // Refused right after Esc; the next click asks again.
-    if (document.pointerLockElement !== canvas) canvas.requestPointerLock?.()?.catch?.(() => {});
+    if (!locked) canvas.requestPointerLock?.()?.catch?.(() => {});
   });
   document.addEventListener("mousemove", (event) => {
     if (document.pointerLockElement !== canvas || !listens()) return;

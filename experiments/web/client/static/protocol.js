@@ -17,7 +17,7 @@
 /** @typedef {{ type: "leave" }} Leave End the trial now. */
 /** @typedef {{ type: "state"; phase: Phase; reason: string; input: number }} State The state of the session, why it is paused, over or failed, and the number of the last input that it received. */
 /** @typedef {{ type: "taken"; input: number; step: number }} Taken Everything up to this input and control step counts, and is safe on the disk. */
-/** @typedef {{ text: string; detail: string; picture: string | null; target_picture: string | null; number: number | null; done: boolean; current: boolean }} ChecklistItem A row of the task list. */
+/** @typedef {{ text: string; detail: string; picture: string | null; target_picture: string | null; number: number | null; done: boolean; current: boolean; carried: boolean }} ChecklistItem A row of the task list. */
 /** @typedef {{ label: string; place: string; picture: string | null }} BinEntry A receptacle in the list that every condition shows: picture, name and semantic location. */
 /** @typedef {{ label: string | null; picture: string | null }} InventorySlot One hand: what it holds, or nothing. */
 /** @typedef {{ text: string; kind: "info" | "success" | "refusal"; opacity: number }} HudMessage Text of the message bar, and its opacity at this moment: 1 opaque, 0 gone. */
@@ -26,7 +26,10 @@
 /** @typedef {{ picture: string; bounds: [number, number, number, number]; position: [number, number]; heading: number; path: Array<[number, number]>; objects: Array<[number, number]>; goal: [number, number] | null }} MiniMap The house from above with north (+y) up. */
 /** @typedef {{ checklist_title: string; checklist: Array<ChecklistItem>; bins: Array<BinEntry>; inventory: [InventorySlot | null, InventorySlot]; message: HudMessage | null; markers: Array<Marker>; rerouted: boolean; delivered: number; total: number; clock: number | null; pointer: Pointer | null; minimap: MiniMap | null; scroll: number }} HudState Everything that is shown. */
 /** @typedef {{ type: "snapshot"; step: number; input: number; time: number; eye: Array<number>; objects: Record<string, Array<number>>; hud: HudState }} Snapshot Poses and HUD at the start of a control step, for clients that draw by themselves. */
-/** @typedef {{ type: "text"; message: string; title: string; rows: Array<string>; hands: Array<string> }} Text The HUD for screen readers: the message bar, the list's heading, its rows, the hands. */
+/** @typedef {{ type: "pictures"; pictures: Record<string, string> }} Pictures The pictures that a `hud` names, as data URLs, by their keys; sent once to a page. */
+/** @typedef {{ type: "hud"; state: HudState }} Hud What is shown beside the picture: the state of the HUD without its markers, and without what a `moment` has. */
+/** @typedef {{ object: string; receptacle: string | null; at: [number, number] | null }} Reach What the action key would do: the object, the receptacle if it is put there, where it is in the frame. */
+/** @typedef {{ type: "moment"; step: number; clock: number | null; room: string; reach: Reach | null; pointer: Pointer | null; minimap: MiniMap | null }} Moment What changes as the person moves: the clock in whole seconds, the room, what is in reach, pointer and map. */
 /** @typedef {{ type: "busy"; busy: boolean }} Busy Whether a pick or place is under way; keys pressed then are handled afterwards. */
 /** @typedef {{ type: "saved" }} Saved The run directory of a session that is over has been written. */
 /** @typedef {{ type: "queue"; position: number }} Queue All places are taken; the session opens by itself when it is its turn. Position 1 is next. */
@@ -35,7 +38,7 @@
 /** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was refused and does not count: a code, and the reason in words. */
 /** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} Frame A frame of a view, by number from 1: the start of a control step, the last input that counts, and the picture. */
 /** @typedef {Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave} FromBrowser */
-/** @typedef {State | Taken | Snapshot | Text | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
+/** @typedef {State | Taken | Snapshot | Pictures | Hud | Moment | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
 
 export const FRAME_HEAD_BYTES = 28;
 /** @type {Record<number, Codec>} */

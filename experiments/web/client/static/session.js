@@ -13,7 +13,7 @@ export class Session {
   /** @param {Pick<State, "phase" | "reason">} state from the server */
   take({ phase, reason }) {
     if (phase === "loading") this.interrupted ||= this.phase === "running";
-    else if (reason !== "disconnected") this.interrupted = false;
+    else if (reason !== "disconnected" && reason !== "silent") this.interrupted = false;
     this.phase = phase;
     this.reason = reason;
   }

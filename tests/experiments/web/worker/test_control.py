@@ -60,10 +60,10 @@ def test_what_is_sent_again_counts_once():
     assert control.state.reason == "disconnected"
 
 
-def test_pauses_and_blurs_are_noted_in_order_with_their_time():
+def test_start_pauses_and_blurs_are_noted_in_order_with_their_time():
     _, control = after(Trigger.OPENED, Trigger.RUN, Trigger.PAUSE)
     control.note("blur", away=True)
     control.apply(Trigger.RUN)
     notes = control.take_notes()
-    assert [event for event, _ in notes] == ["pause", "blur", "resume"]
+    assert [event for event, _ in notes] == ["started", "pause", "blur", "resume"]
     assert all(fields["wall"] > 0.0 for _, fields in notes) and control.take_notes() == []

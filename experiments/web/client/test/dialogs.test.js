@@ -1,30 +1,8 @@
 // @vitest-environment happy-dom
-import { beforeEach, describe, expect, test, vi } from "vitest";
+import { describe, expect, test, vi } from "vitest";
 
 import * as dialogs from "../static/dialogs.js";
 import { Panel } from "../static/panel.js";
-import { showText } from "../static/texts.js";
-
-/** @param {string} id */
-const text = (id) => document.getElementById(id)?.textContent;
-
-describe("the text of the display", () => {
-  beforeEach(() => {
-    document.body.innerHTML = '<p id="message"></p><h2 id="list-title"></h2><ul id="list"></ul><p id="hands"></p>';
-  });
-
-  test("has message, list and hands", () => {
-    showText({ type: "text", message: "Picked up.", title: "Your plan", rows: ["Mug.", "Done: Pan."], hands: ["Mug", "empty"] });
-    expect(["message", "list-title", "list", "hands"].map(text)).toEqual([
-      "Picked up.", "Your plan", "Mug.Done: Pan.", "Left hand: Mug. Right hand: empty.",
-    ]);
-  });
-
-  test("names one hand where there is one", () => {
-    showText({ type: "text", message: "", title: "", rows: [], hands: ["empty"] });
-    expect(text("hands")).toBe("Hand: empty.");
-  });
-});
 
 describe("dialogs", () => {
   test.each(["asked", "hidden", "disconnected", "taken over"])("say why a session is paused: %s", (reason) => {
@@ -36,6 +14,11 @@ describe("dialogs", () => {
     expect(dialogs.instructions("task", 6, "").texts[0]).toContain("all 6 objects into their bins");
     expect(dialogs.queue(1).texts[0]).toBe("You are next.");
     expect(dialogs.queue(3).texts[0]).toBe("You are number 3 in the queue.");
+  });
+
+  test("congratulate on nothing but the whole task", () => {
+    expect(dialogs.over("all delivered", false).title).toBe("All done");
+    for (const reason of ["interrupted", "time limit"]) expect(dialogs.over(reason, true).title).not.toContain("one");
   });
 
   test("explain the controls in the training", () => {

@@ -1,0 +1,173 @@
+// The heads-up display: lists beside the view, and what is over it.
+
+/** @import { BinEntry, ChecklistItem, HudState, InventorySlot, Moment, Pictures, Reach } from "./protocol.js" */
+
+import { byId, made } from "./dom.js";
+import { drawMap } from "./map.js";
+
+const CONTEXT = 2; // rows above the current one that stay in sight
+const LATEST = 200; // ms that a moment waits for its frame
+const SYMBOLS = { info: "ℹ", success: "✓", refusal: "✕" };
+
+/** What is over the view has to fit the frame, so that it waits for it. */
+export class Hud {
+  /** @type {Map<string, HTMLImageElement>} */
+  #pictures = new Map();
+  /** @type {Moment[]} */
+  #waiting = [];
+  /** @type {HudState | null} */
+  #state = null;
+  #key;
+  reach = false; // whether the action key would do something
+
+  /** @param {() => string} key name of the action key */
+  constructor(key) {
+    this.#key = key;
+    window.addEventListener("resize", () => this.#scroll());
+  }
+
+  /** @param {Pictures} message */
+  learn({ pictures }) {
+    for (const [key, address] of Object.entries(pictures)) {
+      const image = new Image();
+      image.alt = ""; // the name is beside it
+      image.src = address;
+      this.#pictures.set(key, image);
+    }
+    if (this.#state) this.show(this.#state);
+  }
+
+  /** @param {HudState} state */
+  show(state) {
+    this.#state = state;
+    byId("list-title", HTMLElement).textContent = `${state.checklist_title}: ${countText(state.checklist)}`;
+    byId("list", HTMLElement).replaceChildren(...state.checklist.map((item) => this.#row(item)));
+    byId("bins", HTMLElement).replaceChildren(...state.bins.map((bin) => this.#bin(bin)));
+    byId("hands", HTMLElement).replaceChildren(...this.#hands(state.inventory));
+    byId("progress", HTMLElement).textContent = `${state.delivered} / ${state.total} put away`;
+    const text = state.message ? `${SYMBOLS[state.message.kind]} ${state.message.text}` : "";
+    const bar = byId("message", HTMLElement);
+    if (bar.textContent !== text) bar.textContent = text; // the same text again would be read again
+    bar.className = state.message?.kind ?? "";
+    this.#scroll();
+  }
+
+  /** @param {Moment} moment */
+  expect(moment) {
+    this.#waiting.push(moment);
+    setTimeout(() => this.reached(moment.step), LATEST);
+  }
+
+  /** @param {number} step whose frame is on show */
+  reached(step) {
+    const due = this.#waiting.filter((moment) => moment.step <= step);
+    this.#waiting = this.#waiting.slice(due.length);
+    const moment = due.at(-1);
+    if (moment) this.#moment(moment);
+  }
+
+  /** @param {Moment} moment */
+  #moment({ clock, room, reach, pointer, minimap }) {
+    byId("clock", HTMLElement).textContent = clock === null ? "" : clockText(clock);
+    byId("room", HTMLElement).textContent = room;
+    this.#reach(reach);
+    const arrow = byId("pointer", HTMLElement);
+    arrow.hidden = !pointer;
+    if (pointer) {
+      const [x, y] = [Math.cos(pointer.angle), -Math.sin(pointer.angle)];
+      const far = 44 / Math.max(Math.abs(x), Math.abs(y)); // % of the view, to its edge
+      arrow.style.left = `${50 + far * x}%`;
+      arrow.style.top = `${50 + far * y}%`;
+      arrow.style.rotate = `${-pointer.angle}rad`;
+    }
+    drawMap(byId("map", HTMLCanvasElement), minimap, minimap && this.#pictures.get(minimap.picture));
+  }
+
+  /** @param {Reach | null} reach */
+  #reach(reach) {
+    const mark = byId("reach", HTMLButtonElement);
+    this.reach = reach !== null;
+    mark.hidden = !reach;
+    if (!reach) return;
+    const what = reach.receptacle ? `Put ${reach.object} into ${reach.receptacle}` : `Pick up ${reach.object}`;
+    mark.replaceChildren(made("kbd", this.#key()), made("span", what));
+    mark.classList.toggle("away", !reach.at);
+    const [x, y] = reach.at ?? [0.5, 0.9];
+    mark.style.left = `${100 * Math.min(Math.max(x, 0.15), 0.85)}%`;
+    mark.style.top = `${100 * Math.min(Math.max(y, 0.15), 0.95)}%`;
+  }
+
+  /** @param {ChecklistItem} item */
+  #row(item) {
+    const row = document.createElement("li");
+    const words = document.createElement("span");
+    words.append(made("b", item.text), made("small", item.carried ? "In your hand" : item.detail.replace("\n", " ")));
+    if (item.number !== null) row.append(made("i", `${item.number}`));
+    row.append(...this.#picture(item.picture), words, ...this.#picture(item.target_picture));
+    if (item.carried) row.className = "carried";
+    else if (item.done) {
+      row.className = "done";
+      words.prepend(hidden("Done: "));
+    }
+    if (item.current) row.setAttribute("aria-current", "step");
+    return row;
+  }
+
+  /** @param {BinEntry} bin */
+  #bin(bin) {
+    const row = document.createElement("li");
+    const words = document.createElement("span");
+    words.append(made("b", bin.label), made("small", bin.place.replace("\n", " ")));
+    row.append(...this.#picture(bin.picture), words);
+    return row;
+  }
+
+  /** @param {(InventorySlot | null)[]} slots */
+  #hands(slots) {
+    const names = slots[0] ? ["Left hand", "Right hand"] : ["", "Hand"];
+    return slots.flatMap((slot, i) => {
+      if (!slot) return [];
+      const row = document.createElement("li");
+      const words = document.createElement("span");
+      words.append(made("small", names[i] ?? ""), made("b", slot.label ?? "empty"));
+      row.append(...this.#picture(slot.picture), words);
+      return [row];
+    });
+  }
+
+  /** @param {string | null} key */
+  #picture(key) {
+    const image = key === null ? undefined : this.#pictures.get(key);
+    return image ? [/** @type {Node} */ (image.cloneNode())] : [];
+  }
+
+  /** Follows the current step, and scrolls as the person asked. */
+  #scroll() {
+    if (!this.#state) return;
+    const list = byId("list", HTMLElement);
+    const { checklist, scroll } = this.#state;
+    const current = Math.max(0, checklist.findIndex((item) => item.current) - CONTEXT);
+    const first = list.children[Math.min(Math.max(current + scroll, 0), checklist.length - 1)];
+    if (first instanceof HTMLElement) list.scrollTop = first.offsetTop - list.offsetTop;
+  }
+}
+
+/** @param {ChecklistItem[]} items */
+function countText(items) {
+  const left = items.filter((item) => !item.done).length;
+  if (!left) return "done";
+  return items[0]?.number === null ? `${left} left` : `step ${items.length - left + 1} of ${items.length}`;
+}
+
+/** @param {string} text for screen readers alone */
+function hidden(text) {
+  const element = made("span", text);
+  element.className = "hidden";
+  return element;
+}
+
+/** @param {number} seconds */
+export function clockText(seconds) {
+  const minutes = Math.floor(seconds / 60);
+  return `${minutes}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
+}

@@ -1,0 +1,65 @@
+// How well the person sees: frames a second, times between frames, latency from an input to the frame that shows it.
+
+/** @import { Frame } from "./protocol.js" */
+
+export class Meter {
+  /** @type {Map<number, number>} */
+  #sent = new Map(); // number of an input -> when it was sent, ms
+  /** @type {number[]} */
+  #trips = [];
+  /** @type {number[]} */
+  #gaps = [];
+  #shown = 0; // frames
+  #came = 0;
+  #bytes = 0;
+  #last = 0; // when the last frame was shown, ms
+  #begun = performance.now();
+
+  /** @param {number} number of an input */
+  sent(number) {
+    this.#sent.set(number, performance.now());
+  }
+
+  /** @param {Frame} frame */
+  came(frame) {
+    this.#came++;
+    this.#bytes += frame.data.length;
+  }
+
+  /** @param {Frame} frame */
+  shown(frame) {
+    const now = performance.now();
+    for (const [number, time] of this.#sent) {
+      if (number > frame.input) continue;
+      this.#trips.push(now - time);
+      this.#sent.delete(number);
+    }
+    if (this.#shown++) this.#gaps.push(now - this.#last);
+    this.#last = now;
+  }
+
+  /** What was measured since the last call. */
+  take() {
+    const now = performance.now();
+    const seconds = Math.max(0.001, (now - this.#begun) / 1000);
+    const found = {
+      frames_per_s: rounded(this.#shown / seconds),
+      frame_ms: rounded(quantile(this.#gaps, 0.5) ?? 0),
+      frame_ms_95: rounded(quantile(this.#gaps, 0.95) ?? 0),
+      dropped: Math.max(0, this.#came - this.#shown),
+      latency_ms: this.#trips.length ? rounded(quantile(this.#trips, 0.5) ?? 0) : null,
+      kilobits: rounded((8 * this.#bytes) / 1000 / seconds),
+    };
+    this.#trips = [];
+    this.#gaps = [];
+    this.#shown = this.#came = this.#bytes = 0;
+    this.#begun = now;
+    return found;
+  }
+}
+
+/** @param {number[]} values @param {number} share */
+const quantile = (values, share) => values.sort((a, b) => a - b)[Math.floor(share * (values.length - 1))];
+
+/** @param {number} value */
+const rounded = (value) => Math.round(10 * value) / 10;

@@ -1,0 +1,67 @@
+// @vitest-environment happy-dom
+import { beforeEach, describe, expect, test, vi } from "vitest";
+
+import { Hud } from "../static/hud.js";
+
+/** @import { ChecklistItem, HudState, Moment } from "../static/protocol.js" */
+
+/** @param {Partial<ChecklistItem>} more @returns {ChecklistItem} */
+const item = (more) => ({
+  text: "Mug", detail: "Kitchen\n→ Dish bin", picture: null, target_picture: null, number: null, done: false, current: false,
+  carried: false, ...more,
+});
+
+/** @param {Partial<HudState>} more @returns {HudState} */
+const state = (more) => ({
+  checklist_title: "Objects to find", checklist: [], bins: [], inventory: [{ label: "Pan", picture: null }, { label: null, picture: null }],
+  message: null, markers: [], rerouted: false, delivered: 1, total: 6, clock: null, pointer: null, minimap: null, scroll: 0, ...more,
+});
+
+/** @param {Partial<Moment>} more @returns {Moment} */
+const moment = (more) => ({ type: "moment", step: 1, clock: 83.9, room: "Hall", reach: null, pointer: null, minimap: null, ...more });
+
+/** @param {string} id */
+const part = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
+describe("the display", () => {
+  /** @type {Hud} */
+  let hud;
+  beforeEach(() => {
+    vi.useFakeTimers();
+    document.body.innerHTML =
+      '<p id="progress"></p><p id="clock"></p><p id="room"></p><h2 id="list-title"></h2><ul id="list"></ul><div id="pointer" hidden></div>' +
+      '<button id="reach" hidden></button><p id="message"></p><ul id="hands"></ul><ul id="bins"></ul><canvas id="map"></canvas>';
+    hud = new Hud(() => "E");
+  });
+
+  test("tells what is carried from what is done", () => {
+    hud.show(state({ checklist: [item({}), item({ done: true }), item({ done: true, carried: true })] }));
+    const rows = [...part("list").children];
+    expect(rows.map((row) => row.className)).toEqual(["", "done", "carried"]);
+    expect(rows.map((row) => row.textContent)).toEqual(["MugKitchen → Dish bin", "Done: MugKitchen → Dish bin", "MugIn your hand"]);
+    expect(part("list-title").textContent).toBe("Objects to find: 1 left");
+  });
+
+  test("counts steps, progress, and says what the hands hold", () => {
+    hud.show(state({ checklist: [item({ number: 1, done: true }), item({ number: 2, current: true })] }));
+    expect(part("list-title").textContent).toBe("Objects to find: step 2 of 2");
+    expect(part("list").children[1]?.getAttribute("aria-current")).toBe("step");
+    expect(part("progress").textContent).toBe("1 / 6 put away");
+    expect(part("hands").textContent).toBe("Left handPanRight handempty");
+    hud.show(state({ inventory: [null, { label: null, picture: null }] }));
+    expect(part("hands").textContent).toBe("Handempty");
+  });
+
+  test("marks what the action key would take, and where it would put it", () => {
+    hud.expect(moment({ reach: { object: "Mug", receptacle: null, at: [0.5, 0.25] } }));
+    expect(hud.reach).toBe(false); // its frame is not on show yet
+    hud.reached(1);
+    expect([hud.reach, part("reach").textContent, part("reach").style.top]).toEqual([true, "EPick up Mug", "25%"]);
+    hud.expect(moment({ step: 2, reach: { object: "Mug", receptacle: "Dish bin", at: null } }));
+    hud.reached(2);
+    expect([part("reach").textContent, part("reach").classList.contains("away")]).toEqual(["EPut Mug into Dish bin", true]);
+    hud.expect(moment({ step: 3 }));
+    vi.runAllTimers(); // no frame comes where nothing has moved
+    expect([part("reach").hidden, part("room").textContent, part("clock").textContent]).toEqual([true, "Hall", "1:23"]);
+  });
+});
