@@ -14,6 +14,7 @@ from experiments.replay.replay import replay
 from experiments.session.first_person import FilmConfig
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST, PROBLEM, ROOT, one_line
+from mjsim.errors import RenderError
 from mjsim.render import context
 
 
@@ -117,3 +118,11 @@ def test_a_driver_that_fails_late_costs_the_pictures_alone(
     assert not {records.VIDEO, records.TOPDOWN} & {path.name for path in out.iterdir()}
     assert replay(out, house=house).ended == "all delivered"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("name", ["osmesa", "glfw"])
+def test_a_backend_that_cannot_be_loaded_is_not_blamed_on_egl(name, monkeypatch):
+    monkeypatch.setattr(context, "chosen_gl", lambda: name)
+    monkeypatch.setitem(sys.modules, f"mujoco.{name}", None)
+    with pytest.raises(RenderError, match="install it, or unset MUJOCO_GL to draw with egl"):
+        context._backend()
