@@ -17,7 +17,7 @@ from experiments.house import House
 from experiments.record import records
 from experiments.record.files import read_arrays
 from experiments.record.phases import TASK
-from experiments.record.run_directory import TRIALS
+from experiments.record.run_directory import TRIALS, is_run
 from experiments.record.topdown import PLANNED, WALKED, planned_path
 from experiments.study.figures import svg
 from experiments.study.table import StudyTable
@@ -54,8 +54,9 @@ def median_people(table: StudyTable) -> Iterator[Any]:
 
 def _run_of(row: Any, folder: Path) -> Path | None:
     """The run directory of a row; fingerprints are of one trial only, but for people who play the same task."""
-    if "participant" in row:
-        return folder / str(row["participant"]) / TASK
+    visit = folder / str(row.get("participant")) / TASK
+    if is_run(visit):
+        return visit
     for path in sorted((folder / TRIALS).glob(f"[!.]*/{records.METRICS}")):
         try:
             metrics = json.loads(read_text(path))
