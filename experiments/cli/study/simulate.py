@@ -48,8 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     console = error_console()
     if (others := len(rows) + failed - len(design.trials)) > 0:
         console.print(
-            f"mjsim: {arguments.out} has {counted(others, 'more row')} than the {len(design.trials)} asked for; the tables "
-            "hold all of them",
+            f"mjsim: {arguments.out} has {counted(others, 'more row')} than the {len(design.trials)} asked "
+            "for; the tables hold all of them",
             style="yellow",
         )
     console.print(
