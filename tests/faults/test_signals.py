@@ -96,13 +96,13 @@ def test_a_batch_that_is_stopped_writes_its_tables(number, tmp_path):
     assert len((tmp_path / "out" / "trials.csv").read_text().splitlines()) == len(done) + 1 < 200
 
 
-def test_a_worker_that_is_killed_is_one_line(tmp_path, mjsim, own_module):
+def test_a_worker_that_is_killed_is_one_line_for_each_trial(tmp_path, mjsim, own_module):
     own_module(participant("os.kill(os.getpid(), signal.SIGKILL)"))
     words = ("--assistance", "none", "--user", "own_code:build", "--workers", "1", "--seeds", "0:4")
     done = mjsim("batch", *FAST, *words, "--out", "out")
     assert done.returncode == 1
-    assert "Traceback" not in done.stderr and "worker" in done.stderr
-    assert all(path.name.startswith(WORK) for path in (tmp_path / "out" / "trials").iterdir())
+    assert "Traceback" not in done.stderr and done.stderr.count("its process died") == 4
+    assert all(path.name.startswith((WORK, ".apart")) for path in (tmp_path / "out" / "trials").iterdir())
 
 
 def test_a_signal_in_the_very_first_step_leaves_one_state(house, tmp_path, monkeypatch):
