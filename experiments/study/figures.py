@@ -40,7 +40,7 @@ def by_condition(table: StudyTable, labels: Mapping[str, str], objects: int) -> 
             axes.errorbar(place + 0.28, values.mean(), error, fmt="o", color="black", capsize=3, ms=5)
         shown = list(table.groups(name, objects))
         axes.set_xticks(range(len(shown)), shown)
-        axes.set_title(labels[name], fontsize=9)
+        axes.set_ylabel(labels[name], fontsize=9)
     return _svg(figure, f"Measures by condition with {objects} objects", table)
 
 
@@ -52,7 +52,7 @@ def interactions(table: StudyTable, labels: Mapping[str, str]) -> Markup:
             _draw_line(axes, table, name, condition, shift=0.25 * (k - (len(table.conditions()) - 1) / 2))
         axes.set_xticks(table.levels())
         axes.set_xlabel("objects", fontsize=8)
-        axes.set_title(labels[name], fontsize=9)
+        axes.set_ylabel(labels[name], fontsize=9)
     figure.axes[0].legend(fontsize=7, frameon=False)
     return _svg(figure, "Means by number of objects and condition", table)
 

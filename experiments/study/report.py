@@ -39,6 +39,7 @@ PAIR_HEAD_MORE = ("g", "95 % interval", "equivalence p", "verdict")
 def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
     """The page; paths are drawn where `folder` holds run directories."""
     parts = (
+        ("Summary", _summary(analysis)),
         ("People", _people(analysis)),
         *selection.sections(analysis.table),
         ("Measures by condition", _figures(analysis)),
@@ -52,6 +53,27 @@ def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
         ("What could not be computed", _missing(analysis)),
     )
     return page(TITLE, analysis.table.origin, parts)
+
+
+def _summary(analysis: Analysis) -> Iterator[Block]:
+    """Every hypothesis about the scored reading of a measure: one F test each, and the pairs it is about."""
+    two_way, labels = "two-way, Type II", _labels(analysis)
+    effects, pairs = [], []
+    for name, objects in ((n, o) for n in labels for o in (*analysis.table.levels(), None)):
+        result = analysis.find(name, "one-way" if objects else two_way, objects)
+        for effect, t in () if result is None else f_tests(result):
+            shown_test = f"F({_freedom(t)}) = {shown(t.statistic)}, p {p_value(t.p)}"
+            effects.append((labels[name], effect, objects or "all", t.eta_squared, t.interval, shown_test))
+        compared = analysis.find(name, "pairs", objects)
+        for p in compared.value if compared is not None and compared.value else ():
+            pair = f"{p.second} - {p.first}"
+            pairs.append(
+                (labels[name], pair, objects, p.difference, p.interval, p_value(p.tukey_p), p.verdict)
+            )
+    yield table(("measure", "effect of", "objects", "partial η²", "90 % interval", "test"), effects)
+    yield table(
+        ("measure", "difference", "objects", "estimate", "95 % interval", "Tukey p", "verdict"), pairs
+    )
 
 
 def _people(analysis: Analysis) -> Iterator[Block]:
@@ -84,11 +106,19 @@ def _figures(analysis: Analysis) -> Iterator[Block]:
     if not labels:
         return
     yield by_condition(found, labels, found.levels()[0])
+    yield Paragraph(
+        f"With {found.levels()[0]} objects: each dot is a person; black: means with 95 % confidence intervals.",
+        "missing",
+    )
     if len(found.levels()) > 1:
         yield interactions(found, labels)
+        yield Paragraph(
+            "Means by number of objects with 95 % confidence intervals, beside each other.", "missing"
+        )
     name = next(iter(labels))
     if found.groups(name):
         yield variances(found, name, labels[name])
+        yield Paragraph("Number of people by value, in each cell.", "missing")
     rows = [d for d in analysis.descriptions if d.measure in labels]
     yield table(
         ("measure", "condition", "objects", "people", "mean", "95 % interval", "deviation", "median"),

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from study_people import SIZES, made_up_people, table_of
 
+from experiments.analysis.page import shown
 from experiments.analysis.statistics.power import people_per_cell
 from experiments.cli import compare, run
 from experiments.cli.main import main
@@ -72,6 +73,17 @@ def test_the_report_is_one_file(analysed):
     assert not re.search(r"https?:|//\w+\.\w|@import|url\((?!#)", text)
     links = [v for _, a in page for n, v in a.items() if n in ("src", "href", "xlink:href")]
     assert all(link.startswith("#") for link in links)
+
+
+def test_the_report_begins_with_every_hypothesis(analysed):
+    first = (analysed / "report.html").read_text().split("<section>")[1]
+    assert first.startswith("<h2>Summary</h2>")
+    tests = pyarrow.csv.read_csv(analysed / "tests.csv").to_pylist()
+    scored = {"deviations", "ipl", "distance", "time"}
+    for test in tests:
+        if test["measure"] in scored and test["test"] in ("one-way", "two-way, Type II"):
+            assert f"F({test['df1']}, {test['df2']:.4g}) = {shown(test['statistic'])}" in first
+    assert first.count("optimal - none") == 4 * 4
 
 
 def test_simulated_stands_on_every_output(analysed):
