@@ -3,6 +3,7 @@
 import inspect
 import os
 import sysconfig
+from pathlib import Path
 
 from experiments.errors import ExperimentError
 from hud.errors import HudError
@@ -46,7 +47,10 @@ def place(error: BaseException | None) -> str:
     trace, found = error.__traceback__ if error is not None else None, ""
     while trace is not None:
         file, module = trace.tb_frame.f_code.co_filename, str(trace.tb_frame.f_globals.get("__name__", ""))
-        if module.partition(".")[0] not in PACKAGES and not file.startswith(LIBRARIES):
+        own = Path(file).is_absolute() and not file.startswith(
+            LIBRARIES
+        )  # compiled libraries name relative files
+        if own and module.partition(".")[0] not in PACKAGES:
             found = f" ({file}, line {trace.tb_lineno})"
         trace = trace.tb_next
     return found
