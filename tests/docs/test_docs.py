@@ -13,10 +13,12 @@ import hud_sample as sample
 import msgspec
 import pytest
 from example_house import write_example_house
+from planning_cases import random_problem
 
 from experiments.cli.main import main
 from experiments.participants.distribution import Distributions
 from experiments.participants.guest import PARAMETERS
+from experiments.session.own_planner import planner_named
 from experiments.trials.person import PARAMETERS as PERSON
 from experiments.trials.person import check_person
 from experiments.trials.trial import run_trial
@@ -100,6 +102,15 @@ def test_the_participant_of_its_page_tidies_a_house_and_prefers_distant_objects(
     near = run_trial(msgspec.structs.replace(config, user="nearest"), tmp_path / "near", topdown=False)
     assert far["delivered"] == near["delivered"] == 3
     assert far["task_distance_m"] > near["task_distance_m"]
+
+
+def test_the_planner_of_its_page_beats_the_nearest_first(own_module, tmp_path, house):
+    name = f"{own_module(blocks('planners.md', 'python')[0], 'rollout_of_the_docs')}:Rollout"
+    problem = random_problem(3, 8)
+    own, greedy, exact = (planner_named(known).solve(problem).cost for known in (name, "greedy", "exact"))
+    assert exact <= own < greedy
+    config = TrialConfig(objects=3, assistance="optimal", seed=0, planner=name, fidelity="event")
+    assert run_trial(config, tmp_path / "run", topdown=False, house=house)["delivered"] == 3
 
 
 def short(number):
