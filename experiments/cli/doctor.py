@@ -13,6 +13,7 @@ def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "doctor",
+        help=None,  # lets completion list it
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -16,7 +16,8 @@ decided is printed and kept in DIR/NAME/report.json; DIR/NAME/preview.png shows 
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
-    top = commands.add_parser("import")
+    # `help` lets completion list it; the overview has its own line.
+    top = commands.add_parser("import", help=None, description="Make objects from mesh files.")
     kinds = top.add_subparsers(title="what to import", metavar="KIND", required=True)
     parser = kinds.add_parser(
         "object", help="an object from a mesh", description=DESCRIPTION, formatter_class=HelpFormatter

@@ -31,6 +31,7 @@ COMMANDS = {
     "gallery": "make the pictures of the documentation",
     "bench": "run a benchmark of the source checkout",
     "doctor": "show versions and whether rendering works",
+    "completion": "print the completion script of a shell",
 }
 MODULES = {"import": "import_"}  # where a module cannot be called as its command
 CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # modules outside the wheel
@@ -63,8 +64,8 @@ examples:
       show versions, and whether off-screen rendering works"""
 
 
-def parser(command: str | None = None) -> argparse.ArgumentParser:
-    """The command line; with `command`, the module of this one alone is loaded."""
+def parser(*loaded: str) -> argparse.ArgumentParser:
+    """The command line: with the options of these commands, or else with one line about each command."""
     top = Parser(
         prog="mjsim",
         description=DESCRIPTION,
@@ -73,13 +74,14 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action=_Version)
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    if command is None:
+    for command in loaded:
+        if command in CHECKOUT:
+            add_checkout_command(commands, command, CHECKOUT[command])
+        else:
+            importlib.import_module(f"experiments.cli.{MODULES.get(command, command)}").add_parser(commands)
+    if not loaded:
         for name, summary in COMMANDS.items():
             commands.add_parser(name, help=summary)
-    elif command in CHECKOUT:
-        add_checkout_command(commands, command, CHECKOUT[command])
-    else:
-        importlib.import_module(f"experiments.cli.{MODULES.get(command, command)}").add_parser(commands)
     return top
 
 
@@ -127,14 +129,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    command = words[0] if words and words[0] in COMMANDS else None
+    known = words[:1] if words and words[0] in COMMANDS else []
     try:
         here = str(Path.cwd())
     except FileNotFoundError as error:
         raise OSError(error.errno, "the current folder was removed; change to another one") from error
     if here not in sys.path:
         sys.path.append(here)  # where a user's participants, conditions and planners may be
-    commands = parser(command)
+    commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
         commands.error(f"{bad} gives no value")  # argparse would take it for a list
     try:

@@ -26,6 +26,7 @@ def add_parser(commands: Any) -> None:
     """Add the subcommand with its own subcommands."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "study",
+        help=None,  # lets completion list it
         description=DESCRIPTION,
         formatter_class=HelpFormatter,
     )
