@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 WORKERS ?= auto
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow check check-client format wheel-check assets pictures data-dictionary client-protocol clean
+.PHONY: help demo test test-slow check check-client format site wheel-check assets pictures data-dictionary client-protocol clean
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -20,7 +20,7 @@ test: $(READY) ## Set up, then run the tests but for the slow ones; COVERAGE=1 m
 test-slow: $(READY) ## Run the slow tests; COVERAGE=1 adds to what `make test` measured, and checks the sum
 	$(BIN)/python -m pytest -n $(WORKERS) -m slow $(if $(COVERAGE),--cov --cov-append --cov-report=term:skip-covered)
 
-check: check-client $(READY) ## Lint, strict types, import contracts
+check: check-client site ## Lint, strict types, import contracts, the site
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -32,6 +32,9 @@ check-client: $(READY) ## Types, lint and unit tests of the client of `mjsim pla
 format: $(READY) ## Put the code into the house style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+site: $(READY) ## Build the site of the documents into site/; any warning is an error
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 wheel-check: $(READY) ## Build the wheel and use it in an empty environment
 	PYTHON=$(BIN)/python .ci/wheel-check
@@ -49,7 +52,7 @@ client-protocol: $(READY) ## Make the client's copy of the protocol anew from th
 	$(BIN)/python -m tools.client_protocol > experiments/web/client/static/protocol.js
 
 clean: ## Remove the environment, caches and runs
-	rm -rf $(VENV) runs dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) runs dist build site .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
 $(READY): pyproject.toml .ci/system-libraries
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -135,6 +135,7 @@ StepAction = Move | Pick | Place  # takes one control step
 Action = StepAction | FollowPath | Wait
 
 IDLE = Move()
+"""Stand still."""
 WAIT = Wait()
 
 

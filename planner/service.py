@@ -89,7 +89,7 @@ class Planner:
             seconds: Live: longest wait for the proof. Then the first regrets are found, which loads the kernels.
 
         Raises:
-            As `ask`.
+            PlannerError: As `ask`.
         """
         self._prepared = state
         self.do(lambda _: self._set_task(state, self._plan(state, shown=False).plan))
@@ -163,7 +163,7 @@ class Planner:
         """A better route for the same task, or the same with a better bound, if one was found since; else None.
 
         Raises:
-            As `ask`.
+            PlannerError: As `ask`.
         """
         better = None if self._route is None else self._source.better(state, self._route)
         self._route = better or self._route

@@ -5,6 +5,7 @@ import json
 import math
 import re
 import shlex
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -15,6 +16,7 @@ import pytest
 from example_house import write_example_house
 from planning_cases import random_problem
 
+import mjsim
 from experiments.cli.main import main
 from experiments.participants.distribution import Distributions
 from experiments.participants.guest import PARAMETERS
@@ -188,3 +190,17 @@ def test_every_test_of_a_section_of_the_paper_is_named_by_its_page():
     }
     assert written <= set(PAPER_LINKS)
     assert all(line.count("|") == 3 for line in page("paper.md").splitlines() if "::test_" in line)
+
+
+def test_the_site_has_every_public_name(tmp_path):
+    build = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", str(tmp_path)]
+    subprocess.run(build, cwd=DOCS.parent, check=True)
+    site = (tmp_path / "api" / "index.html").read_text(encoding="utf-8")
+    assert [name for name in mjsim.__all__ if f'id="mjsim.{name}"' not in site] == []
+
+
+def test_the_example_of_the_api_page_walks():
+    (code,), names = blocks("api.md", "python"), {}
+    exec(compile(code, "docs/api.md", "exec"), names)
+    start, position = names["episode"].start, names["step"].observation.position
+    assert 0 < math.dist((start.x, start.y), position[:2]) < 0.1
