@@ -114,7 +114,8 @@ def replay(
     if faults := damage(record):
         faults += checksum_mismatches(directory, record)
         raise mismatch_error(directory, record, faults[0], (), verdicts(directory, record, faults, 0, 0))
-    if start > (duration := float(record.trajectory["time"][-1])):
+    duration = float(record.trajectory["time"][-1])
+    if start > round(duration, 6):  # the log is rounded like that
         raise ConfigError(f"the run lasts {duration:.2f} s; start earlier than {start:g} s")
     house = house or _house_of(directory, record, catalogue)
     shown = assistance or str(record.start["assistance"])

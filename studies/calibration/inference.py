@@ -48,7 +48,9 @@ class Rows:
         """Those at 6 objects, without answers of people."""
         sizes = {c: n for (c, objects), n in published.people.sizes().items() if objects == OBJECTS}
         tests = [t for t in published.tests if t.objects == OBJECTS and not t.measure.startswith("likert_")]
-        directions = [d for d in published.directions if d.objects == OBJECTS]
+        directions = [
+            d for d in published.directions if d.objects == OBJECTS and not d.measure.startswith("likert_")
+        ]
         return cls(tests, directions, sizes, (published.variances.measure, published.variances.largest))
 
     @property

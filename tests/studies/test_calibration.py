@@ -93,7 +93,9 @@ def study(seed, sizes=ROWS.sizes):
     """People of one study at 6 objects, and its cells' means and variances, (1, measures, conditions) each."""
     rng = np.random.default_rng(seed)
     rows = [
-        person(condition, rng.normal([0.4 - 0.2 * k, 0.6 + 0.1 * k, 100 - 15 * k, 200.0], [0.2, 0.2, 30, 60]))
+        person(
+            condition, rng.normal([0.6 - 0.05 * k, 0.5 + 0.025 * k, 300 - 15 * k, 600], [0.05, 0.05, 30, 60])
+        )
         for k, (condition, count) in enumerate(sizes.items())
         for _ in range(count)
     ]

@@ -154,7 +154,7 @@ def test_what_cannot_be_compared_is_named(tmp_path, values, metrics, fault):
 def test_pairs_in_which_a_metric_is_unknown_are_counted(tmp_path, capsys):
     batch(tmp_path, {"none": [1.0, 2.0, 4.0], "optimal": [2.0, 3.0, np.nan]})
     assert main(["compare", str(tmp_path)]) == 0
-    assert "ipl_stand is not known in 1 pair of none and optimal, left out" in capsys.readouterr().err
+    assert "ipl_locations is not known in 1 pair of none and optimal, left out" in capsys.readouterr().err
     both = str(tmp_path / "both.svg")
     assert main(["compare", str(tmp_path), "--plot", both, "--csv", both]) == 2
     assert "--plot and --csv both name" in capsys.readouterr().err

@@ -21,7 +21,7 @@
 /** @typedef {{ label: string; place: string; picture: string | null }} BinEntry A receptacle in the list that every condition shows: picture, name and semantic location. */
 /** @typedef {{ label: string | null; picture: string | null }} InventorySlot One hand: what it holds, or nothing. */
 /** @typedef {{ text: string; kind: "info" | "success" | "refusal"; opacity: number }} HudMessage Text of the message bar, and its opacity at this moment: 1 opaque, 0 gone. */
-/** @typedef {{ shape: "box" | "cylinder" | "sphere"; position: [number, number, number]; size: [number, number, number]; rgba: [number, number, number, number]; role: string; x_ray: boolean; object: string | null }} Marker A world-locked digital object. */
+/** @typedef {{ shape: "box" | "cylinder" | "sphere"; position: [number, number, number]; size: [number, number, number]; rgba: [number, number, number, number]; role: string; x_ray: boolean; object: string | null; outlined: boolean }} Marker A world-locked digital object. */
 /** @typedef {{ angle: number }} Pointer An arrow at the edge of the view towards a goal that is out of view. */
 /** @typedef {{ picture: string; bounds: [number, number, number, number]; position: [number, number]; heading: number; path: Array<[number, number]>; objects: Array<[number, number]>; goal: [number, number] | null }} MiniMap The house from above with north (+y) up. */
 /** @typedef {{ checklist_title: string; checklist: Array<ChecklistItem>; bins: Array<BinEntry>; inventory: [InventorySlot | null, InventorySlot]; message: HudMessage | null; markers: Array<Marker>; rerouted: boolean; delivered: number; total: number; clock: number | null; pointer: Pointer | null; minimap: MiniMap | null; scroll: number }} HudState Everything that is shown. */
