@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from experiments.record.columns import HEALTH
-from experiments.record.events import OUTCOMES, TYPES, LoggedEvent, OutcomeEvent
+from experiments.record.event_check import OUTCOMES, OutcomeEvent
+from experiments.record.events import TYPES, LoggedEvent
 from experiments.record.health import COUNTED
 from experiments.record.metrics import Metrics
 from experiments.trials.trial_config import SETTINGS, TrialConfig

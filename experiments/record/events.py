@@ -1,11 +1,10 @@
 """The events of a log, one type for each kind of line of `events.jsonl`; docs/data.md is made from them."""
 
-from typing import Annotated, Literal, Union
+from typing import Annotated, Literal
 
 import msgspec
 
-from experiments.errors import RecordError
-from mjsim.actions import EventKind, Refusal
+from mjsim.actions import Refusal
 from planner.plan import Status, VisitKind
 
 Seconds = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -281,28 +280,6 @@ class DisplayEvent(LoggedEvent, frozen=True):
     wall: float
 
 
-class GapEvent(LoggedEvent, frozen=True):
-    """The page was silent; from 1 s on the clock stood and nothing was held.
-
-    Attributes:
-        seconds: For how long, s.
-        wall: When it was heard again, s since 1970.
-    """
-
-    seconds: float
-    wall: float
-
-
-class RestartedEvent(LoggedEvent, frozen=True):
-    """The process that simulates the session had died; another one continued from the last state on the disk.
-
-    Attributes:
-        wall: When, s since 1970.
-    """
-
-    wall: float
-
-
 class EndEvent(LoggedEvent, frozen=True):
     """Last line.
 
@@ -318,44 +295,3 @@ class EndEvent(LoggedEvent, frozen=True):
 
 
 TYPES = tuple(LoggedEvent.__subclasses__())  # so far
-
-
-class OutcomeEvent(LoggedEvent, frozen=True):
-    """Something happened in the world.
-
-    Attributes:
-        object: The object.
-        receptacle: The receptacle concerned, or null.
-    """
-
-    object: str
-    receptacle: str | None
-
-
-OUTCOMES = {
-    EventKind.PICKED: "an object was gripped and lifted",
-    EventKind.PICK_FAILED: "a pick started but did not succeed",
-    EventKind.PLACED: "an object came to rest in its receptacle",
-    EventKind.PLACE_FAILED: "a place started, but the object did not end up in the receptacle",
-    EventKind.GRIP_LOST: "a carried object slipped out of a hand",
-    EventKind.DISLODGED: "a delivered object left its receptacle again",
-    EventKind.EJECTED: "an object was faster than anything could throw it (docs/health.md)",
-    EventKind.TUNNELLED: "an object went through something solid (docs/health.md)",
-}
-_OUTCOME_TYPES = [
-    msgspec.defstruct(kind.name, [], bases=(OutcomeEvent,), frozen=True, tag_field="event", tag=kind.value)
-    for kind in EventKind
-]
-_DECODER: msgspec.json.Decoder[LoggedEvent] = msgspec.json.Decoder(Union[(*TYPES, *_OUTCOME_TYPES)])
-
-
-def check_event(line: bytes) -> None:
-    """Check that a line of a log is an event with the fields of its kind.
-
-    Raises:
-        RecordError: It is not; the message says where.
-    """
-    try:
-        _DECODER.decode(line)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise RecordError(f"events.jsonl has a line that is no event: {error}") from error

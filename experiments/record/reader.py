@@ -22,7 +22,7 @@ from experiments.record.columns import (
     row_type,
     trajectory_layout,
 )
-from experiments.record.events import check_event
+from experiments.record.event_check import check_event
 from experiments.record.files import read_arrays
 from experiments.record.journal import Entry, Header
 from experiments.record.records import Event, EventLog

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from experiments.record import records
-from experiments.record.events import check_event
+from experiments.record.event_check import check_event
 from experiments.record.files import read_json
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig

@@ -93,7 +93,7 @@ export const REPLACED = {
 /** @type {Dialog} */
 export const OFFLINE = {
   title: "No connection",
-  texts: ["The clock stands. This page reconnects by itself. Nothing is lost."],
+  texts: ["The clock is paused. This page reconnects by itself. Nothing is lost."],
 };
 
 /** @type {Dialog} */

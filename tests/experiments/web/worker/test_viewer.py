@@ -1,4 +1,4 @@
-"""What a page is told while the clock stands and while it runs."""
+"""What a page is told while the clock is paused and while it runs."""
 
 from types import SimpleNamespace
 
@@ -17,7 +17,7 @@ CONFIG = TrialConfig(objects=3, assistance="guided", seed=3, user="human", live=
 
 @pytest.fixture
 def shown(tmp_path, house):
-    """A viewer of a session, what it sent, and a drawer that can be told that the clock stands."""
+    """A viewer of a session, what it sent, and a drawer that can be told that the clock is paused."""
     sent = []
     viewer = BrowserViewer(sent.append)
     live = LiveSession(open_journal(tmp_path), house, CONFIG, viewer)
