@@ -18,11 +18,10 @@ from experiments.house import House
 from experiments.record import records
 from experiments.record.records import EventLog
 from experiments.record.run_directory import check_file
-from experiments.record.topdown import planned_path, task_picture
 from experiments.session.endings import LeaveSession
 from experiments.session.film_config import FilmConfig
 from experiments.session.first_person import FirstPersonRenderer
-from experiments.trials.setup import prepare_session, prepared_planner, trial_episode
+from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from hud.projection import CameraView
@@ -242,7 +241,6 @@ SHOTS = (
     Shot("none", TrialConfig(objects=12, assistance="none", seed=0), after(6.0)),
 )
 SHEET = "contact_sheet.png"
-LEVELS, LEVEL_OBJECTS = "levels.png", (6, 12, 18, 24)  # the paper's levels of difficulty
 WALK = TrialConfig(objects=6, assistance="optimal", seed=0, fidelity="event")  # of the floor plan
 
 
@@ -287,31 +285,6 @@ def make_gallery(
                 yield out / f"{condition}_{key}.png"
     save_png(out / SHEET, contact_sheet(CONDITIONS, taken))
     yield out / SHEET
-
-
-def make_levels(out: Path, seed: int, *, replace: bool) -> Path:
-    """Draw the paper's four levels of one house, with the shortest way in the first; returns the path of the picture.
-
-    Raises:
-        RecordError: The picture exists already.
-    """
-    path = out / LEVELS
-    check_file(path, replace=replace)
-    pictures = []
-    for objects in LEVEL_OBJECTS:
-        config = TrialConfig(objects=objects, assistance="optimal", seed=seed)
-        house = House.load(config.house)
-        episode, way = trial_episode(config, house), None
-        if objects == LEVEL_OBJECTS[0]:
-            with contextlib.closing(prepared_planner(config, house, episode)) as planner:
-                route = planner.route
-            assert route is not None  # noqa: S101 - it was prepared
-            visits = [(visit.kind.value, visit.object) for visit in route.visits]
-            way = planned_path(house, episode, {"visits": visits})
-        pictures.append(task_picture(house, episode, f"{objects} objects", way))
-    out.mkdir(parents=True, exist_ok=True)
-    save_png(path, np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])]))
-    return path
 
 
 def _fail(warning: str) -> None:

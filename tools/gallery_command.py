@@ -37,7 +37,8 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Take the pictures."""
     from experiments.cli.terminal import error_console
-    from tools.gallery import make_gallery, make_levels
+    from tools.gallery import make_gallery
+    from tools.levels import make_levels
 
     if arguments.what == "levels":
         path = make_levels(arguments.out, arguments.seed, replace=arguments.force)

@@ -1,0 +1,40 @@
+"""The paper's figure of its four levels of difficulty."""
+
+import contextlib
+from pathlib import Path
+
+import numpy as np
+
+from experiments.house import House
+from experiments.record.run_directory import check_file
+from experiments.record.topdown import planned_path, task_picture
+from experiments.trials.setup import prepared_planner, trial_episode
+from experiments.trials.trial_config import TrialConfig
+from tools.gallery import save_png
+
+LEVELS, LEVEL_OBJECTS = "levels.png", (6, 12, 18, 24)
+
+
+def make_levels(out: Path, seed: int, *, replace: bool) -> Path:
+    """Draw the paper's four levels of one house, with the shortest way in the first; returns the path of the picture.
+
+    Raises:
+        RecordError: The picture exists already.
+    """
+    path = out / LEVELS
+    check_file(path, replace=replace)
+    pictures = []
+    for objects in LEVEL_OBJECTS:
+        config = TrialConfig(objects=objects, assistance="optimal", seed=seed)
+        house = House.load(config.house)
+        episode, way = trial_episode(config, house), None
+        if objects == LEVEL_OBJECTS[0]:
+            with contextlib.closing(prepared_planner(config, house, episode)) as planner:
+                route = planner.route
+            assert route is not None  # noqa: S101 - it was prepared
+            visits = [(visit.kind.value, visit.object) for visit in route.visits]
+            way = planned_path(house, episode, {"visits": visits})
+        pictures.append(task_picture(house, episode, f"{objects} objects", way))
+    out.mkdir(parents=True, exist_ok=True)
+    save_png(path, np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])]))
+    return path
