@@ -1,6 +1,7 @@
 """Damaged, forged, swapped and truncated run directories: a replay notices every one, in one line."""
 
 import json
+import math
 import pickle
 import shutil
 
@@ -114,6 +115,10 @@ def forged_values(value):
     return [other for other in [*others, None, {}] if other != value]
 
 
+def is_json(value):
+    return not isinstance(value, float) or math.isfinite(value)
+
+
 def derived_faults(folder):
     """What is wrong with files that follow from log and trajectory; needs no simulation."""
     record = read_run(folder)
@@ -128,8 +133,10 @@ def test_every_field_of_the_metrics_is_checked(copy, house):
     assert len(metrics) > 50 + len(CIRCUMSTANCES)
     for number, name in enumerate(metrics):
         values = forged_values(metrics[name])
-        write_json(path, {**metrics, name: values[number % len(values)]})
+        value = values[number % len(values)]
+        write_json(path, {**metrics, name: value})
         fault = "is not the file that was written" if name in CIRCUMSTANCES else f"has {name} = "
+        fault = fault if is_json(value) else f"{path} is not JSON"
         assert derived_faults(copy).startswith(f"metrics.json {fault}")
     for others in ({**metrics, "score": 9}, {name: metrics[name] for name in [*metrics][1:]}):
         write_json(path, others)
@@ -143,7 +150,8 @@ def test_every_field_of_the_plans_is_checked(copy, house):
     for name in plans[0]:
         for value in forged_values(plans[0][name]):
             path.write_text(json.dumps([{**plans[0], name: value}, *plans[1:]]))
-            assert derived_faults(copy).startswith("plan.json does not hold the plans of the log")
+            fault = "does not hold the plans of the log" if is_json(value) else f"{path} is not JSON"
+            assert derived_faults(copy).startswith(f"plan.json {fault}")
     write_json(path, plans[:-1])
     write_checksums(copy, records.FILES)
     assert "plan.json does not hold the plans of the log" in str(fault_of(copy, house))
