@@ -188,7 +188,7 @@ def pool(count=250, seed=0):
         for _ in range(count):
             follows, words = rng.random(2).tolist()
             away = 1 - follows if condition == "optimal" else 1.0
-            means, spreads = [0.4 * away, 0.9 - 0.2 * away, 60 + 20 * away, 200], [0.08, 0.1, 12, 50]
+            means, spreads = [0.3 + 0.4 * away, 0.9 - 0.2 * away, 60 + 20 * away, 200], [0.08, 0.1, 12, 50]
             given = {"behaviour_compliance_follows": follows, "behaviour_timing_words": words}
             rows.append(person(condition, rng.normal(means, spreads), **given))
     return rows
