@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from planner.exact.deadline import Deadline
+from planner.exact.full_table import SMALL_TABLE, by_table, full_table_bytes
 from planner.exact.instance import Instance, make_instance, to_visits
-from planner.exact.table import BIN_ROWS, SMALL_TABLE, Solution, by_table, full_table_bytes
+from planner.exact.table import BIN_ROWS, Solution
 from planner.exact.warm_start import Start, WarmStart
 from planner.plan import Plan
 from planner.problem import RoutingProblem

@@ -14,23 +14,19 @@ many are left; any of a group may then be picked, though none twice in a row. Ea
 more; subtracting the multipliers of U gives a lower bound of the cost-to-go from every U, for any multipliers and
 groups. With each object in a group of its own and no multipliers the table is exact.
 
-This module needs numpy alone. It fills and follows small tables itself where numba, which takes 0.5 s to load, is not
-loaded; the kernels fill in the same numbers.
+This module needs numpy alone; `planner.exact.table_kernels` fills in the same numbers.
 """
 
 import math
-import sys
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.certificate import Certificate, Proof
+from planner.certificate import Certificate
 from planner.exact.instance import FAR, Instance
 
-COMPILER = "numba"
-SMALL_TABLE = 1 << 23  # bytes, 14 objects and 6 bins: filled in 10 ms by kernels, in 50 by numpy
 BIN_ROWS = 50_000  # of a table that counts objects by bin: 30 objects and 6 bins
 SPARE = 8  # entries behind the last row: kernels read eight at a time
 # Units of the longest leg, and of a price, with which tours of 40 objects fit in int32, and in int64.
@@ -98,43 +94,6 @@ def _longest(inst: Instance) -> int:
     """The longest leg between objects and bins, units."""
     longest = max(legs.max(initial=0) for legs in (inst.to_bin, inst.from_bin, inst.bins))
     return int(np.where(inst.between < FAR, inst.between, 0).max(initial=longest))
-
-
-def full_table_bytes(inst: Instance) -> int:
-    """Memory of the full table in int32, about."""
-    n, m = inst.to_bin.shape
-    return int(8 * (m * m + n) << n)
-
-
-def by_table(inst: Instance) -> Solution:
-    """Fill the full table and follow a shortest tour."""
-    table = filled_table(inst)
-    length, actions = follow(inst, table, len(table.bin) - 1)
-    return Solution(actions, length, Certificate(Proof.FULL_TABLE, inst.unit, length))
-
-
-def filled_table(inst: Instance) -> Table:
-    """The full table."""
-    table = new_table(inst, np.arange(len(inst.home)))
-    if COMPILER in sys.modules or full_table_bytes(inst) > SMALL_TABLE:
-        from planner.exact.table_kernels import fill  # loaded only where it is needed
-
-        fill(inst, table)
-    else:
-        fill_layers(inst, table)
-    return table
-
-
-def follow(inst: Instance, table: Table, row: int) -> tuple[int, list[int]]:
-    """Length of a shortest tour by a full table, and its actions as in `Solution`; `row` is that of the root."""
-    actions: NDArray[np.int64] = np.empty(2 * len(inst.home) + 2, np.int64)
-    if COMPILER in sys.modules:
-        from planner.exact.table_kernels import walk as compiled_walk  # loaded only where it is needed
-
-        length, count = compiled_walk(inst, table, row, actions)
-    else:
-        length, count = walk(inst, table, row, actions)
-    return int(length), actions[:count].tolist()
 
 
 def fill_layers(inst: Instance, table: Table) -> None:

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.certificate import Certificate, Proof
+from planner.exact.full_table import filled_table, follow
 from planner.exact.instance import FAR, Instance, make_instance, to_visits
-from planner.exact.table import Table, filled_table, follow
+from planner.exact.table import Table
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
 from planner.tour import make_plan

@@ -25,7 +25,7 @@ class BrowserSocket:
     """An accepted connection of a browser. A separate task sends the messages in order."""
 
     def __init__(self, socket: WebSocket) -> None:
-        self._tab = ""
+        self.tab = ""
         self._socket = socket
         self._waiting: asyncio.Queue[WireMessage | tuple[int, str]] = asyncio.Queue()
         self._allowed, self._at = BURST, time.monotonic()
@@ -79,7 +79,7 @@ class BrowserSocket:
             self.send(State(OVER))
             self.send(Saved())
             return
-        self._tab = hello.tab
+        self.tab = hello.tab
         await self._wait_for_place(session)
         session.attach(self, hello.view)
         while True:
@@ -97,7 +97,7 @@ class BrowserSocket:
     async def _wait_for_place(self, session: PlayedSession) -> None:
         """Wait until no other page has the session, or this one is to take it over."""
         until = time.monotonic() + CLOSE_TIMEOUT
-        while (before := session.browser) is not None and before._tab != self._tab:
+        while (before := session.browser) is not None and before.tab != self.tab:
             if time.monotonic() < until:
                 await asyncio.sleep(0.05)
                 continue

@@ -4,25 +4,46 @@ import asyncio
 import logging
 import time
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import msgspec
 
 from experiments.web import protocol
-from experiments.web.protocol import Error, Inputs, Leave, Open, Pause, Run, Saved, State, Taken, View
+from experiments.web.protocol import (
+    Error,
+    Inputs,
+    Leave,
+    Open,
+    Pause,
+    Run,
+    Saved,
+    State,
+    Taken,
+    View,
+    WireMessage,
+)
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.pool import WorkerPool, WorkerProcess
 from experiments.web.server.visits import PLAYED, Visit
 from experiments.web.state import FAILED, LOADING, READY, Trigger
-
-if TYPE_CHECKING:
-    from experiments.web.server.browser_socket import BrowserSocket
 
 LOG = logging.getLogger("mjsim.play")
 MAX_CRASHES = 3  # of workers in a row, without an input taken in between, after which a session fails
 QUEUE_TIMEOUT = 10.0  # s that a place in the queue is kept without a connection
 MAX_AHEAD = 1000  # inputs that may be on their way
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
+
+
+class Browser(Protocol):
+    """A connection to a page, of which each tab has one at a time."""
+
+    tab: str
+
+    def send(self, message: WireMessage) -> None:
+        """Send a message, without waiting."""
+
+    def close(self, code: int, reason: str) -> None:
+        """Close the connection once all is sent."""
 
 
 class PlayedSession:
@@ -37,7 +58,7 @@ class PlayedSession:
 
     def __init__(self, visit: Visit, pool: WorkerPool, limit: SessionLimit) -> None:
         self.visit = visit
-        self.browser: BrowserSocket | None = None
+        self.browser: Browser | None = None
         self.heard = time.monotonic()
         self.state = State()
         self._pool, self._limit = pool, limit
@@ -45,7 +66,7 @@ class PlayedSession:
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
 
-    def attach(self, browser: "BrowserSocket", view: View) -> None:
+    def attach(self, browser: Browser, view: View) -> None:
         """Connect a browser; it replaces the one before."""
         if self.browser is not None:
             self.browser.send(protocol.Replaced())
@@ -60,7 +81,7 @@ class PlayedSession:
         else:
             browser.send(self.state)
 
-    def detach(self, browser: "BrowserSocket") -> None:
+    def detach(self, browser: Browser) -> None:
         """A browser is gone; the session is paused until one is back."""
         if self.browser is not browser:
             return

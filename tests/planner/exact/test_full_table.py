@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planning_cases import random_problem
 
-from planner.exact import table as tables
+from planner.exact import full_table
+from planner.exact.full_table import by_table
 from planner.exact.instance import FAR, make_instance
-from planner.exact.table import by_table, fill_layers, new_table, walk
+from planner.exact.table import fill_layers, new_table, walk
 from planner.exact.table_kernels import fill
 from planner.exact.table_kernels import walk as compiled_walk
 
@@ -46,7 +47,7 @@ def test_numpy_and_the_kernels_fill_in_and_follow_the_same(seed, n, onboard, bin
 def test_a_table_is_the_same_before_and_after_the_kernels_are_loaded(monkeypatch):
     instance = instance_of(3, 9, 1, 4, True)
     loaded = by_table(instance)
-    monkeypatch.setattr(tables, "COMPILER", "not loaded")
+    monkeypatch.setattr(full_table, "COMPILER", "not loaded")
     assert by_table(instance) == loaded
 
 
