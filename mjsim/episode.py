@@ -134,7 +134,7 @@ class _Header(msgspec.Struct):
 
 
 def _check_fields(raw: dict[str, Any]) -> None:
-    """Raise an EpisodeError where an episode of JSON values holds what nobody reads."""
+    """Raise an EpisodeError if the JSON of an episode has an unknown field."""
     tables = [(Episode, "episode", raw), (StartPose, "start", raw["start"])]
     tables += [(PlacedObject, f"objects[{k}]", table) for k, table in enumerate(raw["objects"])]
     for kind, place, table in tables:

@@ -40,7 +40,7 @@ class LeaveOneOut:
     reason: str
     leaves_out: int  # people
     alone: int  # people whom no other rule leaves out: they are back without it
-    changes: tuple[Change, ...]  # of every test; empty where nobody is back
+    changes: tuple[Change, ...]  # of every test; empty where the rule changes no one's inclusion
     refused: str | None = None  # why there are no results without it
 
 
@@ -61,7 +61,7 @@ def leave_one_out(
             changes = tuple(
                 _change(key, tests.get(key), others.get(key)) for key in {**tests, **others} if alone
             )
-        except RecordError as error:  # somebody is left out because of a value that cannot be
+        except RecordError as error:  # the rule leaves out an impossible value, which is refused without it
             refused = str(error)
         found.append(LeaveOneOut(rule, reason, len(theirs), alone, changes, refused))
     return found
@@ -136,7 +136,7 @@ def _left_out(people: StudyTable, found: Sequence[LeaveOneOut]) -> Iterator[Bloc
         [(gap.measure, gap.value, len(gap.people), ", ".join(gap.people)) for gap in people.gaps],
     )
     if not people.left_out and not people.gaps:
-        yield Paragraph("Nobody.")
+        yield Paragraph("No one.")
     yield table(
         ("rule", "reason", "leaves out", "by it alone", "decisions at .05 that change without it"),
         [

@@ -82,7 +82,7 @@ class StudyTable:
         return {c: v for c, v in found.items() if len(v)}
 
     def visits(self) -> NDArray[np.int64]:
-        """Visits that each made, (n,): two per object for who delivered everything, where the table lacks `visits`."""
+        """Visits of each person, (n,); without a column `visits`, two per object if all were delivered."""
         told = zip(self.rows, (2 * self.objects).tolist(), strict=True)
         whole = [
             (row.get("visits"), usual * (row.get("ended", ALL_DELIVERED) == ALL_DELIVERED))

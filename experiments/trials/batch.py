@@ -156,7 +156,7 @@ def _died(path: Path) -> Path:
 def _together(
     pool: Executor, left: dict[Path, TrialConfig], alone: dict[Path, TrialConfig], workers: int
 ) -> Iterator[str | None]:
-    """Take trials from those left, a few at a time; where a process dies, all that were begun are to run alone."""
+    """Run the trials that are left, a few at a time; when a process dies, those in progress are moved to `alone`."""
     running: dict[Future[str | None], tuple[Path, TrialConfig]] = {}
     whole = True
     while True:

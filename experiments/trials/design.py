@@ -129,7 +129,7 @@ def read_exclusions(path: Path) -> Exclusions:
     if "cells" in content:
         found = read_design(path).exclusions
         if found is None:
-            raise ConfigError(f"{path} has no table [exclusions]; it leaves nobody out")
+            raise ConfigError(f"{path} has no table [exclusions]; add one, or leave out --exclude")
         return found
     try:
         return msgspec.convert(content, Exclusions)

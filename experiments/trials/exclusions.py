@@ -68,7 +68,7 @@ UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 
 
 class Person(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Somebody who is left out by name, and why."""
+    """A person left out by id, and the reason."""
 
     id: Name | int  # in one of the columns `IDS`
     reason: Reason
@@ -95,7 +95,7 @@ class Exclusions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Somebody who is left out."""
+    """A person who is left out."""
 
     person: str
     assistance: str

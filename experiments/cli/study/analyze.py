@@ -16,8 +16,8 @@ each in one cell of assistance x number of objects. Writes
   people.parquet, .csv    a row per person
   tests.csv               a row per F test
 
-Who did not finish is left out, and so are those whom --exclude names, by rules over columns or one by one; the report
-says who, why, and how results change without each rule.
+People who did not finish are left out, and so are those that --exclude selects by rules over columns or by id; the
+report lists them, the reasons, and how results change without each rule.
 
 Which column stands for which measure is fixed in experiments/study/designs/metrics.toml. docs/study.md explains how
 to read it. All output from simulated people is marked as such."""

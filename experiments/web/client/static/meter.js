@@ -13,7 +13,7 @@ export class Meter {
   #came = 0;
   #bytes = 0;
   #last = 0; // when the last frame was shown, ms
-  #begun = performance.now();
+  #start = performance.now();
 
   /** @param {number} number of an input */
   sent(number) {
@@ -41,7 +41,7 @@ export class Meter {
   /** What was measured since the last call. */
   take() {
     const now = performance.now();
-    const seconds = Math.max(0.001, (now - this.#begun) / 1000);
+    const seconds = Math.max(0.001, (now - this.#start) / 1000);
     const found = {
       frames_per_s: rounded(this.#shown / seconds),
       frame_ms: rounded(quantile(this.#gaps, 0.5) ?? 0),
@@ -53,7 +53,7 @@ export class Meter {
     this.#trips = [];
     this.#gaps = [];
     this.#shown = this.#came = this.#bytes = 0;
-    this.#begun = now;
+    this.#start = now;
     return found;
   }
 }
