@@ -60,7 +60,7 @@ class House:
         """Compile a house and compute where the usual person can walk.
 
         Args:
-            name: Name under `models/houses`, or the path of a `catalogue.toml`.
+            name: Name under `models/houses`, or the path of a `catalogue.toml` or its folder.
 
         Raises:
             AssetError: The house cannot be read, does not compile, or breaks a convention of docs/models.md.

@@ -28,7 +28,11 @@ def add_parser(commands: Any) -> None:
     add("--category", required=True, metavar="NAME", help="of the house; its bin takes the object")
     add("--out", type=Path, required=True, metavar="DIR", help="folder of the catalogue, new or not")
     add("--name", metavar="NAME", help="shown to the person (default: the name of the file)")
-    add("--house", metavar="NAME", help="house to extend, or its catalogue.toml (default: apartment)")
+    add(
+        "--house",
+        metavar="NAME",
+        help="house to extend, or its catalogue.toml or folder (default: apartment)",
+    )
     add("--force", action="store_true", help="replace an object of the same name")
     shape = parser.add_argument_group("what the file does not say")
     shape.add_argument("--units", choices=tuple(UNITS), help="default: m in glTF, else guessed from the size")

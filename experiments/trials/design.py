@@ -22,6 +22,7 @@ from experiments.trials.trial_config import (
     episode_settings,
 )
 from mjsim.files import read_text
+from mjsim.model.catalogue_files import house_name
 
 MAX_NUMBERS = 1_000_000
 
@@ -161,8 +162,8 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
     settings = {name: value for name, value in values.items() if name in SETTINGS}
     people = msgspec.convert({n: v for n, v in values.items() if n not in SETTINGS}, _People).each()
     for name in PATHS:
-        if isinstance(path := settings.get(name), str) and (name != "house" or path.endswith(".toml")):
-            settings[name] = str(folder / path)
+        if isinstance(path := settings.get(name), str):
+            settings[name] = house_name(path, folder) if name == "house" else str(folder / path)
     if isinstance(settings.get("phases"), list):
         settings["phases"] = ",".join(map(str, settings["phases"]))
     if "episode" in settings:

@@ -14,6 +14,7 @@ from experiments.participants.distribution import Distributions
 from experiments.record.phases import STORY, TASK, TRAINING, phases_of
 from experiments.trials.person import check_person
 from mjsim.episode import CAPACITY, POINTS, Episode
+from mjsim.model.catalogue_files import house_name
 from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solver import DEFAULT_SOLVER
 
@@ -44,7 +45,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     assistance: Annotated[str, _about("Assistance condition.", metavar="NAME")]
     user: Annotated[str, _about("Participant.", metavar="NAME")] = DEFAULT_PARTICIPANT
     house: Annotated[
-        str, _about("Name of a house, or path of its catalogue.toml.", metavar="NAME", path=True)
+        str, _about("Name of a house, or path of its catalogue.toml or folder.", metavar="NAME", path=True)
     ] = "apartment"
     planner: Annotated[str, _about("Solver of the routing problem.", metavar="NAME")] = DEFAULT_SOLVER
     time_limit: Annotated[
@@ -154,6 +155,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
                 self._set(name, seed)
             _check_seed(name if getattr(self, name) != seed else "seed", getattr(self, name))
         self._set("seed", None)
+        self._set("house", house_name(self.house))
         for name in PATHS:
             if (path := getattr(self, name)) is not None and (name != "house" or path.endswith(".toml")):
                 self._set(name, str(Path(path).absolute()))

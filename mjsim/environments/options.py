@@ -32,7 +32,7 @@ class EnvironmentOptions:
     """Options of both `mjsim.make` and `gymnasium.make`.
 
     Attributes:
-        house: Name under `models/houses`, or path of a `catalogue.toml`.
+        house: Name under `models/houses`, or path of a `catalogue.toml` or its folder.
         objects: Number of misplaced objects; or (min, max), from which each episode draws its own.
         observations: Names of sensors or bundles, or custom `Sensor` values (docs/environments.md).
         actions: `continuous`, `discrete` or a custom `Control`.

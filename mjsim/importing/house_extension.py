@@ -17,11 +17,11 @@ from mjsim.importing.model_writer import MODEL
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.catalogue_files import CATALOGUE, house_name
 from mjsim.model.house import compiled_house
 from mjsim.model.validation.findings import errors, one_line
 from mjsim.model.validation.object_rules import check_object
 
-CATALOGUE = "catalogue.toml"
 HELD = 4  # objects of a kind that a bin has room for, by their boxes
 MAX_LABEL = 40
 _UNNAMED = ".unnamed"  # file in the folder of an object that the catalogue does not name yet
@@ -173,4 +173,5 @@ class HouseExtension:
 
 def _reference(house: str, folder: Path) -> str:
     """A house as a catalogue in a folder names it: a name, or a path from there."""
-    return os.path.relpath(Path(house).resolve(), folder.resolve()) if house.endswith(".toml") else house
+    name = house_name(house)
+    return os.path.relpath(Path(name).resolve(), folder.resolve()) if name.endswith(".toml") else name

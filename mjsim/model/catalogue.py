@@ -10,7 +10,7 @@ import msgspec
 from mjsim.errors import AssetError, brief
 from mjsim.files import is_file
 from mjsim.model.assets import models_root
-from mjsim.model.catalogue_files import catalogue_path, read_tables
+from mjsim.model.catalogue_files import catalogue_path, house_name, read_tables
 from mjsim.model.model_files import content_hash
 
 T = TypeVar("T")
@@ -90,7 +90,7 @@ class Catalogue:
         """Read and check the catalogue of a house.
 
         Args:
-            house: Name of a folder under `models/houses`, or the path of a `catalogue.toml`.
+            house: Name of a folder under `models/houses`, or the path of a `catalogue.toml` or its folder.
 
         Raises:
             AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused
@@ -98,7 +98,7 @@ class Catalogue:
         """
         path = catalogue_path(house)
         tables, text = read_tables(path)
-        return _Reader(path, tables).catalogue(house, text)
+        return _Reader(path, tables).catalogue(house_name(house), text)
 
 
 _Text = Annotated[str, msgspec.Meta(pattern=r"\S")]  # not blank

@@ -8,22 +8,43 @@ from mjsim.errors import AssetError, brief
 from mjsim.files import is_file, read_text
 from mjsim.model.assets import models_root
 
+CATALOGUE = "catalogue.toml"
 MAX_EXTENDS = 20  # catalogues, each of which extends the next
 
 
-def catalogue_path(house: str, folder: Path = Path()) -> Path:
-    """File of a catalogue, given the name of a house, or a path from `folder`; `AssetError` where there is none."""
+def house_name(house: str, folder: Path = Path()) -> str:
+    """A house as it is recorded: by its name if it comes with the package, else by the path of its catalogue.
+
+    Args:
+        house: Name of a house, path of a `catalogue.toml`, or of the folder that holds one.
+        folder: Folder that relative paths start from.
+    """
     if house.endswith(".toml"):
-        path = folder / house
-        if not is_file(path):
-            raise AssetError(f"no catalogue at {path}; give a house name or the path of a catalogue.toml")
-        return path.resolve()
+        return str(folder / house)
+    is_path = Path(house).name != house
+    if house and (is_path or not is_file(models_root() / "houses" / house / CATALOGUE)):
+        path = folder / house / CATALOGUE
+        if is_path or is_file(path):
+            return str(path)
+    return house
+
+
+def catalogue_path(house: str, folder: Path = Path()) -> Path:
+    """File of a catalogue, given as `house_name` takes it; `AssetError` where there is none."""
+    name = house_name(house, folder)
+    if name.endswith(".toml"):
+        if not is_file(Path(name)):
+            raise AssetError(
+                f"no catalogue at {name}; give a house name, or the path of a {CATALOGUE} or its folder"
+            )
+        return Path(name).resolve()
     houses = models_root() / "houses"
-    path = houses / house / "catalogue.toml"
-    # A name with a separator would leave the folder of houses: that is a path, and paths end in .toml.
-    if Path(house).name != house or not is_file(path):
-        known = sorted(p.parent.name for p in houses.glob("*/catalogue.toml"))
-        raise AssetError(f"no house {house!r}; there are {known}, or give the path of a catalogue.toml")
+    path = houses / name / CATALOGUE
+    if not name or not is_file(path):
+        known = sorted(p.parent.name for p in houses.glob(f"*/{CATALOGUE}"))
+        raise AssetError(
+            f"no house {house!r}; there are {known}, or give the path of a {CATALOGUE} or its folder"
+        )
     return path
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from mjsim.episode import POINTS, Episode
 from mjsim.errors import AssetError, EpisodeError, PhysicsError, SamplingError
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.catalogue_files import CATALOGUE
 from mjsim.model.house import CompiledHouse, compiled_house
 from mjsim.model.model_files import elements
 from mjsim.model.sampling import points_that_fit, sample_episode
@@ -20,8 +21,6 @@ from mjsim.model.validation.object_rules import check_object
 from mjsim.model.validation.receptacle_rules import check_receptacle
 from mjsim.model.validation.validate import check_house, require_usable
 from mjsim.model.validation.views import Drawing, floor_view, side_views
-
-CATALOGUE = "catalogue.toml"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,16 @@
 """The catalogue: what ships is complete, and every mistake in a file is reported by name."""
 
+import shutil
+from pathlib import Path
+
 import pytest
 
 import mjsim.model.assets
+from experiments.trials.trial_config import TrialConfig
 from mjsim.errors import AssetError
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.catalogue_files import house_name
 
 SHIPPED = models_root() / "houses" / "apartment" / "catalogue.toml"
 
@@ -89,6 +94,20 @@ def test_a_mistake_is_reported_with_the_file_and_the_culprit(copy, mistake):
 def test_an_unknown_house_is_reported_by_name(house):
     with pytest.raises(AssetError, match=r"house name|no house"):
         Catalogue.load(house)
+
+
+def test_a_house_may_be_named_by_its_folder(tmp_path, monkeypatch):
+    shutil.copytree(models_root() / "houses" / "apartment", tmp_path / "mine")
+    monkeypatch.chdir(tmp_path)
+    file = str(Path("mine", "catalogue.toml"))
+    assert Catalogue.load("mine") == Catalogue.load("./mine") == Catalogue.load(file)
+    assert (Catalogue.load("mine").name, house_name("apartment")) == (file, "apartment")
+    assert (
+        TrialConfig(objects=2, house="mine").house
+        == TrialConfig(objects=2, house=file).house
+        == str(tmp_path / file)
+    )
+    assert not Catalogue.load("mine").is_shipped
 
 
 def test_an_installed_package_prefers_the_models_it_carries(tmp_path, monkeypatch):
