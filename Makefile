@@ -11,8 +11,10 @@ WORKERS ?= auto
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
 
-demo: $(READY) ## Set up, then film an assisted clean-up into runs/demo
-	$(BIN)/mjsim run --objects 6 --assistance guided --seed 0 --out runs/demo
+demo: $(READY) ## Set up, simulate an assisted clean-up into runs/demo, then film it
+	$(BIN)/mjsim run --objects 6 --assistance guided --seed 0 --no-video --force --out runs/demo
+	@echo "Look at runs/demo/topdown.png while the film is made."
+	$(BIN)/mjsim replay runs/demo --video runs/demo.mp4 --force
 
 test: $(READY) ## Set up, then run the tests but for the slow ones; COVERAGE=1 measures what they cover
 	$(BIN)/python -m pytest -n $(WORKERS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered --cov-fail-under=0)
