@@ -1,7 +1,9 @@
 """The task itself: reset, step, observe. The dm_env and the Gymnasium environment are thin adapters of it."""
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +19,7 @@ from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.rewards import RewardFunction
 from mjsim.environments.sensors import SENSORS, Sensor, SensorInput
 from mjsim.environments.sensors.vision import visible_pixels
-from mjsim.errors import PhysicsError, SamplingError
+from mjsim.errors import ActionError, PhysicsError, SamplingError
 from mjsim.observation import ObjectStatus, Observation
 from mjsim.world import StepResult, World
 
@@ -43,6 +45,9 @@ class Rearrangement:
 
     `control` turns actions of the agent into those of the world. Where the physics fails, it raises, or truncates
     the episode with `truncate_on_physics_error`. `on_control_step`, if set, gets the world after every control step.
+
+    A copy, or what comes out of a pickle, is made by `rebuild`, and repeats the actions of the episode: compiled
+    models and motions under way cannot be pickled, and equal seeds and actions lead to equal states.
     """
 
     def __init__(
@@ -53,6 +58,7 @@ class Rearrangement:
         sensors: Sequence[Sensor],
         control: Control,
         reward: RewardFunction,
+        rebuild: Callable[[], "Rearrangement"],
         truncate_on_physics_error: bool = False,
     ) -> None:
         self.layout = layout
@@ -61,13 +67,19 @@ class Rearrangement:
         self.on_control_step: Callable[[World], None] | None = None
         self._episodes = episodes
         self._reward = reward
+        self._rebuild = rebuild
         self._truncate_on_error = truncate_on_physics_error
         self._own_sensors = [s for s in self.sensors if SENSORS.get(s.name) is not s]
         self._images = frozenset[str]().union(*(s.images for s in sensors))
         self._episode: CompiledEpisode | None = None
         self._seed = 0
+        self._actions: list[Any] = []  # of the episode, so far
         self._is_over = True
         self._last_observation: ObservationDict = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        progress = (self._seed, self._actions) if self._actions or not self._is_over else None
+        return _restored, (self._rebuild, progress)
 
     @property
     def observation_spec(self) -> dict[str, specs.Array]:
@@ -104,6 +116,7 @@ class Rearrangement:
     def prepare(self, seed: int) -> None:
         """Compile the episode of a seed before it is reset; raises as `reset`."""
         self._episode, self._is_over = self._episodes.get(seed), True
+        self._seed, self._actions = seed, []
 
     def reset(self, seed: int) -> tuple[ObservationDict, dict[str, Any]]:
         """Begin the episode of a seed; the observation and the info.
@@ -114,7 +127,7 @@ class Rearrangement:
             RenderError: Images were asked for and cannot be drawn.
         """
         self.prepare(seed)
-        self._seed, self._is_over = seed, False
+        self._is_over = False
         inputs = self._sensor_input(self.world.reset())
         return self._observe(inputs), self._info(inputs, ())
 
@@ -138,6 +151,7 @@ class Rearrangement:
         world = self.world
         if self._is_over:
             raise EnvironmentStateError("the episode is over; call reset before the next step")
+        self._actions.append(copy(action))  # the agent may write into its array again
         before = world.observation()
         steps, error = self._run(world, action, before)
         after = steps[-1].observation if steps else before
@@ -165,7 +179,7 @@ class Rearrangement:
 
     def close(self) -> None:
         """Free all compiled episodes; a later reset compiles them again."""
-        self._episode, self._is_over = None, True
+        self._episode, self._is_over, self._actions = None, True, []
         self._episodes.close()
 
     def _run(
@@ -253,6 +267,17 @@ class Rearrangement:
         elif "segmentation" in self._images:
             info["visible"] = visible_pixels(inputs)
         return info
+
+
+def _restored(rebuild: Callable[[], Rearrangement], progress: tuple[int, list[Any]] | None) -> Rearrangement:
+    core = rebuild()
+    if progress is not None:
+        seed, actions = progress
+        core.reset(seed)
+        for action in actions:
+            with contextlib.suppress(ActionError, PhysicsError):  # raised when they happened
+                core.step(action)
+    return core
 
 
 def _place(code: object) -> str:

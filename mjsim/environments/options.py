@@ -163,6 +163,7 @@ def build(options: EnvironmentOptions) -> Rearrangement:
         sensors=sensors,
         control=control,
         reward=reward,
+        rebuild=partial(build, options),
         truncate_on_physics_error=options.physics_errors == "truncate",
     )
 

@@ -1,6 +1,8 @@
 """Both public interfaces: conformance, seeding, ends of episodes, vectors, rendering, and errors."""
 
+import copy
 import math
+import pickle
 import warnings
 from types import SimpleNamespace
 from typing import Any
@@ -198,6 +200,25 @@ def test_reset_with_a_seed_repeats_the_episode_bit_for_bit():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_of_an_environment_continues_as_the_original_does(easy, duplicate):
+    env = gymnasium.make(ID, **easy)
+    assert duplicate(env).reset(seed=0)[1] == env.reset(seed=0)[1]
+    actions = np.random.default_rng(0).uniform(-1, 1, (12, 4))
+    for action in actions[:6]:  # a pick is under way by then
+        env.step(action)
+    other = duplicate(env)
+    for action in actions[6:]:
+        (one, *outcome), (two, *same) = env.step(action), other.step(action)
+        assert outcome == same
+        assert {k: v.tobytes() for k, v in one.items()} == {k: v.tobytes() for k, v in two.items()}
+    assert env.unwrapped.core.world.state_hash() == other.unwrapped.core.world.state_hash()
+    dm = mjsim.make(actions="discrete", **easy)
+    dm.reset()
+    dm.step(FORWARD)
+    assert duplicate(dm).step(PICK).observation["gps"].tolist() == dm.step(PICK).observation["gps"].tolist()
+
+
 def test_vectors_agree(easy):
     logs = []
     for mode, extra in (("sync", {}), ("async", {"context": "spawn"})):
