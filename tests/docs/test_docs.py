@@ -12,8 +12,10 @@ from pathlib import Path
 
 import hud_sample as sample
 import msgspec
+import nbformat
 import pytest
 from example_house import write_example_house
+from nbclient import NotebookClient
 from planning_cases import random_problem
 
 import mjsim
@@ -94,6 +96,21 @@ def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
     for row in json.loads(Path("my-house/toy_robot/report.json").read_text(encoding="utf-8")):
         cells = " | ".join((row["what"], row["choice"], row["reason"])).strip()
         assert f"| {cells} |" in page("import.md")
+
+
+@pytest.mark.slow
+def test_the_tutorial_runs(tmp_path):
+    notebook = nbformat.read(DOCS / "tutorial.ipynb", as_version=4)
+    assert not any(cell.get("outputs") for cell in notebook.cells), "clear the outputs; the site makes them"
+    for cell in notebook.cells:
+        for link in re.findall(r"\]\(([\w-]+\.md)\)", cell.source):
+            assert (DOCS / link).is_file(), link
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    assert sum("image/png" in output.get("data", {}) for output in outputs) == 4
+    printed = "".join(output.get("text", "") for output in outputs)
+    walked, slow = (float(x) for x in re.search(r"([\d.]+) s, and ([\d.]+) s", printed).groups())
+    assert walked + 12 < slow and "task_distance_m: -" in printed
 
 
 @pytest.mark.slow
