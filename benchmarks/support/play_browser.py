@@ -15,7 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from benchmarks.support.play_server import PATIENCE
-from experiments.web.protocol import FRAME_HEAD, MAX_INPUTS
+from experiments.web.protocol import BEAT_PERIOD, FRAME_HEAD, MAX_INPUTS
 
 RETRANSMISSION = 0.2  # s that a lost packet costs, as TCP sends it again
 
@@ -116,8 +116,9 @@ class SimulatedBrowser:
             compression=None,
             open_timeout=PATIENCE,
         )
-        self._tasks = [asyncio.create_task(self._send_all()), asyncio.create_task(self._receive_all())]
         self.say(type="hello", tab=self._tab, trial=trial, view=self._view)
+        doing = (self._send_all(), self._receive_all(), self._beat())
+        self._tasks = [asyncio.create_task(task) for task in doing]
 
     async def cut(self) -> None:
         """Lose the connection, without a word to the server."""
@@ -210,6 +211,11 @@ class SimulatedBrowser:
         self.say(type="leave")
         await self.until(lambda: "saved" in self.last)
         await self.close()
+
+    async def _beat(self) -> None:
+        while True:
+            self.say(type="beat")
+            await asyncio.sleep(BEAT_PERIOD)
 
     async def _send_all(self) -> None:
         with suppress(ConnectionClosed):

@@ -4,11 +4,13 @@ import argparse
 import fcntl
 import logging
 import os
+import resource
 import socket
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -33,6 +35,7 @@ from planner.solver import SOLVERS, solver
 
 OBJECTS = 6
 PORT = 8000
+MAX_FILES = 16384  # open files, sockets included
 TRAINING_LIMIT = 24 * 3600.0  # s; as good as none
 
 DESCRIPTION = """\
@@ -61,6 +64,13 @@ def add_parser(commands: Any) -> None:
     group.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at")
     group.add_argument(
         "--public-url", metavar="URL", help="URL under which a proxy makes the server public (docs/play.md)"
+    )
+    group.add_argument(
+        "--trusted-proxy",
+        type=_networks,
+        default=(),
+        metavar="ADDRESS,..",
+        help="addresses or networks of proxies whose X-Forwarded-For tells who asks (docs/play.md)",
     )
     group.add_argument("--no-open", action="store_true", help="open no browser")
     group.add_argument(
@@ -133,6 +143,10 @@ def _phases(arguments: argparse.Namespace) -> tuple[str, ...]:
 def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], listener: socket.socket) -> None:
     from experiments.web.server.pool import WorkerPool  # imported here, so that other commands start fast
 
+    os.umask(0o077)  # what people did is nobody else's business
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, MAX_FILES) if most > 0 else MAX_FILES, most))
+
     pool = WorkerPool(trials[TASK]["house"])
     pool.warm_up()  # in parallel to the imports that follow
 
@@ -140,6 +154,7 @@ def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], lis
 
     from experiments.web.protocol import MAX_TEXT
     from experiments.web.server.app import PlayConfig, PlayServer
+    from experiments.web.server.connections import QuickConnection
 
     phases = _phases(arguments)
     config = PlayConfig(
@@ -150,6 +165,7 @@ def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], lis
         idle=max(arguments.idle, 1.0),
         film=arguments.film,
         story=story_text(arguments.story) if STORY in phases else "",
+        proxies=arguments.trusted_proxy,
     )
     logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
     logging.getLogger("mjsim.play").setLevel(logging.INFO)
@@ -160,13 +176,15 @@ def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], lis
             access_log=False,  # paths hold tokens
             log_level="warning",
             server_header=False,
+            proxy_headers=False,  # the guards believe those that are named
+            http=QuickConnection,
             ws="websockets-sansio",
             ws_max_size=MAX_TEXT,
             ws_ping_interval=5.0,
             ws_ping_timeout=10.0,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=3,
-            limit_concurrency=1000,
+            limit_concurrency=4000,
         )
     )
     url = arguments.public_url or _url(*listener.getsockname()[:2])
@@ -213,6 +231,14 @@ def _check_public(url: str | None) -> None:
 def _url(host: str, port: int) -> str:
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
+
+
+def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
+    """Addresses and networks, joined by commas."""
+    try:
+        return tuple(ip_network(part.strip()) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _number(smallest: int, largest: int) -> Callable[[str], int]:

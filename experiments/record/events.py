@@ -222,11 +222,12 @@ class PauseEvent(LoggedEvent, frozen=True):
     """The clock was stopped.
 
     Attributes:
-        reason: `hidden` (the tab), `disconnected`, `silent` (no sign of life of the page), `asked` or `taken over`.
+        reason: `hidden` (the tab), `disconnected`, `silent` (no sign of life of the page for 1 s), `restarted` (the
+            process that simulates the session died), `asked` or `taken over`.
         wall: When, s since 1970.
     """
 
-    reason: Literal["asked", "hidden", "disconnected", "silent", "taken over"]
+    reason: Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
     wall: float
 
 

@@ -105,12 +105,17 @@ class Journal:
         Raises:
             OSError: It cannot be written (a full disk); nothing of it stays in the file.
         """
-        end, content = os.fstat(self._file).st_size, _encode(entry)
+        end, content = self.size, _encode(entry)
         try:
             _write(self._file, _HEAD.pack(len(content), zlib.crc32(content)) + content)
         except OSError:
             os.ftruncate(self._file, end)
             raise
+
+    @property
+    def size(self) -> int:
+        """Bytes that it has now."""
+        return os.fstat(self._file).st_size
 
     def sync(self) -> None:
         """Wait until everything appended so far is on the disk."""

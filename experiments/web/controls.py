@@ -19,6 +19,8 @@ Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # of the highest speed
 Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # rad
 Press = Literal["act", "left hand", "right hand"]
 MAX_PITCH = 1.2  # rad that the mouse can look up or down
+MAX_PRESSES = 8  # that wait
+PRESS_LIFE = 0.5  # s after which a press that was not handled is forgotten
 MAX_TURN_AHEAD = 2.8  # rad that the mouse can be ahead of the body
 
 
@@ -37,18 +39,22 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     # rows by which the task list is scrolled, positive towards its end
     scroll: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
 
+    def at_rest(self) -> "Input":
+        """What of it counts while the clock stands: nothing is held, turned or pressed then."""
+        return Input(number=self.number, scroll=self.scroll)
+
 
 Answer = Callable[[Pick | Place], ActionResult]
 
 
 @dataclass(frozen=True)
 class Controls:
-    """The latest input, where the mouse points (rad; None if it does not), and presses that are not handled yet."""
+    """The latest input, where the mouse points (rad; None if it does not), and waiting presses with their age, s."""
 
     held: Input | None = None
     heading: float | None = None
     pitch: float | None = None
-    presses: tuple[Press, ...] = ()
+    presses: tuple[tuple[Press, float], ...] = ()
 
     def take(self, inputs: Sequence[Input], seen: Observation) -> "Controls":
         """The controls after further inputs."""
@@ -62,8 +68,8 @@ class Controls:
                 pitch = min(max(pitch, -MAX_PITCH), MAX_PITCH)
             heading = None if new.turn else heading
             pitch = None if new.look else pitch
-        presses = (*self.presses, *(new.press for new in inputs if new.press is not None))
-        return Controls(inputs[-1] if inputs else self.held, heading, pitch, presses)
+        presses = (*self.presses, *((new.press, 0.0) for new in inputs if new.press is not None))
+        return Controls(inputs[-1] if inputs else self.held, heading, pitch, presses[:MAX_PRESSES])
 
 
 def control_step(
@@ -83,8 +89,9 @@ def control_step(
     controls = before.take(inputs, seen)
     if not controls.presses:
         return _move(controls, inputs, seen, person, duration), controls
-    press, *later = controls.presses
-    return _attempt(press, seen, answer), replace(controls, presses=tuple(later))
+    (press, _), *later = controls.presses
+    aged = tuple((new, age + duration) for new, age in later if age + duration <= PRESS_LIFE)
+    return _attempt(press, seen, answer), replace(controls, presses=aged)
 
 
 def _attempt(press: Press, seen: Observation, answer: Answer) -> Action:

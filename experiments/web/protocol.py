@@ -25,7 +25,7 @@ KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # codes with which the server closes
 
 Codec = Literal["jpeg", "h264", "none"]
-PauseReason = Literal["asked", "hidden", "disconnected", "silent", "taken over"]
+PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
 Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # px
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
@@ -74,7 +74,10 @@ class Seen(WireMessage, frozen=True):
 
 
 class Beat(WireMessage, frozen=True):
-    """A sign of life, twice a second both ways. After 1 s without any message from the page the clock is stopped."""
+    """A sign of life: the server sends one twice a second, and the page sends one back.
+
+    After 1 s without any message from the page the clock is stopped.
+    """
 
 
 class Display(WireMessage, frozen=True):
@@ -115,12 +118,16 @@ class Leave(WireMessage, frozen=True):
 
 
 class Open(WireMessage, frozen=True):
-    """Open a session in a worker: its journal's folder, its run directory, settings, earlier phases of the visit."""
+    """Open a session in a worker: its journal's folder, its run directory, settings, earlier phases of the visit.
+
+    `restarted` tells that the worker before has died.
+    """
 
     folder: str
     run: str
     config: dict[str, Any]
     before: list[dict[str, Any]] = []
+    restarted: bool = False
 
 
 class State(WireMessage, frozen=True):

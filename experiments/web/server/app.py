@@ -4,6 +4,7 @@ import asyncio
 import logging
 import re
 import time
+from collections import Counter
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from typing import Any
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
@@ -23,7 +25,7 @@ from starlette.websockets import WebSocket
 from experiments.errors import RecordError
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
 from experiments.web.server.browser_socket import BrowserSocket
-from experiments.web.server.guards import Guards, Rate, allowed_hosts
+from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.pages import STATIC, message_page, page
 from experiments.web.server.pool import WorkerPool
@@ -32,9 +34,11 @@ from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, token_h
 
 LOG = logging.getLogger("mjsim.play")
 MAX_QUEUE = 100  # visits that may wait for a place
-OPENED = re.compile(r"\d{1,15}")  # ms since 1970
+OPENED = re.compile(r"\d{1,15}")  # ms of the monotonic clock
 MAX_READING = 24 * 3600.0  # s; a page may stay open over night
 NEW_VISITS = 30, 60.0  # visits from one address, within this time, s
+SOCKETS_OF_A_VISIT, SOCKETS_OF_AN_ADDRESS = 2, 20  # open at a time
+FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
 INTERNAL_ERROR = "Internal server error"
 
 
@@ -49,6 +53,7 @@ class PlayConfig:
     idle: float = 1800.0
     film: Path | None = None
     story: str = ""
+    proxies: Sequence[Network] = ()  # whose word about the address of a person is believed
 
 
 class PlayServer:
@@ -60,6 +65,7 @@ class PlayServer:
         self._pool, self._limit = pool, SessionLimit(config.sessions)
         self.sessions = Sessions(pool, self._limit, config.idle)
         self._new = Rate(*NEW_VISITS)
+        self._sockets: Counter[str] = Counter()  # by visit and by address
 
     def app(self, host: str, public: str | None = None) -> Starlette:
         """The ASGI application that listens at `host`; `public` is the URL under which a proxy makes it public."""
@@ -78,7 +84,7 @@ class PlayServer:
                 Middleware(
                     TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, public), www_redirect=False
                 ),
-                Middleware(Guards, public=public),
+                Middleware(Guards, public=public, proxies=self._config.proxies),
             ],
             exception_handlers={
                 404: _not_found,
@@ -101,14 +107,14 @@ class PlayServer:
             await self.sessions.release()
             await self._pool.close()
 
-    async def _story(self, request: Request) -> Response:
+    def _story(self, request: Request) -> Response:
         return page(
             request,
             "story",
             story=[text for text in self._config.story.split("\n\n") if text.strip()],
             condition=str(self._config.trials[TASK]["assistance"]).split("-")[0],
             training=TRAINING in self._config.phases,
-            opened=round(1000.0 * time.time()),
+            opened=round(1000.0 * time.monotonic()),
         )
 
     async def _begin(self, request: Request) -> Response:
@@ -118,7 +124,8 @@ class PlayServer:
             return message_page(request, 503, "All places are taken", "Please come back later.")
         left_out = (STORY,) if self._config.film else (STORY, FLYTHROUGH)
         phases = [name for name in self._config.phases if name not in left_out]
-        token = self._visits.create(phases, self._config.trials, self._reading(await request.body()))
+        reading = self._reading(await request.body())
+        token = await run_in_threadpool(self._visits.create, phases, self._config.trials, reading)
         LOG.info("session %s begins", token_hash(token)[:12])
         return RedirectResponse(f"/play/{token}", 303)
 
@@ -127,13 +134,13 @@ class PlayServer:
         if STORY not in self._config.phases:
             return []
         opened = parse_qs(form.decode("ascii", "replace")).get("opened", [""])[0]
-        seconds = time.time() - int(opened) / 1000.0 if OPENED.fullmatch(opened) else 0.0
+        seconds = time.monotonic() - int(opened) / 1000.0 if OPENED.fullmatch(opened) else 0.0
         return [Ended(STORY, round(min(max(0.0, seconds), MAX_READING), 3))]
 
-    async def _visit(self, request: Request) -> Response:
+    def _visit(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])
         if visit is None:
-            return await _not_found(request, None)
+            return _not_found(request, None)
         if visit.phase == FLYTHROUGH and self._config.film is None:
             visit.finish(FLYTHROUGH)
         if visit.phase == FLYTHROUGH:
@@ -144,50 +151,61 @@ class PlayServer:
             return page(request, "play", trial=visit.phase, objects=objects)
         return page(request, "result", metrics=visit.metrics(TASK))
 
-    async def _film(self, request: Request) -> Response:
+    def _film(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])
         if visit is None or self._config.film is None:
-            return await _not_found(request, None)
-        return FileResponse(self._config.film, media_type="video/mp4")
+            return _not_found(request, None)
+        return FileResponse(self._config.film, headers=FILM_HEADERS, media_type="video/mp4")
 
-    async def _film_seen(self, request: Request) -> Response:
+    def _film_seen(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])
         if visit is None:
-            return await _not_found(request, None)
+            return _not_found(request, None)
         visit.finish(FLYTHROUGH)
         return RedirectResponse(request.url.path.removesuffix("/film"), 303)
 
-    async def _floor_plan(self, request: Request) -> Response:
+    def _floor_plan(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])
         if visit is None or visit.phase != RESULT or not visit.floor_plan.is_file():
-            return await _not_found(request, None)
+            return _not_found(request, None)
         return FileResponse(visit.floor_plan, media_type="image/png")
 
     async def _play(self, socket: WebSocket) -> None:
         try:
-            visit = self._visits.find(socket.path_params["token"])
+            visit = await run_in_threadpool(self._visits.find, socket.path_params["token"])
         except (RecordError, OSError) as error:
             LOG.error("%s", error)
             visit = None
-        if visit is None:
+        address = socket.client.host if socket.client else ""
+        if visit is None or not self._has_room(visit.name, address):
             await socket.close(1008)
             return
-        await socket.accept()
-        await BrowserSocket(socket).serve(self.sessions.of(visit), visit.phase)
+        self._sockets.update((visit.name, address))
+        try:
+            await socket.accept()
+            await BrowserSocket(socket).serve(self.sessions.of(visit), visit.phase)
+        finally:
+            self._sockets.subtract((visit.name, address))
+            self._sockets += Counter()  # forgets those without any
+
+    def _has_room(self, visit: str, address: str) -> bool:
+        """Whether one more socket of a visit and an address is served."""
+        from_address = max(SOCKETS_OF_AN_ADDRESS, self._config.sessions)  # all may sit behind one address
+        return self._sockets[visit] < SOCKETS_OF_A_VISIT and self._sockets[address] < from_address
 
 
-async def _not_found(request: Request, _: Any) -> Response:
+def _not_found(request: Request, _: Any) -> Response:
     if request.url.path.startswith("/static"):
         return PlainTextResponse("not found\n", 404)
     return message_page(request, 404, "This page does not exist", "The link may be incomplete.")
 
 
-async def _damaged(request: Request, error: Exception) -> Response:
+def _damaged(request: Request, error: Exception) -> Response:
     LOG.error("%s", error)
     return message_page(
         request, 500, INTERNAL_ERROR, "The server cannot read or write its files at the moment."
     )
 
 
-async def _failed(request: Request, _: Exception) -> Response:
+def _failed(request: Request, _: Exception) -> Response:
     return message_page(request, 500, INTERNAL_ERROR, "What you did so far is kept. Please try again.")

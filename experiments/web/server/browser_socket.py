@@ -9,15 +9,28 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from experiments.web import protocol
-from experiments.web.protocol import Error, Hello, Occupied, Saved, Snapshot, State, TakeOver, WireMessage
+from experiments.web.protocol import (
+    BEAT_PERIOD,
+    Beat,
+    Error,
+    Hello,
+    Inputs,
+    Occupied,
+    Saved,
+    Snapshot,
+    State,
+    TakeOver,
+    WireMessage,
+)
 from experiments.web.server.played_session import PlayedSession
 from experiments.web.state import OVER
 
 HELLO_TIMEOUT = 10.0  # s for the first message
+OCCUPIED_TIMEOUT = 60.0  # s for the answer to `occupied`
 CLOSE_TIMEOUT = 0.5  # s that the connection before has to end, as when a page is reloaded
 MAX_WAITING = 300  # messages that wait to be sent
 MAX_WAITING_FOR_SNAPSHOTS = 8  # with more than these waiting, no snapshots are sent
-RATE, BURST = 200.0, 400.0  # messages a second, and at once
+RATE, BURST = 200.0, 1200.0  # messages and inputs a second, and at once: inputs are repeated after a failure
 MAX_ERRORS = 50  # refused messages of one connection
 
 
@@ -49,6 +62,7 @@ class BrowserSocket:
         """Serve until the browser is gone; `trial` is the phase of the visit that is under way."""
         sending = asyncio.create_task(self._send_all())
         receiving = asyncio.create_task(self._receive_all(session, trial))
+        beating = asyncio.create_task(self._beat(session))
         try:
             await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
             session.detach(self)
@@ -56,7 +70,7 @@ class BrowserSocket:
             await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # the last message is still to be sent
         finally:
             session.detach(self)
-            for task in (sending, receiving):
+            for task in (sending, receiving, beating):
                 task.cancel()
                 with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError):
                     await task
@@ -70,6 +84,13 @@ class BrowserSocket:
                     await self._socket.send_text(protocol.encode_to_browser(item).decode())
             await self._socket.close(*item)
 
+    async def _beat(self, session: PlayedSession) -> None:
+        """Give signs of life to the page that has the session."""
+        while True:
+            await asyncio.sleep(BEAT_PERIOD)
+            if session.browser is self and self._waiting.empty():
+                self.send(Beat())
+
     async def _receive_all(self, session: PlayedSession, trial: str) -> None:
         try:
             hello = await asyncio.wait_for(self._hello(), HELLO_TIMEOUT)
@@ -80,7 +101,10 @@ class BrowserSocket:
             self.send(Saved())
             return
         self.tab = hello.tab
-        await self._wait_for_place(session)
+        try:
+            await asyncio.wait_for(self._wait_for_place(session), OCCUPIED_TIMEOUT)
+        except TimeoutError:
+            self._end(Error("idle", "nobody wanted to continue here"))
         session.attach(self, hello.view)
         while True:
             message = await self._receive()
@@ -102,8 +126,9 @@ class BrowserSocket:
                 await asyncio.sleep(0.05)
                 continue
             self.send(Occupied())
-            while not isinstance(await self._receive(), TakeOver):
-                self._refuse(Error("too early", "the session is open in another page"))
+            while not isinstance(message := await self._receive(), TakeOver):
+                if not isinstance(message, Beat):
+                    self._refuse(Error("too early", "the session is open in another page"))
             return
 
     async def _receive(self) -> WireMessage:
@@ -112,20 +137,21 @@ class BrowserSocket:
             event = await self._socket.receive()
             if event["type"] != "websocket.receive":
                 raise WebSocketDisconnect(event.get("code", 1006))
-            self._check_rate()
             try:
                 message: WireMessage = protocol.decode_from_browser(event.get("text") or "")
             except (msgspec.DecodeError, RecursionError) as error:
+                self._count(1)
                 self._refuse(Error("malformed", str(error) or "nested too deeply"))
             else:
+                self._count(max(1, len(message.inputs)) if isinstance(message, Inputs) else 1)
                 return message
 
-    def _check_rate(self) -> None:
+    def _count(self, number: int) -> None:
         now = time.monotonic()
-        self._allowed = min(BURST, self._allowed + (now - self._at) * RATE) - 1.0
+        self._allowed = min(BURST, self._allowed + (now - self._at) * RATE) - number
         self._at = now
         if self._allowed < 0.0:
-            self._end(Error("too much", f"at most {RATE:.0f} messages a second"))
+            self._end(Error("too much", f"at most {RATE:.0f} messages and inputs a second"))
 
     def _refuse(self, error: Error) -> None:
         self._errors += 1

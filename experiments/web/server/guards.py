@@ -1,8 +1,10 @@
 """Checks of every request before the pages see it, and the headers of every answer."""
 
+import re
 import socket
 import time
 from collections.abc import Mapping, Sequence
+from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -10,6 +12,10 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MAX_BODY = 4096  # bytes of a form
+HOST = re.compile(r"([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(:\d{1,5})?")
+UNCACHED, CHECKED = "no-store", "no-cache"  # pages; files, which are used again while their ETag is the same
+Address = IPv4Address | IPv6Address
+Network = IPv4Network | IPv6Network
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -48,10 +54,13 @@ def _own_addresses() -> set[str]:
 
 
 class Guards:
-    """ASGI middleware: checks `Origin`, limits bodies, adds headers."""
+    """ASGI middleware: checks `Host` and `Origin`, limits bodies, adds headers, tells who asks.
 
-    def __init__(self, app: ASGIApp, public: str | None) -> None:
-        self._app = app
+    What a request that comes from one of the `proxies` says about its sender is believed as far as the proxy wrote it.
+    """
+
+    def __init__(self, app: ASGIApp, public: str | None, proxies: Sequence[Network] = ()) -> None:
+        self._app, self._proxies = app, proxies
         self._public = urlsplit(public or "")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -67,16 +76,34 @@ class Guards:
             await send({"type": "websocket.close", "code": 1008})
             return
 
+        cache = CHECKED if scope["path"].startswith("/static/") else UNCACHED
+
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
-                _add_headers(MutableHeaders(scope=message), origin)
+                _add_headers(MutableHeaders(scope=message), origin, cache)
             await send(message)
 
+        if scope["type"] == "http" and refusal is None:
+            whole = await _whole(receive)
+            if whole is None:
+                return  # who asked is gone
+            receive = whole
         app = self._app if refusal is None else PlainTextResponse(f"{refusal[1]}\n", refusal[0])
-        await app(scope, receive, send_guarded)
+        await app({**scope, "client": (self._sender(scope, headers), 0)}, receive, send_guarded)
+
+    def _sender(self, scope: Scope, headers: Headers) -> str:
+        """The machine that asks."""
+        peer = address_of((scope.get("client") or ("",))[0])
+        if any(peer is not None and peer in proxy for proxy in self._proxies):
+            # the last one is what the proxy saw; others anybody can write
+            forwarded = ",".join(headers.getlist("x-forwarded-for")).rpartition(",")[2]
+            peer = address_of(forwarded.strip()) or peer
+        return machine_of(peer)
 
     def _origin(self, host: str) -> str:
-        """Origin of the pages that are served under a `Host`."""
+        """Origin of the pages that are served under a `Host`; empty if that is none."""
+        if not HOST.fullmatch(host):
+            return ""
         public = host == self._public.netloc and self._public.scheme == "https"
         return f"{'https' if public else 'http'}://{host}"
 
@@ -97,8 +124,41 @@ class Rate:
         return allowed
 
 
+def address_of(text: str) -> Address | None:
+    """The IP address that a text is; None if it is none."""
+    try:
+        found = ip_address(text)
+    except ValueError:
+        return None
+    return (found.ipv4_mapped or found) if isinstance(found, IPv6Address) else found
+
+
+def machine_of(address: Address | None) -> str:
+    """An address, or the network of an IPv6 address, all of whose addresses one machine can have."""
+    return str(ip_network((address, 64), strict=False) if isinstance(address, IPv6Address) else address)
+
+
+async def _whole(receive: Receive) -> Receive | None:
+    """A `receive` that has the whole body; None if it never came."""
+    body = b""
+    while (message := await receive())["type"] == "http.request":
+        body += message.get("body", b"")
+        if not message.get("more_body", False):
+            break
+    else:
+        return None
+    first: list[Message] = [{"type": "http.request", "body": body}]
+
+    async def receive_whole() -> Message:
+        return first.pop() if first else await receive()
+
+    return receive_whole
+
+
 def _refusal(scope: Scope, headers: Mapping[str, str], origin: str) -> tuple[int, str] | None:
     """Status and text where a request is refused."""
+    if not origin:
+        return 400, "Invalid host header"
     changes = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
     if changes and headers.get("origin") != origin:
         return 403, "This request does not come from a page of this server."
@@ -108,8 +168,8 @@ def _refusal(scope: Scope, headers: Mapping[str, str], origin: str) -> tuple[int
     return None
 
 
-def _add_headers(headers: MutableHeaders, origin: str) -> None:
+def _add_headers(headers: MutableHeaders, origin: str, cache: str) -> None:
     for name, value in HEADERS.items():
         headers[name] = value
-    headers.setdefault("Cache-Control", "no-store")
+    headers.setdefault("Cache-Control", cache)
     headers["Content-Security-Policy"] = POLICY.format(sockets=origin.replace("http", "ws", 1))

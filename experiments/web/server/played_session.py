@@ -10,6 +10,8 @@ import msgspec
 
 from experiments.web import protocol
 from experiments.web.protocol import (
+    Beat,
+    Display,
     Error,
     Inputs,
     Leave,
@@ -17,6 +19,7 @@ from experiments.web.protocol import (
     Pause,
     Run,
     Saved,
+    Seen,
     State,
     Taken,
     View,
@@ -30,7 +33,7 @@ from experiments.web.state import FAILED, LOADING, READY, Trigger
 LOG = logging.getLogger("mjsim.play")
 MAX_CRASHES = 3  # of workers in a row, without an input taken in between, after which a session fails
 QUEUE_TIMEOUT = 10.0  # s that a place in the queue is kept without a connection
-MAX_AHEAD = 1000  # inputs that may be on their way
+MAX_AHEAD = 1000  # inputs that may wait to be taken
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
 
@@ -65,6 +68,7 @@ class PlayedSession:
         self._task: asyncio.Task[None] | None = None
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
+        self._taken = 0  # number of the last input that is safe
 
     def attach(self, browser: Browser, view: View) -> None:
         """Connect a browser; it replaces the one before."""
@@ -93,7 +97,7 @@ class PlayedSession:
 
     def take(self, message: Any) -> Error | None:
         """Take a message from the browser; why it was refused, or None."""
-        if not isinstance(message, protocol.Seen):
+        if not isinstance(message, Seen | Beat | Display):  # which a page sends by itself
             self.heard = time.monotonic()
         match message:
             case View():
@@ -128,8 +132,8 @@ class PlayedSession:
             return Error("too early", "the clock has not been started")
         if numbers != sorted(set(numbers)):
             return Error("out of order", "numbers of inputs must ascend")
-        if numbers and numbers[-1] > self.state.input + MAX_AHEAD:
-            return Error("out of order", f"input {numbers[-1]} follows input {self.state.input}")
+        if numbers and numbers[-1] > self._taken + MAX_AHEAD:
+            return Error("out of order", f"input {numbers[-1]} comes while {self._taken} was taken last")
         return None
 
     def _pause(self, reason: protocol.PauseReason) -> None:
@@ -178,6 +182,7 @@ class PlayedSession:
     async def _play(self, trial: str) -> None:
         """Play a trial to its end, with another worker whenever one dies."""
         visit, crashes = self.visit, 0
+        self._taken = 0
         opening = Open(
             str(visit.journal(trial)), str(visit.run(trial)), visit.settings(trial), visit.before(trial)
         )
@@ -192,15 +197,19 @@ class PlayedSession:
                     case State(phase, reason) if phase is FAILED:
                         raise OSError(reason)
                     case State(input=number):
+                        if self.state.phase is LOADING:
+                            self._taken = number  # of a session that was restored
                         message = msgspec.structs.replace(message, input=max(number, self.state.input))
                         self.state = message
-                    case Taken():
-                        crashes = 0
+                    case Taken(number):
+                        crashes, self._taken = 0, number
                     case Saved():
-                        self._finish(trial)
+                        await asyncio.to_thread(self._finish, trial)
+                        self._tell(message)
                         return
                 self._tell(message)
             LOG.warning("session %s: its worker died", visit.name[:12])
+            opening = msgspec.structs.replace(opening, restarted=True)
             self._discard_worker()
             crashes += 1
         raise OSError(f"the worker crashed {MAX_CRASHES} times in a row")
@@ -212,7 +221,6 @@ class PlayedSession:
         LOG.info(
             "session %s: %s is over (%s): %s", visit.name[:12], trial, metrics["ended"], visit.run(trial)
         )
-        self._tell(Saved())
 
     def _discard_worker(self) -> None:
         if self._worker is not None:

@@ -6,6 +6,7 @@ A link holds a token that cannot be guessed. Only its SHA-256 is kept, as the na
 import hashlib
 import re
 import secrets
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -41,7 +42,7 @@ class _Stored(msgspec.Struct, frozen=True):
     phases: list[str]  # all phases, in order
     trials: dict[str, dict[str, Any]]  # settings of the trials, by phase
     ended: list[Ended] = []  # phases that are over
-    # when the phase was shown first, s since 1970; None if it was not, or has a clock of its own
+    # when the phase was shown first, s of the monotonic clock; None if it was not, or has a clock of its own
     shown: float | None = None
     version: int = 1  # of this format
 
@@ -51,6 +52,7 @@ class Visit:
 
     def __init__(self, folder: Path, stored: _Stored) -> None:
         self._folder, self._stored = folder, stored
+        self._lock = threading.Lock()
 
     @property
     def name(self) -> str:
@@ -80,22 +82,24 @@ class Visit:
 
     def show(self) -> None:
         """Note when the phase was shown for the first time."""
-        if self._stored.shown is None:
-            self._save(shown=time.time())
+        with self._lock:
+            if self._stored.shown is None:
+                self._save(shown=time.monotonic())
 
     def finish(self, phase: str, duration: float | None = None, reason: str | None = None) -> None:
         """Move to the next phase; nothing happens if the visit is further already.
 
         The duration, s, is by default the time since the phase was shown; `reason` says why a training ended.
         """
-        if phase != self.phase:
-            return
-        stored, now = self._stored, time.time()
-        if duration is None:
-            duration = max(0.0, now - (stored.shown or now))
-        after = stored.phases[stored.phases.index(phase) + 1 :]
-        ended = [*stored.ended, Ended(phase, round(duration, 3), reason)]
-        self._save(phase=after[0] if after else RESULT, ended=ended, shown=None)
+        with self._lock:
+            if phase != self.phase:
+                return
+            stored, now = self._stored, time.monotonic()
+            if duration is None:
+                duration = max(0.0, now - (stored.shown or now))
+            after = stored.phases[stored.phases.index(phase) + 1 :]
+            ended = [*stored.ended, Ended(phase, round(duration, 3), reason)]
+            self._save(phase=after[0] if after else RESULT, ended=ended, shown=None)
 
     @property
     def floor_plan(self) -> Path:
@@ -120,15 +124,23 @@ class Visits:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
         self._known: dict[str, Visit] = {}
+        self._lock = threading.Lock()
+        self._begun = sum(1 for _ in folder.glob(f"*/{VISIT}"))
 
     def create(
         self, phases: Sequence[str], trials: Mapping[str, dict[str, Any]], ended: Sequence[Ended] = ()
     ) -> str:
-        """Start a visit with the phases to come, settings of their trials, and phases that are over; its token."""
+        """Start a visit with the phases to come, settings of their trials, and phases that are over; its token.
+
+        The first visit has the order seed of the settings, each later one the next.
+        """
         token = secrets.token_urlsafe(32)
         folder = self._folder / token_hash(token)
-        folder.mkdir()
-        visit = Visit(folder, _Stored(phases[0], list(phases), dict(trials), list(ended)))
+        folder.mkdir(0o700)
+        with self._lock:
+            later, self._begun = self._begun, self._begun + 1
+        own = {name: {**trial, "order_seed": trial["order_seed"] + later} for name, trial in trials.items()}
+        visit = Visit(folder, _Stored(phases[0], list(phases), own, list(ended)))
         visit._save()
         sync_folder(self._folder)
         self._known[visit.name] = visit
@@ -140,12 +152,15 @@ class Visits:
             return None
         name = token_hash(token)
         path = self._folder / name / VISIT
-        if name not in self._known and path.is_file():
-            try:
-                self._known[name] = Visit(path.parent, msgspec.json.decode(path.read_bytes(), type=_Stored))
-            except msgspec.DecodeError as error:
-                raise RecordError(f"{path} is damaged: {error}") from error
-        return self._known.get(name)
+        with self._lock:
+            if name not in self._known and path.is_file():
+                try:
+                    self._known[name] = Visit(
+                        path.parent, msgspec.json.decode(path.read_bytes(), type=_Stored)
+                    )
+                except msgspec.DecodeError as error:
+                    raise RecordError(f"{path} is damaged: {error}") from error
+            return self._known.get(name)
 
 
 def token_hash(token: str) -> str:

@@ -35,7 +35,9 @@ class Clock:
                     self._log_notes()
                 if phase is RUNNING:
                     due = self._step_at(due)
+                    control.pause_if_silent()
                 else:
+                    live.release()
                     live.session.show()
                     control.wait_for_change(phase, SHOW_PERIOD)
                     due = time.monotonic()

@@ -8,9 +8,10 @@ from typing import Any
 import msgspec
 
 from experiments.web.controls import Input
-from experiments.web.protocol import State
+from experiments.web.protocol import MAX_SILENCE, State
 from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, Trigger
 
+MAX_NOTES = 1000  # that wait for a control step
 Note = tuple[str, dict[str, Any]]  # name and fields of an event of the log
 
 
@@ -24,6 +25,7 @@ class SessionControl:
         self._notes: list[Note] = []
         self._changed = threading.Condition()
         self._ready = 0.0  # when the session could first be started, monotonic
+        self._heard = time.monotonic()  # when the page was heard last
 
     def apply(self, trigger: Trigger, reason: str = "", *, last: int | None = None) -> None:
         """Change the state as the table says; `last` is the number of the last input of a restored session."""
@@ -35,6 +37,7 @@ class SessionControl:
             self.state = after
             if after.phase is PAUSED:
                 self._note("pause", reason=reason)
+                self._inputs = [new.at_rest() for new in self._inputs]
             elif (before.phase, after.phase) == (PAUSED, RUNNING):
                 self._note("resume")
             elif after.phase is READY:
@@ -49,13 +52,26 @@ class SessionControl:
         with self._changed:
             for new in inputs:
                 if new.number > self.state.input:
-                    self._inputs.append(new)
+                    self._inputs.append(new if self.state.phase is RUNNING else new.at_rest())
                     self.state = msgspec.structs.replace(self.state, input=new.number)
 
-    def note(self, event: str, **fields: Any) -> None:
-        """Note something that the page told, for the log."""
+    def hear(self) -> None:
+        """The page gave a sign of life."""
         with self._changed:
-            self._note(event, **fields)
+            self.pause_if_silent()
+            self._heard = time.monotonic()
+
+    def pause_if_silent(self) -> None:
+        """Stop the clock of a page that gave no sign of life for a while."""
+        with self._changed:
+            if self.state.phase is RUNNING and time.monotonic() - self._heard > MAX_SILENCE:
+                self.apply(Trigger.PAUSE, "silent")
+
+    def note(self, event: str, **fields: Any) -> None:
+        """Note something that the page told, for the log; too much of it is dropped."""
+        with self._changed:
+            if len(self._notes) < MAX_NOTES:
+                self._note(event, **fields)
 
     def take_inputs(self) -> tuple[Input, ...]:
         """All inputs since the last call."""

@@ -17,6 +17,7 @@ from experiments.record.reader import read_journal
 from experiments.record.records import EventLog
 from experiments.record.run_directory import is_run, run_directory
 from experiments.replay.log_source import LogSource
+from experiments.session.endings import INTERRUPTED
 from experiments.session.viewer import Viewer
 from experiments.trials.setup import (
     draw_person,
@@ -35,6 +36,8 @@ from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.service import Mode, Planner
+
+MAX_JOURNAL = 512 * 1024**2  # bytes, some seven hours, after which a session ends
 
 
 class PersonState(msgspec.Struct):
@@ -167,7 +170,11 @@ class LiveSession:
     @property
     def end_reason(self) -> str | None:
         """Why the task is over; None while it is not."""
-        return self.session.end_reason
+        return self.session.end_reason or (INTERRUPTED if self._journal.size > MAX_JOURNAL else None)
+
+    def release(self) -> None:
+        """Nothing is held or pressed any more."""
+        self._human.state.controls = Controls()
 
     def step(self, inputs: Sequence[Input]) -> None:
         """One control step; it is safe once the journal was synced.

@@ -71,6 +71,8 @@ class Worker:
             os._exit(0)
 
     def _take(self, message: WireMessage) -> None:
+        if not isinstance(message, Open | Pause):  # which the server may send by itself
+            self._control.hear()
         match message:
             case Open():
                 self._control = SessionControl(self._send)
@@ -103,7 +105,8 @@ class Worker:
                     viewer.live, viewer.drawer = live, drawer
                     viewer.set_view(None)
                     if live.resumed:
-                        control.apply(Trigger.RESTORED, "disconnected", last=live.input)
+                        reason = "restarted" if opened.restarted else "disconnected"
+                        control.apply(Trigger.RESTORED, reason, last=live.input)
                     else:
                         control.apply(Trigger.OPENED)
                     reason = Clock(live, control, journal.sync, self._send).run()

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.house import House
-from experiments.web.controls import MAX_PITCH, Controls, Input, control_step
+from experiments.web.controls import MAX_PITCH, MAX_PRESSES, PRESS_LIFE, Controls, Input, control_step
 from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
 from mjsim.model.scene import compose
 from mjsim.options import WorldOptions
@@ -92,6 +92,16 @@ def test_no_input_exceeds_the_limits(scene, batches):
         assert math.hypot(action.forward, action.left) <= PERSON.walking_speed * (1 + 1e-12)
         assert abs(action.turn) <= PERSON.turning_speed and abs(action.look) <= PERSON.looking_speed
     assert controls.pitch is None or abs(controls.pitch) <= MAX_PITCH
+
+
+def test_presses_that_wait_are_few_and_short_lived(scene):
+    world = World(scene, OPTIONS)
+    seen = world.reset()
+    flood = Controls().take([Input(number=1, press="act")] * 64, seen)
+    assert len(flood.presses) == MAX_PRESSES
+    old = Controls(presses=(("act", 0.0), ("left hand", PRESS_LIFE), ("right hand", 0.0)))
+    _, controls = control_step(old, (), seen, nothing, PERSON, world.control_timestep)
+    assert [press for press, _ in controls.presses] == ["right hand"]
 
 
 def pressed(key, answers, hands=(None, None)):

@@ -8,6 +8,7 @@ const PAUSED = {
   hidden: "Paused while the page was hidden.",
   silent: "Paused while there was no connection.",
   disconnected: "Paused while there was no connection.",
+  restarted: "Paused while the session was restored.",
   "taken over": "Paused while the session moved to this page.",
 };
 

@@ -99,6 +99,9 @@ function take(message) {
     case "moment":
       hud.expect(message);
       break;
+    case "beat":
+      if (session.phase === "running") connection.send({ type: "beat" }); // not by a timer: those of hidden pages are slow
+      break;
     case "busy":
       byId("busy", HTMLElement).hidden = !message.busy;
       break;
@@ -161,10 +164,8 @@ function lose() {
   panel.show(dialogs.OFFLINE);
 }
 
-function beat() {
-  if (session.phase !== "running") return;
-  connection.send({ type: "beat" });
-  if (connection.silence < 1000 * MAX_SILENCE) return;
+function watchLink() {
+  if (session.phase !== "running" || connection.silence < 1000 * MAX_SILENCE) return;
   silent = true;
   lose();
 }
@@ -264,7 +265,7 @@ connectMouse(canvas, inputs, listens, () => hud.reach);
 connectTouch(canvas, byId("touch", HTMLElement), inputs, listens);
 connectGamepad(inputs, commands, listens);
 watchPage();
-setInterval(beat, 1000 * BEAT_PERIOD);
+setInterval(watchLink, 1000 * BEAT_PERIOD);
 setInterval(report, 1000 * DISPLAY_PERIOD);
 byId("debug", HTMLElement).hidden = !new URLSearchParams(location.search).has("debug");
 rememberVisit();

@@ -1,7 +1,7 @@
 // Types and constants of docs/protocol.md, made by `make client-protocol`; change them in experiments/web/protocol.py.
 
 /** @typedef {"jpeg" | "h264" | "none"} Codec */
-/** @typedef {"asked" | "hidden" | "disconnected" | "silent" | "taken over"} PauseReason */
+/** @typedef {"asked" | "hidden" | "disconnected" | "silent" | "restarted" | "taken over"} PauseReason */
 /** @typedef {"loading" | "ready" | "running" | "paused" | "over" | "failed"} Phase */
 /** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; snapshots?: boolean }} View How a page wants to see the session: size in px, how frames are compressed, whether snapshots are sent. */
 /** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page, which may reconnect, its trial and its view. */
@@ -10,9 +10,9 @@
 /** @typedef {{ number: number; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input A change at the keyboard, the mouse, a gamepad or a touch screen. */
 /** @typedef {{ type: "inputs"; inputs: Array<Input> }} Inputs What the person pressed, in order, each once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen The browser has shown a frame, by its number. */
-/** @typedef {{ type: "beat" }} Beat A sign of life, twice a second both ways. After 1 s without any message from the page the clock is stopped. */
+/** @typedef {{ type: "beat" }} Beat A sign of life: the server sends one twice a second, and the page sends one back. */
 /** @typedef {{ type: "display"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null }} Display How well the person saw the session in the last 5 s; this is only logged. */
-/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "silent" | "taken over" }} Pause Stop the clock; the reason is logged. */
+/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "restarted" | "silent" | "taken over" }} Pause Stop the clock; the reason is logged. */
 /** @typedef {{ type: "blur"; away: boolean }} Blur The page lost the keyboard to another window, or got it back; this is only logged. */
 /** @typedef {{ type: "leave" }} Leave End the trial now. */
 /** @typedef {{ type: "state"; phase: Phase; reason: string; input: number }} State The state of the session, why it is paused, over or failed, and the number of the last input that it received. */

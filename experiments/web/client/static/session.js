@@ -12,8 +12,8 @@ export class Session {
 
   /** @param {Pick<State, "phase" | "reason">} state from the server */
   take({ phase, reason }) {
-    if (phase === "loading") this.interrupted ||= this.phase === "running";
-    else if (reason !== "disconnected" && reason !== "silent") this.interrupted = false;
+    if (phase === "loading" || reason === "silent") this.interrupted ||= this.phase === "running";
+    else if (reason !== "disconnected" && reason !== "restarted") this.interrupted = false;
     this.phase = phase;
     this.reason = reason;
   }

@@ -5,7 +5,7 @@ import * as dialogs from "../static/dialogs.js";
 import { Panel } from "../static/panel.js";
 
 describe("dialogs", () => {
-  test.each(["asked", "hidden", "disconnected", "taken over"])("say why a session is paused: %s", (reason) => {
+  test.each(["asked", "hidden", "disconnected", "silent", "restarted", "taken over"])("say why a session is paused: %s", (reason) => {
     expect(dialogs.paused(reason)).toMatchObject({ title: "Paused", texts: [expect.stringMatching(/\.$/)] });
   });
 

@@ -45,8 +45,12 @@ describe("a session whose clock ran is interrupted", () => {
     expect(session).toMatchObject({ phase: "running", interrupted: false });
   });
 
+  test("when the server heard nothing of this page", () => {
+    expect(after(["running"], ["paused", "silent"]).interrupted).toBe(true);
+  });
+
   test("when its worker is restored", () => {
-    expect(after(["running"], ["loading"], ["paused", "disconnected"]).interrupted).toBe(true);
+    expect(after(["running"], ["loading"], ["paused", "restarted"]).interrupted).toBe(true);
   });
 
   test.each(["asked", "hidden", "taken over"])("but not if it was paused: %s", (reason) => {

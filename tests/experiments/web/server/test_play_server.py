@@ -4,10 +4,13 @@ import asyncio
 import json
 import re
 import threading
+import time
 from contextlib import contextmanager
+from ipaddress import ip_network
 from pathlib import Path
 
 import pytest
+from starlette.responses import PlainTextResponse
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
@@ -17,7 +20,7 @@ from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
 from experiments.web.protocol import Frame, Inputs, Leave, Open, Pause, Run, Saved, State, Taken
 from experiments.web.server.app import PlayConfig, PlayServer
-from experiments.web.server.guards import allowed_hosts
+from experiments.web.server.guards import Guards, allowed_hosts
 from experiments.web.server.played_session import MAX_CRASHES
 from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
 from experiments.web.server.visits import VISIT, Visits, token_hash
@@ -279,6 +282,42 @@ def test_every_answer_has_strict_headers_and_no_script_or_style_of_its_own(clien
             assert not [name for name in own if name in answer.text]
 
 
+def test_files_are_cached_and_pages_are_not(tmp_path, pool):
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"0123456789")
+    with serving(tmp_path / "visits", pool, film=film) as client:
+        link = new_visit(client)
+        for path, cached in (("/", False), (link, False), ("/static/play.js", True), (f"{link}/film", True)):
+            headers = client.get(path).headers
+            assert ("no-store" not in headers["cache-control"]) is cached
+            assert not cached or headers["etag"]
+        tag = client.get("/static/play.js").headers["etag"]
+        assert client.get("/static/play.js", headers={"If-None-Match": tag}).status_code == 304
+
+
+PROXY, SPOOF = "203.0.113.9", "198.51.100."
+
+
+@pytest.mark.parametrize(
+    ("peer", "forwarded", "begun"),
+    [
+        ("192.0.2.7", SPOOF + "{}", 30),  # no proxy: its word is nothing
+        (PROXY, "192.0.2.7", 30),
+        (PROXY, SPOOF + "{}, 192.0.2.7", 30),  # what the proxy did not write is nothing
+        (PROXY, SPOOF + "{}", 40),  # people behind the proxy have limits of their own
+        (PROXY, "2001:db8::{}", 30),  # one machine has all addresses of its network
+        (PROXY, "unknown, {}, x", 30),
+    ],
+)
+def test_limits_hold_for_the_address_that_a_trusted_proxy_saw(tmp_path, pool, peer, forwarded, begun):
+    config = PlayConfig(PHASES, TRIALS, tmp_path, proxies=[ip_network(PROXY)])
+    app = PlayServer(config, pool).app("127.0.0.1")
+    with TestClient(app, base_url=ORIGIN, follow_redirects=False, client=(peer, 1)) as client:
+        headers = [{"Origin": ORIGIN, "X-Forwarded-For": forwarded.format(i)} for i in range(40)]
+        answers = [client.post("/visits", headers=sent).status_code for sent in headers]
+    assert answers.count(303) == begun and answers.count(429) == 40 - begun
+
+
 OWN_HOSTS = "127.0.0.1:8000", "localhost:8000", "[::1]:8000"
 OTHER_HOSTS = "evil.example", "192.168.7.9:8000", "", "user@127.0.0.1:8000", "127.0.0.1:x", "[::1"
 
@@ -286,6 +325,12 @@ OTHER_HOSTS = "evil.example", "192.168.7.9:8000", "", "user@127.0.0.1:8000", "12
 @pytest.mark.parametrize("host", OWN_HOSTS + OTHER_HOSTS)
 def test_only_own_addresses_are_served(client, host):
     assert client.get("/", headers={"Host": host}).status_code == (200 if host in OWN_HOSTS else 400)
+
+
+@pytest.mark.parametrize("host", ["[fe80::1%;script-src *]", "a;b", "a b", "[::1", ""])
+def test_an_odd_host_reaches_no_content_security_policy(host):
+    answer = TestClient(Guards(PlainTextResponse("a page"), None)).get("/", headers={"Host": host})
+    assert answer.status_code == 400 and "script-src *" not in answer.headers["content-security-policy"]
 
 
 @pytest.mark.parametrize(
@@ -339,6 +384,7 @@ def test_large_bodies_and_many_visits_are_refused(client):
         (json.dumps(inputs(2, 1)), "out of order"),
         (json.dumps(inputs(1, 1)), "out of order"),
         (json.dumps(inputs(2**53)), "out of order"),
+        (json.dumps(inputs(1001)), "out of order"),
         (json.dumps(hello()), "out of order"),
         ('{"type":"takeover"}', "out of order"),
     ],
@@ -379,6 +425,78 @@ def test_a_flood_is_cut_off_and_others_are_not_disturbed(tmp_path, pool):
         assert closed.value.code == protocol.TOO_MUCH
         quiet.send_json(inputs(1))
         assert until(quiet, "taken")[-1]["input"] == 1
+
+
+def test_inputs_are_bound_by_those_that_were_taken(client, pool, monkeypatch):
+    monkeypatch.setattr("experiments.web.server.played_session.MAX_AHEAD", 100)
+    with connected(client, new_visit(client)) as socket:
+        started(socket)
+        pool.workers[0]._answers.put_nowait = lambda _: None  # nothing is taken any more
+        for first in (1, 51, 101):
+            socket.send_json(inputs(*range(first, first + 50)))
+        assert until(socket, "error")[-1]["code"] == "out of order"
+
+
+def test_presses_without_end_are_cut_off(client):
+    with connected(client, new_visit(client)) as socket, pytest.raises(WebSocketDisconnect) as closed:
+        started(socket)
+        for first in range(1, 64 * 40, 64):
+            socket.send_json(inputs(*range(first, first + 64), press="act"))
+        until(socket, "nothing")
+    assert closed.value.code == protocol.TOO_MUCH
+
+
+def test_a_visit_and_an_address_have_few_sockets(client, monkeypatch):
+    link = new_visit(client)
+    with connected(client, link), connected(client, link):
+        with pytest.raises(WebSocketDisconnect), connected(client, link):
+            pass
+        monkeypatch.setattr("experiments.web.server.app.SOCKETS_OF_AN_ADDRESS", 2)
+        with pytest.raises(WebSocketDisconnect), connected(client, new_visit(client)):
+            pass
+    with connected(client, link) as socket:
+        started(socket)
+
+
+def test_a_page_is_told_twice_a_second_that_the_server_lives(client):
+    with connected(client, new_visit(client)) as socket:
+        started(socket)
+        until(socket, "beat")
+        began = time.perf_counter()
+        until(socket, "beat")
+        assert time.perf_counter() - began < 1.0
+
+
+def test_who_answers_occupied_with_nothing_is_sent_away(client, monkeypatch):
+    monkeypatch.setattr("experiments.web.server.browser_socket.CLOSE_TIMEOUT", 0.01)
+    monkeypatch.setattr("experiments.web.server.browser_socket.OCCUPIED_TIMEOUT", 0.1)
+    link = new_visit(client)
+    with connected(client, link) as first, connected(client, link) as second:
+        started(first)
+        second.send_json(hello(tab="tab-00000002"))
+        assert until(second, "error")[-1]["code"] == "idle"
+
+
+def test_visits_have_orders_of_their_own_and_folders_that_nobody_else_reads(tmp_path):
+    tokens = [Visits(tmp_path).create(["training", "task"], TRIALS) for _ in range(3)]
+    assert [Visits(tmp_path).find(token).settings("task")["order_seed"] for token in tokens] == [0, 1, 2]
+    assert all((tmp_path / token_hash(token)).stat().st_mode & 0o077 == 0 for token in tokens)
+
+
+def test_a_step_of_the_wall_clock_changes_no_duration(tmp_path, pool, monkeypatch):
+    with serving(tmp_path, pool) as client:
+        opened = re.search(r'name="opened" value="(\d+)"', client.get("/").text)[1]
+        monkeypatch.setattr("time.time", lambda: 5e9)
+        go_through(client, new_visit(client, opened=opened))
+    assert before_the_task(pool)[0]["duration_s"] < 10.0
+
+
+def test_a_worker_that_died_is_named_to_the_next(client, pool):
+    with connected(client, new_visit(client)) as socket:
+        started(socket)
+        pool.workers[0].die()
+        until_phase(socket, "ready")
+    assert [worker.told[0].restarted for worker in pool.workers] == [False, True]
 
 
 def test_a_second_page_takes_over_by_asking_and_the_first_is_told(client, monkeypatch):

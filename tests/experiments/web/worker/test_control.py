@@ -16,7 +16,7 @@ from experiments.web.state import (
     SessionPhase,
     Trigger,
 )
-from experiments.web.worker.control import SessionControl
+from experiments.web.worker.control import MAX_NOTES, SessionControl
 
 
 def after(*triggers):
@@ -58,6 +58,39 @@ def test_what_is_sent_again_counts_once():
     assert [new.number for new in control.take_inputs()] == [8, 9, 10, 11]
     assert control.take_inputs() == () and control.state.input == 11
     assert control.state.reason == "disconnected"
+
+
+def test_what_comes_while_the_clock_stands_holds_and_presses_nothing():
+    _, control = after(Trigger.OPENED, Trigger.RUN)
+    control.add([Input(number=1, forward=1.0, press="act", scroll=2)])
+    control.apply(Trigger.PAUSE, "silent")
+    control.add([Input(number=2, yaw=1.0, press="act", scroll=3)])
+    assert control.take_inputs() == (Input(number=1, scroll=2), Input(number=2, scroll=3))
+
+
+def test_a_silent_page_stops_the_clock(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr("experiments.web.worker.control.time.monotonic", lambda: now[0])
+    phases, control = after(Trigger.OPENED, Trigger.RUN)
+    for _ in range(5):
+        now[0] += 0.9
+        control.hear()
+        control.pause_if_silent()
+    assert phases == [READY, RUNNING]
+    now[0] += 1.1
+    control.pause_if_silent()
+    assert control.state.phase is PAUSED and control.state.reason == "silent"
+    control.hear()
+    control.apply(Trigger.RUN)
+    assert phases == [READY, RUNNING, PAUSED, RUNNING]
+    assert [event for event, _ in control.take_notes()] == ["started", "pause", "resume"]
+
+
+def test_notes_of_a_page_have_an_end():
+    _, control = after(Trigger.OPENED)
+    for _ in range(MAX_NOTES + 10):
+        control.note("blur", away=True)
+    assert len(control.take_notes()) == MAX_NOTES
 
 
 def test_start_pauses_and_blurs_are_noted_in_order_with_their_time():

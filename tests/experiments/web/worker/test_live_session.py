@@ -98,3 +98,11 @@ def test_an_unfinished_session_leaves_a_run_that_replays(house, tmp_path):
     save_run(tmp_path / "session", tmp_path / "run", house)
     assert (tmp_path / "run" / TOPDOWN).is_file()
     assert journal_of(tmp_path / "session") == tmp_path / "session" and journal_of(tmp_path) is None
+
+
+def test_a_journal_that_is_full_ends_the_session(tmp_path, house, monkeypatch):
+    session = play(tmp_path, house, wandering(0, 3), config=CONFIG)
+    assert session.end_reason is None
+    monkeypatch.setattr("experiments.web.worker.live_session.MAX_JOURNAL", 100)
+    assert session.end_reason == "interrupted"
+    crash(session)
