@@ -1,8 +1,9 @@
-"""A session with a person goes on after a crash as if there had been none, and leaves a run that replays."""
+"""A session with a person continues after a crash as if there had been none, and leaves a run that replays."""
 
 import itertools
 import shutil
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -58,7 +59,7 @@ def state(session):
 
 
 @pytest.mark.parametrize("cut", [1, 7, 49, 50, 51, 103, 250])
-def test_a_session_goes_on_in_the_same_state_with_the_same_plan(house, tmp_path, cut):
+def test_a_session_resumes_in_the_same_state_with_the_same_plan(house, tmp_path, cut):
     batches = list(wandering(cut, 300))
     whole = play(tmp_path / "whole", house, batches[:cut], config=CONFIG)
     shutil.copytree(tmp_path / "whole", tmp_path / "crashed")
@@ -73,18 +74,19 @@ def test_a_session_goes_on_in_the_same_state_with_the_same_plan(house, tmp_path,
         session.end("interrupted")
 
 
-@pytest.mark.parametrize("crashes", [(), (60, 61, 170)])
-def test_the_run_directory_of_a_session_replays(house, tmp_path, crashes):
+@pytest.mark.parametrize(("crashes", "planner"), [((), "ortools"), ((60, 61, 170), "exact")])
+def test_the_run_directory_of_a_session_replays(house, tmp_path, crashes, planner):
     batches = list(wandering(5, 260))
-    session = play(tmp_path / "session", house, batches[: crashes[0] if crashes else 260], config=CONFIG)
+    config = msgspec.structs.replace(CONFIG, planner=planner)
+    session = play(tmp_path / "session", house, batches[: crashes[0] if crashes else 260], config=config)
     for first, end in itertools.pairwise((*crashes, 260)):
         crash(session)
         session = play(tmp_path / "session", house, batches[first:end])
     session.end("interrupted")
     save_run(tmp_path / "session", tmp_path / "run", house)
     metrics = read_json(tmp_path / "run" / METRICS)
-    assert (metrics["ended"], metrics["user"]) == ("interrupted", "human")
-    assert session.config.settings() == CONFIG.settings()
+    assert (metrics["ended"], metrics["user"], metrics["planner"]) == ("interrupted", "human", planner)
+    assert metrics["planned_distance_m"] > 0 and session.config.settings() == config.settings()
     report = replay(tmp_path / "run", house=house)
     assert report.steps == 260
 
