@@ -13,11 +13,14 @@ from mjsim.files import replacing
 
 PANEL = (2.6, 2.4)  # inches
 PAIR, MEAN = "#9AA5B1", "#0072B2"
+LABELS = {"ipl_locations": "inverse path length", "nd_feasible": "normalized deviations"}
+UNITS = {"_s": "s", "_m": "m"}
+CAPTION = "grey: a person under each condition; blue: mean and 95 % confidence interval (t)"
 
 
 def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str]) -> None:
     """Write the figure: a row of panels per block, a panel per metric. The suffix of `path` says the format."""
-    size = PANEL[0] * len(metrics), PANEL[1] * len(blocks) + 0.3
+    size = PANEL[0] * len(metrics), PANEL[1] * len(blocks) + 0.5
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(len(blocks), len(metrics), squeeze=False)
@@ -26,12 +29,20 @@ def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str])
             _draw_panel(axes, block, metric)
         row[0].set_ylabel(block.label.replace(", ", "\n"), fontsize=8)
     for metric, axes in zip(metrics, panels[0], strict=True):
-        axes.set_title(metric, fontsize=9)
+        axes.set_title(axis_label(metric), fontsize=9)
+    figure.supxlabel(CAPTION, fontsize=7)
     mark_origin(figure, batch_origin(blocks))
     with replacing(path) as temporary:
         # No date in the file: equal batches give equal figures.
         metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix, {})
         figure.savefig(temporary, dpi=150, metadata=metadata)
+
+
+def axis_label(metric: str) -> str:
+    """The words of a column, and its unit."""
+    unit = UNITS.get(metric[-2:])
+    words = LABELS.get(metric, (metric[:-2] if unit else metric).replace("_", " "))
+    return f"{words} ({unit})" if unit else words
 
 
 def _draw_panel(axes: Axes, block: Block, metric: str) -> None:

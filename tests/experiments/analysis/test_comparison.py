@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import nct, ttest_rel
 
 from experiments.analysis.comparison import compare, mean_interval, missing_pairs, read_blocks
+from experiments.analysis.comparison_plot import CAPTION
 from experiments.cli.compare import METRICS
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError
@@ -129,7 +130,8 @@ def test_the_command_shows_and_writes_both_and_replaces_nothing(tmp_path, capsys
         assert (tmp_path / figure).stat().st_size > 5000
     printed = capsys.readouterr().out
     assert "none → optimal" in printed and SIMULATED in printed
-    assert f">{SIMULATED}</text>" in (tmp_path / "plot.svg").read_text()
+    drawn = (tmp_path / "plot.svg").read_text()
+    assert all(f">{text}</text>" in drawn for text in (SIMULATED, CAPTION, "completion time (s)"))
     with (tmp_path / "plot.svg.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 3 * len(METRICS)
