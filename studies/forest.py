@@ -1,9 +1,9 @@
 """Forest plot of effect sizes: the published ones and ours, row by row."""
 
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from experiments.analysis.comparison_plot import mark_origin
+from experiments.analysis.page import Picture
 from experiments.study.figures import svg
 from studies.published import Published
 from studies.score import EFFECT_SIZE, Score
@@ -16,7 +16,7 @@ FOREST = (
 PUBLISHED, TARGET, AGREES, DIFFERS = "#444444", "#DDDDDD", "#0072B2", "#D55E00"
 
 
-def forest(score: Score, published: Published) -> Markup:
+def forest(score: Score, published: Published) -> Picture:
     """A row for each effect size that was judged."""
     tests = {(t.measure, str(t.effect), t.objects): t for t in published.tests}
     rows = [r for r in score.rows if r.kind == EFFECT_SIZE and r.target is not None]
@@ -46,4 +46,4 @@ def forest(score: Score, published: Published) -> Markup:
     axes.set_xlim(left=0)
     axes.spines[["top", "right"]].set_visible(False)
     mark_origin(figure, score.origin)
-    return svg(figure, f"Published effect sizes and ours. {score.origin}.")
+    return svg(figure, f"Published effect sizes and ours. {score.origin}.", FOREST)

@@ -19,16 +19,11 @@ from experiments.errors import StatisticsError
 from experiments.record.origin import RECORDED
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.study.table import StudyTable
+from experiments.trials.exclusions import LeftOut
 from studies.prediction import effect_found, log_score, population_interval, prediction_interval
 from studies.published import Direction, Published, PublishedTest
 from studies.score_population import draw, population_eta_squared
-from studies.score_rules import (
-    points,
-    published_cells,
-    require_cells,
-    tests_of,
-    varies_most,
-)
+from studies.score_rules import points, published_cells, require_cells, tests_of, varies_most
 from studies.truth import true_studies
 
 POOL = 200  # people in each cell that make a pool
@@ -88,6 +83,7 @@ class Score:
         pool: Whether they are judged as a population.
         as_published: Whether every cell has as many people as in the published study.
         rows: The rows in the order of the published numbers.
+        left_out: People of the table who are not judged.
         truths: How many rows of each line of the summary agree in studies of people who are as published on average.
     """
 
@@ -96,6 +92,7 @@ class Score:
     pool: bool
     as_published: bool
     rows: tuple[Row, ...]
+    left_out: tuple[LeftOut, ...]
     truths: tuple[tuple[int, ...], ...] = ()
 
     def summary(self) -> Iterator[tuple[str, str, int, int, int, str]]:
@@ -164,8 +161,8 @@ def score(table: StudyTable, published: Published, *, seed: int = 0) -> Score:
         for row, *ours in zip(judge.rows(), *true, strict=True)
     )
     counts = [[sum(r.agrees is True for r in line) for *_, line in _lines(study)] for study in true]
-    truths = tuple(zip(*counts, strict=True))
-    return Score(table.origin, len(inside.rows), is_pool, known == Counter(sizes), rows, truths)
+    usual, truths = known == Counter(sizes), tuple(zip(*counts, strict=True))
+    return Score(table.origin, len(inside.rows), is_pool, usual, rows, table.left_out, truths)
 
 
 @dataclass(frozen=True)

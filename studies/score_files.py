@@ -9,8 +9,9 @@ from typing import Any
 
 from experiments.analysis.page import Block, Paragraph, p_value, page, table
 from experiments.record.files import write_json
+from experiments.study.robustness import left_out_table
 from mjsim.files import write_text_atomically
-from studies.forest import FOREST, forest
+from studies.forest import forest
 from studies.published import Published, inconsistencies
 from studies.score import POOL, TRUTHS, Row, Score
 from studies.score_population import REPLICATES
@@ -55,7 +56,8 @@ def score_page(score: Score, published: Published) -> str:
 
 def _sections(score: Score, published: Published) -> Iterator[tuple[str, Iterable[Block]]]:
     yield "Summary", (Paragraph(how(score)), table(SUMMARY, score.summary()))
-    yield "Published and ours", (forest(score, published), Paragraph(FOREST))
+    yield "People who are left out", (left_out_table(score.left_out),)
+    yield "Published and ours", (forest(score, published),)
     for fitted, title, about in (
         (True, "6 objects: may be fitted", ()),
         (False, "All numbers of objects: not fitted", (Paragraph(NOT_FITTED),)),

@@ -7,6 +7,9 @@ from typing import NamedTuple
 import jinja2
 from markupsafe import Markup
 
+from experiments.analysis.statistics.effects import FTest
+from experiments.analysis.statistics.mixed import WaldTest
+
 
 class Paragraph(NamedTuple):
     """Plain text; `kind` is its class in HTML."""
@@ -22,7 +25,14 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[object]]
 
 
-Block = Paragraph | Table | Markup  # the last holds a figure
+class Picture(NamedTuple):
+    """A figure, and its caption; figures are numbered."""
+
+    drawing: Markup
+    caption: str
+
+
+Block = Paragraph | Table | Picture
 
 
 def page(title: str, origin: str, sections: Iterable[tuple[str, Iterable[Block]]]) -> str:
@@ -64,3 +74,8 @@ def shown(value: object) -> str:
 def p_value(p: float | None) -> str:
     """A p value as it is printed: three decimals, or below .001."""
     return "-" if p is None else "< .001" if p < 0.001 else f"{p:.3f}".lstrip("0")
+
+
+def freedom(test: FTest | WaldTest) -> str:
+    """Degrees of freedom of an F test."""
+    return f"{test.df1}, {test.df2:.4g}"

@@ -1,25 +1,31 @@
 """The analysis of a study: descriptions, tests and models; those that cannot be computed give a reason."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, is_dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from experiments.analysis.comparison import Interval, mean_interval
-from experiments.analysis.statistics.anova import Values, brown_forsythe, one_way, two_way, welch
+from experiments.analysis.statistics.anova import EFFECTS, Values, brown_forsythe, one_way, two_way, welch
+from experiments.analysis.statistics.diagnostics import diagnose
 from experiments.analysis.statistics.effects import FTest
-from experiments.analysis.statistics.mixed import mixed_model
+from experiments.analysis.statistics.mixed import MixedModel, WaldTest, mixed_model
 from experiments.analysis.statistics.mixtures import fit_mixtures
-from experiments.analysis.statistics.models import ordinal_model
+from experiments.analysis.statistics.models import Chi2Test, OrdinalModel, ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
 from experiments.analysis.statistics.power import POWER, detectable_eta_squared
+from experiments.analysis.statistics.unequal import hc3, welch_james
 from experiments.errors import StatisticsError
 from experiments.study.measures import LIKERT_PREFIX, Measures
 from experiments.study.table import StudyTable
 
+ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
 STRICT = "nd_strict_2n"  # holds how many visits deviated, as its denominator is known
+
+
+Test = FTest | WaldTest | Chi2Test
 
 
 @dataclass(frozen=True)
@@ -73,33 +79,62 @@ class Analysis:
             "gaps": [asdict(gap) for gap in self.table.gaps],
             "columns": dict(self.table.sources),
             "descriptions": [asdict(d) for d in self.descriptions],
-            "results": [vars(r) | {"value": _plain(r.value)} for r in self.results],
+            "results": [vars(r) | {"value": plain(r.value)} for r in self.results],
         }
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """A result as JSON has it."""
     if isinstance(value, FTest):
         return value.as_json()
     if isinstance(value, dict):
-        return {name: _plain(one) for name, one in value.items()}
+        return {name: plain(one) for name, one in value.items()}
     if isinstance(value, list):
-        return [_plain(one) for one in value]
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+        return [plain(one) for one in value]
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return value
 
 
 def analyse(table: StudyTable, measures: Measures) -> Analysis:
     """Compute all descriptions, tests and models that the data allow."""
+    results = test_results(table, measures)
+    for name in table.columns:
+        if name in measures.objective or name.startswith(LIKERT_PREFIX):
+            for objects in table.levels():
+                work = partial(compare_pairs, table.groups(name, objects), measures.equivalence.pair)
+                results.append(_attempt(name, "pairs", objects, work))
+        if name in measures.objective:
+            results.append(_attempt(name, "diagnostics", None, partial(diagnose, cells_of(table, name))))
+    results += [more for r in results for more in _sensitivity(r, measures)]
+    results += _acceptance(table)
+    return Analysis(table, measures, tuple(_describe(table)), tuple(results))
+
+
+def test_results(table: StudyTable, measures: Measures) -> list[Result]:
+    """Everything that `tests_of` a result yields: F tests, mixed and ordinal models."""
     results = []
-    for name in (n for n in table.columns if not n.startswith(LIKERT_PREFIX)):
-        results += [r for objects in table.levels() for r in _one_way(table, measures, name, objects)]
-        if len(table.levels()) > 1:
+    for name in table.columns:
+        answers = name.startswith(LIKERT_PREFIX)
+        for objects in table.levels():
+            results += _answer_tests(table, name, objects) if answers else one_way_tests(table, name, objects)
+        if len(table.levels()) > 1 and not answers:
             results += two_way_tests(table, name)
         if name in measures.objective:
             results.append(_attempt(name, "mixed model", None, partial(_mixed, table, name)))
-    results += _acceptance(table)
-    for name in (n for n in table.columns if n.startswith(LIKERT_PREFIX)):
-        results += [r for objects in table.levels() for r in _likert(table, measures, name, objects)]
-    return Analysis(table, measures, tuple(_describe(table)), tuple(results))
+    return results
+
+
+def tests_of(result: Result) -> Iterator[tuple[str, Test]]:
+    """Tests of a result with the names of their effects."""
+    if isinstance(result.value, FTest):
+        yield EFFECTS[0], result.value
+    elif isinstance(result.value, OrdinalModel):
+        yield EFFECTS[0], result.value.test
+    elif isinstance(result.value, MixedModel):
+        yield from result.value.tests.items()
+    elif isinstance(result.value, dict):
+        yield from ((effect, test) for effect, test in result.value.items() if isinstance(test, FTest))
 
 
 def _attempt(measure: str, kind: str, objects: int | None, work: Callable[[], Any]) -> Result:
@@ -109,32 +144,26 @@ def _attempt(measure: str, kind: str, objects: int | None, work: Callable[[], An
         return Result(measure, kind, objects, None, str(error))
 
 
-def _one_way(table: StudyTable, measures: Measures, name: str, objects: int) -> list[Result]:
-    groups = table.groups(name, objects)
-    results = one_way_tests(table, name, objects)
-    if name in measures.objective:
-        results.append(
-            _attempt(name, "pairs", objects, partial(compare_pairs, groups, measures.equivalence.pair))
-        )
-    test = results[0].value
-    if test is not None:
+def _sensitivity(result: Result, measures: Measures) -> Iterator[Result]:
+    """What a study of this size can show, of Fisher's analysis of a measure."""
+    test, bound = result.value, measures.equivalence.eta_squared
+    if result.kind == ONE_WAY and test is not None and not result.measure.startswith(LIKERT_PREFIX):
         size = detectable_eta_squared(test.df1, test.df2, test.people)
-        equivalence = {
-            "bound": measures.equivalence.eta_squared,
-            "p": test.p_of_equivalence(measures.equivalence.eta_squared),
-        }
-        results.append(Result(name, "equivalence", objects, equivalence, None))
-        results.append(Result(name, "power", objects, {"power": POWER, "detectable_eta_squared": size}, None))
-    return results
+        of = result.measure, result.objects
+        yield Result(of[0], "equivalence", of[1], {"bound": bound, "p": test.p_of_equivalence(bound)}, None)
+        yield Result(of[0], "power", of[1], {"power": POWER, "detectable_eta_squared": size}, None)
 
 
 def one_way_tests(table: StudyTable, name: str, objects: int) -> list[Result]:
     """F tests of a measure at a number of objects."""
     groups = table.groups(name, objects)
+    members = [c for c, values in groups.items() for _ in values]
+    pooled = np.concatenate([np.empty(0), *groups.values()]), np.array(members), np.zeros(len(members))
     return [
-        _attempt(name, "one-way", objects, partial(one_way, groups)),
+        _attempt(name, ONE_WAY, objects, partial(one_way, groups)),
         _attempt(name, "welch", objects, partial(welch, groups)),
         _attempt(name, "brown-forsythe", objects, partial(brown_forsythe, groups)),
+        _attempt(name, "HC3", objects, lambda: hc3(*pooled)[EFFECTS[0]]),
     ]
 
 
@@ -143,9 +172,16 @@ def two_way_tests(table: StudyTable, name: str) -> list[Result]:
     known = ~np.isnan(table.columns[name])
     factors = table.columns[name][known], table.assistance[known], table.objects[known]
     return [
-        _attempt(name, f"two-way, Type {numeral}", None, partial(two_way, *factors, kind=kind))
-        for kind, numeral in ((2, "II"), (3, "III"))
+        _attempt(name, TWO_WAY, None, partial(two_way, *factors)),
+        _attempt(name, "two-way, Type III", None, partial(two_way, *factors, kind=3)),
+        _attempt(name, "two-way, Welch-James", None, partial(welch_james, *factors)),
+        _attempt(name, "two-way, HC3", None, partial(hc3, *factors)),
     ]
+
+
+def cells_of(table: StudyTable, name: str) -> dict[str, Values]:
+    """Known values of a column by cell, those of each number of objects together."""
+    return {f"{c}, {n}": v for n in table.levels() for c, v in table.groups(name, n).items()}
 
 
 def _mixed(table: StudyTable, name: str) -> Any:
@@ -173,12 +209,11 @@ def _acceptance(table: StudyTable) -> list[Result]:
     return results
 
 
-def _likert(table: StudyTable, measures: Measures, name: str, objects: int) -> list[Result]:
+def _answer_tests(table: StudyTable, name: str, objects: int) -> list[Result]:
     groups: Mapping[str, Values] = table.groups(name, objects)
     return [
-        _attempt(name, "one-way", objects, partial(one_way, groups)),
+        _attempt(name, ONE_WAY, objects, partial(one_way, groups)),
         _attempt(name, "ordinal", objects, partial(ordinal_model, groups)),
-        _attempt(name, "pairs", objects, partial(compare_pairs, groups, measures.equivalence.pair)),
     ]
 
 

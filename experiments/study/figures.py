@@ -2,7 +2,8 @@
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -10,9 +11,11 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from experiments.analysis.comparison import mean_interval
 from experiments.analysis.comparison_plot import mark_origin
+from experiments.analysis.page import Picture
 from experiments.study.analysis import Analysis
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.study.table import ANSWERS, StudyTable
@@ -25,43 +28,56 @@ PANEL = (3.0, 2.6)  # inches
 JITTER = 0.12  # of a category's width
 
 
-def by_condition(table: StudyTable, labels: Mapping[str, str], objects: int) -> Markup:
-    """A panel per measure: each person as a dot, and means with their 95 % confidence intervals."""
-    names = [name for name in labels if table.groups(name, objects)]
-    figure = Figure(figsize=(PANEL[0] * max(len(names), 1), PANEL[1]), layout="constrained")
-    for axes, name in zip(_panels(figure, len(names)), names, strict=True):
-        for place, (condition, values) in enumerate(table.groups(name, objects).items()):
-            colour = _colour(table, condition)
-            # A fixed jitter: equal data give equal figures.
-            shift = JITTER * np.sin(np.arange(len(values)) * 2.4)
-            axes.plot(place + shift, values, ".", color=colour, ms=3, alpha=0.5)
-            low, high = mean_interval(values) or (values.mean(), values.mean())
-            error = [[values.mean() - low], [high - values.mean()]]
-            axes.errorbar(place + 0.28, values.mean(), error, fmt="o", color="black", capsize=3, ms=5)
-        shown = list(table.groups(name, objects))
-        axes.set_xticks(range(len(shown)), shown)
-        axes.set_ylabel(labels[name], fontsize=9)
-    return _svg(figure, f"Measures by condition with {objects} objects", table)
+def by_condition(table: StudyTable, labels: Mapping[str, str]) -> Picture:
+    """A row of panels per measure: each person as a dot, and means with their 95 % confidence intervals."""
+    levels = table.levels()
+    figure = Figure(figsize=(PANEL[0] * len(levels), PANEL[1] * len(labels)), layout="constrained")
+    for panels, name in zip(grid(figure, len(labels), len(levels)), labels, strict=True):
+        for axes, objects in zip(panels, levels, strict=True):
+            _draw_people(axes, table, name, objects)
+            axes.set_ylim(*_limits(table, name))
+        panels[0].set_ylabel(labels[name], fontsize=8)
+    for axes, objects in zip(figure.axes, levels, strict=False):
+        axes.set_title(f"{objects} objects", fontsize=9)
+    caption = "Each dot is a person; black: means with 95 % confidence intervals (Student's t)."
+    return framed(figure, "Measures by condition and number of objects", table, caption)
 
 
-def interactions(table: StudyTable, labels: Mapping[str, str]) -> Markup:
+def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None:
+    groups = table.groups(name, objects)
+    for place, (condition, values) in enumerate(groups.items()):
+        # A fixed jitter: equal data give equal figures.
+        shift = JITTER * np.sin(np.arange(len(values)) * 2.4)
+        axes.plot(place + shift, values, ".", color=_colour(table, condition), ms=3, alpha=0.5)
+        low, high = mean_interval(values) or (values.mean(), values.mean())
+        error = [[values.mean() - low], [high - values.mean()]]
+        axes.errorbar(place + 0.28, values.mean(), error, fmt="o", color="black", capsize=3, ms=5)
+    axes.set_xticks(range(len(groups)), list(groups))
+
+
+def interactions(table: StudyTable, labels: Mapping[str, str]) -> Picture:
     """A panel per measure: means by number of objects, a line per condition, with 95 % confidence intervals."""
     figure = Figure(figsize=(PANEL[0] * len(labels), PANEL[1] + 0.3), layout="constrained")
-    for axes, name in zip(_panels(figure, len(labels)), labels, strict=True):
+    for axes, name in zip(grid(figure, 1, len(labels))[0], labels, strict=True):
         for k, condition in enumerate(table.conditions()):
             _draw_line(axes, table, name, condition, shift=0.25 * (k - (len(table.conditions()) - 1) / 2))
         axes.set_xticks(table.levels())
         axes.set_xlabel("objects", fontsize=8)
-        axes.set_ylabel(labels[name], fontsize=9)
+        axes.set_ylabel(labels[name], fontsize=8)
+        axes.set_ylim(*_limits(table, name))
     figure.axes[0].legend(fontsize=7, frameon=False)
-    return _svg(figure, "Means by number of objects and condition", table)
+    caption = (
+        "Means by number of objects with 95 % confidence intervals, beside each other. Each measure has the axis "
+        "of the figure above."
+    )
+    return framed(figure, "Means by number of objects and condition", table, caption)
 
 
-def variances(table: StudyTable, name: str, label: str) -> Markup:
+def variances(table: StudyTable, name: str, label: str) -> Picture:
     """Distribution of a measure in each cell: a row of histograms per condition."""
     levels, conditions = table.levels(), table.conditions()
     figure = Figure(figsize=(2.2 * len(levels), 1.3 * len(conditions) + 0.5), layout="constrained")
-    panels = figure.subplots(len(conditions), len(levels), squeeze=False, sharex=True)
+    panels = figure.subplots(len(conditions), len(levels), squeeze=False, sharex=True, sharey=True)
     values = table.columns[name][~np.isnan(table.columns[name])]
     edges = np.linspace(values.min(), values.max() if np.ptp(values) else values.min() + 1.0, 16)
     for row, condition in zip(panels, conditions, strict=True):
@@ -69,20 +85,21 @@ def variances(table: StudyTable, name: str, label: str) -> Markup:
             found = table.groups(name, objects).get(condition)
             if found is not None:
                 axes.hist(found, edges, color=_colour(table, condition))
-            axes.set_yticks([])
-        row[0].set_ylabel(condition, fontsize=8)
+            axes.tick_params(labelsize=7)
+        row[0].set_ylabel(f"{condition}\n(people)", fontsize=8)
     for axes, objects in zip(panels[0], levels, strict=True):
         axes.set_title(f"{objects} objects", fontsize=8)
     figure.supxlabel(label, fontsize=9)
-    return _svg(figure, f"Distribution of {label.lower()}", table)
+    caption = "Number of people by value, in each cell."
+    return framed(figure, f"Distribution of {label.lower()}", table, caption)
 
 
-def answers(analysis: Analysis) -> Markup:
+def answers(analysis: Analysis) -> Picture:
     """Shares of the answers to every survey item by condition, all numbers of objects together."""
     table = analysis.table
     items = [name for name in table.columns if name.startswith(LIKERT_PREFIX)]
     figure = Figure(figsize=(7.0, 0.9 * len(items) + 0.6), layout="constrained")
-    for axes, item in zip(_panels(figure, len(items), stacked=True), items, strict=True):
+    for axes, item in zip(grid(figure, len(items), 1)[:, 0], items, strict=True):
         groups = table.groups(item)
         for place, values in enumerate(groups.values()):
             left = 0.0
@@ -93,11 +110,13 @@ def answers(analysis: Analysis) -> Markup:
         axes.set_yticks([-k for k in range(len(groups))], list(groups))
         axes.set_title(analysis.measures.likert[item.removeprefix(LIKERT_PREFIX)], fontsize=9, loc="left")
         axes.set_xlim(0, 1)
-    return _svg(figure, "Shares of answers from 1 (brown) to 5 (violet)", table)
+    figure.supxlabel("share of people", fontsize=9)
+    caption = "Shares of the answers from 1 (brown, disagree) to 5 (violet, agree), all numbers of objects together."
+    return framed(figure, "Answers by condition", table, caption)
 
 
-def svg(figure: Figure, title: str) -> Markup:
-    """A figure as an element of a page."""
+def svg(figure: Figure, title: str, caption: str) -> Picture:
+    """A figure as a block of a page."""
     FigureCanvasSVG(figure)
     text = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": "mjsim", "svg.fonttype": "path"}):
@@ -105,21 +124,30 @@ def svg(figure: Figure, title: str) -> Markup:
     found = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
     found = found[found.index("<svg") :]
     found = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", found)
-    return Markup(found.replace("<svg", f'<svg role="img" aria-label="{title}"', 1))
+    return Picture(Markup(found.replace("<svg", f'<svg role="img" aria-label="{title}"', 1)), caption)
 
 
-def _svg(figure: Figure, title: str, table: StudyTable) -> Markup:
+def framed(figure: Figure, title: str, table: StudyTable, caption: str) -> Picture:
+    """A figure of a study, marked with the origin of its people."""
     mark_origin(figure, table.origin)
-    return svg(figure, f"{title}. {table.origin}.")
+    return svg(figure, f"{title}. {table.origin}.", caption)
 
 
-def _panels(figure: Figure, count: int, *, stacked: bool = False) -> Sequence[Axes]:
-    shape = (max(count, 1), 1) if stacked else (1, max(count, 1))
-    panels: list[Axes] = figure.subplots(*shape, squeeze=False).ravel().tolist()
-    for axes in panels:
+def grid(figure: Figure, rows: int, columns: int) -> NDArray[Any]:
+    """Panels with small labels, (rows, columns)."""
+    panels: NDArray[Any] = figure.subplots(rows, columns, squeeze=False)
+    for axes in panels.ravel():
         axes.tick_params(labelsize=7)
         axes.spines[["top", "right"]].set_visible(False)
-    return panels[:count]
+    return panels
+
+
+def _limits(table: StudyTable, name: str) -> tuple[float, float]:
+    """Ends of the axis of a measure, the same in all figures."""
+    values = table.columns[name]
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    margin = 0.04 * (high - low) or 0.5
+    return low - margin, high + margin
 
 
 def _colour(table: StudyTable, condition: str) -> str:

@@ -2,7 +2,8 @@
 
 import csv
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from experiments.analysis.statistics.effects import FTest
+from experiments.analysis.statistics.mixed import WaldTest
 from experiments.record.files import write_json
 from experiments.record.run_directory import check_file
-from experiments.study.analysis import Analysis, Result
+from experiments.study.analysis import Analysis, Test, tests_of
 from experiments.study.table import StudyTable
 from experiments.trials.trial_config import SEEDS
 from mjsim.files import replacing, write_text_atomically
@@ -60,14 +62,6 @@ def people_table(table: StudyTable) -> pa.Table:
     return found.select([c for c in found.column_names if not pa.types.is_null(found.schema.field(c).type)])
 
 
-def f_tests(result: Result) -> Iterator[tuple[str, FTest]]:
-    """F tests of a result with the names of their effects."""
-    if isinstance(result.value, FTest):
-        yield "assistance", result.value
-    elif isinstance(result.value, dict):
-        yield from ((effect, test) for effect, test in result.value.items() if isinstance(test, FTest))
-
-
 def _tests_csv(analysis: Analysis) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, TEST_COLUMNS, lineterminator="\n", restval="")
@@ -82,13 +76,15 @@ def _tests_csv(analysis: Analysis) -> str:
         }
         if result.reason is not None:
             writer.writerow({**same, "reason": result.reason})
-        for effect, test in f_tests(result):
+        for effect, test in tests_of(result):
             writer.writerow({**same, "effect": effect, **_test_row(test)})
     return text.getvalue()
 
 
-def _test_row(test: FTest) -> Mapping[str, Any]:
-    values = test.as_json()
-    low, high = values.pop("interval") or ("", "")
-    size = values.pop("eta_squared")
-    return {**values, "partial_eta_squared": size, "low": low, "high": high}
+def _test_row(test: Test) -> Mapping[str, Any]:
+    if isinstance(test, FTest):
+        values = test.as_json()
+        low, high = values.pop("interval") or ("", "")
+        return {"partial_eta_squared": values.pop("eta_squared"), "low": low, "high": high, **values}
+    values = asdict(test)
+    return values if isinstance(test, WaldTest) else {"df1": values.pop("df"), **values}

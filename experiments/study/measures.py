@@ -40,6 +40,10 @@ class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     likert: dict[str, str]
     equivalence: Equivalence
 
+    def answers(self) -> dict[str, str]:
+        """Labels of answers by column."""
+        return {LIKERT_PREFIX + name: label for name, label in self.likert.items()}
+
 
 def read_measures() -> Measures:
     """The committed choice."""

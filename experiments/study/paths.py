@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import shapely
-from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.analysis.comparison_plot import mark_origin
+from experiments.analysis.page import Picture
 from experiments.errors import RecordError
 from experiments.house import House
 from experiments.record import records
@@ -28,7 +28,7 @@ WIDTH = 4.0  # inches of a panel
 DISTANCE = "distance"
 
 
-def paths_figure(table: StudyTable, folder: Path) -> Markup:
+def paths_figure(table: StudyTable, folder: Path) -> Picture:
     """The figure: a panel per condition, at the smallest number of objects, from the run directories in `folder`."""
     shown = [(row, found) for row in median_people(table) if (found := _run_of(row, folder)) is not None]
     if not shown:
@@ -38,7 +38,11 @@ def paths_figure(table: StudyTable, folder: Path) -> Markup:
         _draw_run(axes, row, run)
     figure.axes[0].legend(fontsize=7, loc="lower left")
     mark_origin(figure, table.origin)
-    return svg(figure, f"Planned and walked paths. {table.origin}.")
+    caption = (
+        f"The person with the median distance in each condition, with {table.levels()[0]} objects: the route that was "
+        "planned at the start, and the one that was walked, in the house seen from above; metres walked in the titles."
+    )
+    return svg(figure, f"Planned and walked paths. {table.origin}.", caption)
 
 
 def median_people(table: StudyTable) -> Iterator[Any]:

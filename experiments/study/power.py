@@ -17,6 +17,7 @@ from experiments.analysis.statistics.power import POWER, people_per_cell
 from experiments.errors import ConfigError, StatisticsError
 from experiments.study.cost import StudyCost
 from experiments.study.table import StudyTable
+from experiments.trials.exclusions import LeftOut
 
 RESAMPLES = 200  # of the pool
 STUDIES = 400  # drawn to see whether the power holds
@@ -76,6 +77,7 @@ class PowerPlan:
     hours: float  # of all people together
     cost_interval: Interval | None  # cost at both ends of `interval`, or None
     hours_interval: Interval | None  # hours at both ends of it, or None
+    left_out: tuple[LeftOut, ...]  # people of the pool's table who are no people of the pool
 
 
 def plan_power(
@@ -108,6 +110,7 @@ def plan_power(
         cost.hours(people),
         None if ends is None else (cost.total(ends[0]), cost.total(ends[1])),
         None if ends is None else (cost.hours(ends[0]), cost.hours(ends[1])),
+        table.left_out,
     )
 
 

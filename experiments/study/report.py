@@ -1,17 +1,17 @@
 """The report of a study: one HTML file with all figures, tests and models."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from experiments.analysis.page import Block, Paragraph, Table, p_value, page, shown, table
+from experiments.analysis.page import Block, Paragraph, Table, freedom, p_value, page, shown, table
 from experiments.analysis.statistics.effects import FTest
-from experiments.analysis.statistics.mixed import MixedModel, WaldTest
+from experiments.analysis.statistics.mixed import MixedModel
 from experiments.analysis.statistics.models import OrdinalModel
 from experiments.errors import ExperimentError
 from experiments.record.origin import RECORDED
-from experiments.study.analysis import STRICT, Analysis, Result
+from experiments.study.analysis import ONE_WAY, STRICT, TWO_WAY, Analysis, Result, tests_of
+from experiments.study.assumptions import assumptions, specification_curve
 from experiments.study.figures import answers, by_condition, interactions, variances
-from experiments.study.files import f_tests
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.study.paths import paths_figure
 from experiments.study.robustness import Selection
@@ -22,7 +22,7 @@ CAUTION = (
     "These people were simulated. The numbers follow from a model of people and are no evidence about people; "
     "answers to survey questions are not simulated."
 )
-TEST_HEAD = ("measure", "test", "effect", "objects", "F", "df", "p", "partial η²", "90 % interval", "of")
+TEST_HEAD = ("measure", "test", "effect", "objects", "F", "df", "p", "partial η²", "90 % interval")
 PAIR_HEAD = (
     "measure",
     "objects",
@@ -45,6 +45,8 @@ def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
         ("Measures by condition", _figures(analysis)),
         ("Answers", _answers(analysis)),
         ("Analyses of variance", _tests(analysis)),
+        ("Assumptions", assumptions(analysis, _labels(analysis))),
+        ("Readings and analyses of each measure", _curves(analysis)),
         ("Pairs of conditions", _pairs(analysis)),
         ("Kinds of people by acceptance", _mixtures(analysis)),
         ("Houses as a random factor", _mixed(analysis)),
@@ -57,12 +59,12 @@ def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
 
 def _summary(analysis: Analysis) -> Iterator[Block]:
     """Every hypothesis about the scored reading of a measure: one F test each, and the pairs it is about."""
-    two_way, labels = "two-way, Type II", _labels(analysis)
+    labels = _labels(analysis)
     effects, pairs = [], []
     for name, objects in ((n, o) for n in labels for o in (*analysis.table.levels(), None)):
-        result = analysis.find(name, "one-way" if objects else two_way, objects)
-        for effect, t in () if result is None else f_tests(result):
-            shown_test = f"F({_freedom(t)}) = {shown(t.statistic)}, p {p_value(t.p)}"
+        result = analysis.find(name, ONE_WAY if objects else TWO_WAY, objects)
+        for effect, t in _f_tests([result] if result else []):
+            shown_test = f"F({freedom(t)}) = {shown(t.statistic)}, p {p_value(t.p)}"
             effects.append((labels[name], effect, objects or "all", t.eta_squared, t.interval, shown_test))
         compared = analysis.find(name, "pairs", objects)
         for p in compared.value if compared is not None and compared.value else ():
@@ -105,23 +107,15 @@ def _figures(analysis: Analysis) -> Iterator[Block]:
     found, labels = analysis.table, _labels(analysis)
     if not labels:
         return
-    yield by_condition(found, labels, found.levels()[0])
-    yield Paragraph(
-        f"With {found.levels()[0]} objects: each dot is a person; black: means with 95 % confidence intervals.",
-        "missing",
-    )
+    yield by_condition(found, labels)
     if len(found.levels()) > 1:
         yield interactions(found, labels)
-        yield Paragraph(
-            "Means by number of objects with 95 % confidence intervals, beside each other.", "missing"
-        )
     name = next(iter(labels))
     if found.groups(name):
         yield variances(found, name, labels[name])
-        yield Paragraph("Number of people by value, in each cell.", "missing")
     rows = [d for d in analysis.descriptions if d.measure in labels]
     yield table(
-        ("measure", "condition", "objects", "people", "mean", "95 % interval", "deviation", "median"),
+        ("measure", "condition", "objects", "people", "mean", "95 % interval", "SD", "median"),
         [
             (labels[d.measure], d.assistance, d.objects, d.people, d.mean, d.interval, d.deviation, d.median)
             for d in rows
@@ -136,7 +130,7 @@ def _answers(analysis: Analysis) -> tuple[Block, ...]:
     models = [(r, r.value) for r in analysis.results if isinstance(r.value, OrdinalModel)]
     rows = [
         (
-            analysis.measures.likert[r.measure.removeprefix(LIKERT_PREFIX)],
+            analysis.measures.answers()[r.measure],
             r.objects,
             m.people,
             m.test.statistic,
@@ -150,38 +144,47 @@ def _answers(analysis: Analysis) -> tuple[Block, ...]:
     return answers(analysis), table(head, rows)
 
 
-def _tests(analysis: Analysis) -> tuple[Block, ...]:
+def _tests(analysis: Analysis) -> Iterator[Block]:
+    """Of the scored readings; `_curves` shows the others."""
+    scored = analysis.measures.objective
+    names = {name: scored[name].label for name in _labels(analysis)} | analysis.measures.answers()
     rows = [
         (
-            r.measure,
-            r.kind,
-            effect,
-            r.objects,
-            t.statistic,
-            _freedom(t),
-            p_value(t.p),
-            t.eta_squared,
-            t.interval,
-            t.of,
+            *(names[r.measure], r.kind, effect, r.objects or "all"),
+            *(t.statistic, freedom(t), p_value(t.p), t.eta_squared, t.interval),
         )
         for r in analysis.results
-        for effect, t in f_tests(r)
+        if r.measure in names
+        for effect, t in _f_tests([r])
     ]
-    return (Table(TEST_HEAD, rows),)
+    yield table(TEST_HEAD, rows)
+    if rows:
+        yield Paragraph(
+            "Partial η² is a share of the variance. In Welch's test, Welch-James and HC3 each group counts in units of "
+            "its own variance; in Brown and Forsythe's it is a share of the variance of the distances from the medians."
+        )
 
 
-def _freedom(test: FTest | WaldTest) -> str:
-    return f"{test.df1}, {test.df2:.4g}"
+def _f_tests(results: Iterable[Result]) -> Iterator[tuple[str, FTest]]:
+    for result in results:
+        yield from ((effect, test) for effect, test in tests_of(result) if isinstance(test, FTest))
+
+
+def _curves(analysis: Analysis) -> Iterator[Block]:
+    for name, label in _labels(analysis).items():
+        yield specification_curve(analysis, name, label)
 
 
 def _pairs(analysis: Analysis) -> tuple[Block, ...]:
-    rows = []
+    rows, names = [], _labels(analysis) | analysis.measures.answers()
     for result in (r for r in analysis.results if r.kind == "pairs" and r.value):
         for p in result.value:
             corrected = (p_value(p.tukey_p), p_value(p.games_howell_p), p_value(p.holm_p))
             size = (p.g, p.g_interval, p_value(p.equivalence_p), p.verdict)
             pair = f"{p.second} - {p.first}"
-            rows.append((result.measure, result.objects, pair, p.difference, p.interval, *corrected, *size))
+            rows.append(
+                (names[result.measure], result.objects, pair, p.difference, p.interval, *corrected, *size)
+            )
     bound = analysis.measures.equivalence.pair
     about = Paragraph(
         f"Equivalent: Tukey's test finds no difference, and two one-sided tests show that it is below {bound:g} "
@@ -207,10 +210,10 @@ def _mixtures(analysis: Analysis) -> tuple[Block, ...]:
 def _mixed(analysis: Analysis) -> tuple[Block, ...]:
     rows = [
         (
-            r.measure,
+            _labels(analysis)[r.measure],
             effect,
             t.statistic,
-            _freedom(t),
+            freedom(t),
             p_value(t.p),
             m.house_variance,
             m.residual_variance,
@@ -220,16 +223,25 @@ def _mixed(analysis: Analysis) -> tuple[Block, ...]:
         if isinstance(m := r.value, MixedModel)
         for effect, t in m.tests.items()
     ]
-    head = ("measure", "effect", "Wald F", "df", "p", "variance of houses", "of people in a house", "houses")
+    head = (
+        "measure",
+        "effect",
+        "Wald F",
+        "df",
+        "p",
+        "variance of houses (unit²)",
+        "of people in a house (unit²)",
+        "houses",
+    )
     return (Table(head, rows),)
 
 
 def _power(analysis: Analysis) -> tuple[Block, ...]:
-    rows = []
-    for r in (r for r in analysis.results if r.kind == "power"):
+    rows, labels = [], _labels(analysis)
+    for r in (r for r in analysis.results if r.kind == "power" and r.measure in labels):
         equivalence = analysis.find(r.measure, "equivalence", r.objects)
         p = None if equivalence is None else p_value(equivalence.value["p"])
-        rows.append((r.measure, r.objects, r.value["detectable_eta_squared"], p))
+        rows.append((labels[r.measure], r.objects, r.value["detectable_eta_squared"], p))
     bound = analysis.measures.equivalence.eta_squared
     head = ("measure", "objects", "partial η² found in 80 % of such studies", f"p of η² ≥ {bound:g}")
     return (Table(head, rows),)

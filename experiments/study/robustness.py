@@ -7,21 +7,21 @@ from typing import Any
 
 import msgspec
 
-from experiments.analysis.page import Block, Paragraph, p_value, table
-from experiments.analysis.statistics.effects import ALPHA, FTest
+from experiments.analysis.page import Block, Paragraph, Table, p_value, table
+from experiments.analysis.statistics.effects import ALPHA
 from experiments.errors import RecordError
-from experiments.study.analysis import one_way_tests, two_way_tests
-from experiments.study.files import f_tests
+from experiments.study.analysis import ONE_WAY, TWO_WAY, Test, plain, test_results, tests_of
 from experiments.study.measures import LIKERT_PREFIX, Measures
 from experiments.study.table import StudyTable, study_table
-from experiments.trials.exclusions import BY_NAME, UNFINISHED, Exclusions
+from experiments.trials.exclusions import BY_NAME, UNFINISHED, Exclusions, LeftOut
 
+SHOWN = "the main tests, and all others that decide otherwise; stats.json holds every test."
 Key = tuple[str, str, str, int | None]  # measure, test, effect, objects
 
 
 @dataclass(frozen=True)
 class Change:
-    """An F test with all rules, and without one of them; None where it cannot be computed."""
+    """A test with all rules, and without one of them; None where it cannot be computed."""
 
     measure: str
     test: str
@@ -50,14 +50,14 @@ def leave_one_out(
     """For each rule, and for the people who are left out by name, the tests with and without it."""
     found = []
     whole = study_table(everybody, measures, path, exclusions)
-    tests = _tests(whole)
+    tests = _tests(whole, measures)
     for rule, reason, rest in _without_each(exclusions):
         theirs = [person for person in whole.left_out if rule in person.rules]
         alone = sum(len(person.rules) == 1 for person in theirs)
         changes: tuple[Change, ...] = ()
         refused = None
         try:
-            others = _tests(study_table(everybody, measures, path, rest)) if alone else {}
+            others = _tests(study_table(everybody, measures, path, rest), measures) if alone else {}
             changes = tuple(
                 _change(key, tests.get(key), others.get(key)) for key in {**tests, **others} if alone
             )
@@ -77,21 +77,17 @@ def _without_each(exclusions: Exclusions) -> Iterator[tuple[str, str, Exclusions
         yield BY_NAME, reasons, msgspec.structs.replace(exclusions, people=())
 
 
-def _tests(people: StudyTable) -> dict[Key, FTest]:
-    found = {}
-    for name in people.columns:
-        results = [r for objects in people.levels() for r in one_way_tests(people, name, objects)]
-        if len(people.levels()) > 1 and not name.startswith(LIKERT_PREFIX):
-            results += two_way_tests(people, name)
-        for result in results:
-            for effect, test in f_tests(result):
-                found[name, result.kind, effect, result.objects] = test
-    return found
+def _tests(people: StudyTable, measures: Measures) -> dict[Key, Test]:
+    return {
+        (result.measure, result.kind, effect, result.objects): test
+        for result in test_results(people, measures)
+        for effect, test in tests_of(result)
+    }
 
 
-def _change(key: Key, one: FTest | None, other: FTest | None) -> Change:
+def _change(key: Key, one: Test | None, other: Test | None) -> Change:
     decisions = [test is not None and test.p < ALPHA for test in (one, other)]
-    whole, without = (None if test is None else test.as_json() for test in (one, other))
+    whole, without = (None if test is None else plain(test) for test in (one, other))
     return Change(*key, whole, without, decisions[0] != decisions[1])
 
 
@@ -123,14 +119,22 @@ def _preregistered(selection: Selection) -> Iterator[Block]:
     yield from map(Paragraph, selection.departures)
 
 
-def _left_out(people: StudyTable, found: Sequence[LeaveOneOut]) -> Iterator[Block]:
-    yield table(
+def left_out_table(people: Iterable[LeftOut]) -> Table:
+    """Who is left out, by which rules and for what reasons."""
+    return table(
         ("left out", "condition", "objects", "by", "reason"),
         [
             (p.person, p.assistance, p.objects, "; ".join(p.rules), "; ".join(p.rules.values()))
-            for p in people.left_out
+            for p in people
         ],
     )
+
+
+def _left_out(people: StudyTable, found: Sequence[LeaveOneOut]) -> Iterator[Block]:
+    main = [
+        name for name, column in people.sources.items() if name != column or name.startswith(LIKERT_PREFIX)
+    ]
+    yield left_out_table(people.left_out)
     yield table(
         ("left out of one measure", "value", "people", "who"),
         [(gap.measure, gap.value, len(gap.people), ", ".join(gap.people)) for gap in people.gaps],
@@ -152,14 +156,14 @@ def _left_out(people: StudyTable, found: Sequence[LeaveOneOut]) -> Iterator[Bloc
     )
     for one in found:
         if one.changes or one.refused:
-            yield Paragraph(f"Without {one.rule}: {one.refused or ''}")
+            yield Paragraph(f"Without {one.rule}: {one.refused or SHOWN}")
         yield table(
             (
                 "measure",
                 "test",
                 "effect",
                 "objects",
-                "F",
+                "F or χ²",
                 "without",
                 "p",
                 "without",
@@ -167,8 +171,15 @@ def _left_out(people: StudyTable, found: Sequence[LeaveOneOut]) -> Iterator[Bloc
                 "without",
                 "decision",
             ),
-            [_change_row(change) for change in one.changes],
+            [
+                _change_row(c)
+                for c in one.changes
+                if c.decision_changes or (c.measure in main and c.test in MAIN)
+            ],
         )
+
+
+MAIN = (ONE_WAY, TWO_WAY, "ordinal", "mixed model")
 
 
 def _change_row(change: Change) -> tuple[object, ...]:

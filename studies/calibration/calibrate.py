@@ -11,6 +11,7 @@ from experiments.errors import RecordError, StatisticsError
 from experiments.participants.distribution import Distributions
 from experiments.record.origin import origin_of
 from experiments.study.table import StudyTable
+from experiments.trials.exclusions import LeftOut
 from mjsim.files import read_text
 from studies.calibration.inference import OBJECTS, Cells, Fit, Rows, fit
 from studies.calibration.population import FreeParameters
@@ -32,6 +33,7 @@ class Calibration:
         surrogates: Condition -> surrogate of the measures of `rows`.
         fit: The draws.
         seed: Of all chance.
+        left_out: People of the pools from whom nothing is learnt.
     """
 
     origin: str
@@ -40,6 +42,7 @@ class Calibration:
     surrogates: Cells
     fit: Fit
     seed: int
+    left_out: tuple[LeftOut, ...]
 
     def behaviour(self) -> Distributions:
         """The best population, its parameters to three digits."""
@@ -93,7 +96,8 @@ def calibrate(
     cells = {name: _surrogate(pools, rows.measures(), name, free.inputs()) for name in rows.sizes}
     origin = origin_of(row["user"] for pool in pools for row in pool.rows)
     found = fit(free, cells, rows, draws=draws, seed=seed, on_progress=on_progress)
-    return Calibration(origin, free, rows, cells, found, seed)
+    absent = tuple(person for pool in pools for person in pool.left_out)
+    return Calibration(origin, free, rows, cells, found, seed, absent)
 
 
 def _surrogate(

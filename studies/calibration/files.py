@@ -3,18 +3,19 @@
 import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from experiments.analysis.comparison_plot import mark_origin
-from experiments.analysis.page import Block, Paragraph, page, table
+from experiments.analysis.page import Block, Paragraph, Picture, page, table
 from experiments.record.files import write_json
 from experiments.study.figures import svg
+from experiments.study.robustness import left_out_table
 from mjsim.files import write_text_atomically
 from studies.calibration.calibrate import Calibration, fitted_study
 from studies.calibration.inference import missed_orders
@@ -24,6 +25,10 @@ FILES = (PAGE, JSON, KEPT, STUDY)
 TITLE = "Calibration on the rows at 6 objects"
 INTERVAL = (5, 50, 95)  # percentiles that are shown
 COLUMNS = 4  # panels side by side
+PRIOR_AND_KEPT = (
+    "Distribution of each free parameter (units in studies/calibration.toml) over the draws from its prior (grey) and "
+    "over those that are kept (blue); the best draw (orange)."
+)
 CAUTION = (
     "Only rows at 6 objects were looked at. A parameter that is not identified has a value because it must have one; "
     "others would do as well. Nothing here measures people."
@@ -71,6 +76,7 @@ def as_json(found: Calibration) -> dict[str, Any]:
         "trade_offs": found.trade_offs(),
         "effects": [dict(zip(("measure", "target", "best"), row, strict=True)) for row in effect_rows(found)],
         "missed_orders": _missed(found),
+        "left_out": [asdict(person) for person in found.left_out],
         "behaviour": found.behaviour().as_dict(),
     }
 
@@ -117,6 +123,7 @@ def _sections(found: Calibration) -> Iterator[tuple[str, Iterable[Block]]]:
             ),
         ),
     )
+    yield "People who are left out", (left_out_table(found.left_out),)
     yield (
         "What is identifiable",
         (
@@ -155,7 +162,7 @@ def _missed(found: Calibration) -> list[str]:
     return [order for order, one in zip(found.rows.orders(), missed, strict=True) if one]
 
 
-def prior_and_kept(found: Calibration) -> Markup:
+def prior_and_kept(found: Calibration) -> Picture:
     """A panel per parameter: its prior, what is kept, and the best value."""
     names, fit = list(found.free.priors), found.fit
     lines = -(-len(names) // COLUMNS)
@@ -176,7 +183,7 @@ def prior_and_kept(found: Calibration) -> Markup:
         panels[k].set_title(name, fontsize=8)
     panels[0].legend(fontsize=6, frameon=False)
     mark_origin(figure, found.origin)
-    return svg(figure, f"Free parameters before and after. {found.origin}.")
+    return svg(figure, f"Free parameters before and after. {found.origin}.", PRIOR_AND_KEPT)
 
 
 def _kept_csv(found: Calibration) -> str:

@@ -237,13 +237,16 @@ def test_the_command_writes_files_that_say_simulated(tmp_path):
         {**row, **{f"behaviour_{name.replace('.', '_')}": float(rng.random()) for name in inputs}}
         for row in pool(60)
     ]
+    rows[4]["ended"] = "time limit"
     write_tables(tmp_path, rows)
     assert main(["study", "calibrate", str(tmp_path), "--draws", "200"]) == 0
     folder = tmp_path / "calibration"
     assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
-    assert SIMULATED in (folder / "calibration.html").read_text()
+    page = (folder / "calibration.html").read_text()
+    assert SIMULATED in page and "<td>did not deliver everything</td>" in page
     assert SIMULATED in (folder / "kept.csv").read_text().splitlines()[1]
     found = json.loads((folder / "calibration.json").read_text())
+    assert len(found["left_out"]) == 1
     assert found["origin"] == SIMULATED and len(found["parameters"]) == len(read_free_parameters().priors)
     assert len(read_study(folder / "study.toml").trials) == 447
     assert main(["study", "calibrate", str(tmp_path), "--draws", "200"]) == 2

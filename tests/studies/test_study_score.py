@@ -188,15 +188,19 @@ def test_a_pool_is_judged_as_a_population(pool):
     assert all(0.0 <= r.rate <= 1.0 for r in rows.values())
 
 
-def test_the_score_command_writes_its_files(tmp_path, capsys):
-    write_tables(tmp_path, made_up_people())
+def test_the_score_command_writes_its_files_and_names_who_is_left_out(tmp_path, capsys):
+    people = made_up_people()
+    people[4]["ended"] = "time limit"
+    write_tables(tmp_path, people)
     assert main(["study", "score", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.startswith("Simulated. A study of 447 people")
+    assert capsys.readouterr().out.startswith("Simulated. A study of 446 people")
     found = json.loads((tmp_path / "analysis" / "score.json").read_text())
     assert (found["origin"], len(found["rows"]), len(found["inconsistent"])) == ("Simulated", 58, 4)
+    assert [person["person"] for person in found["left_out"]] == ["4"]
     page = (tmp_path / "analysis" / "score.html").read_text()
     assert "http" not in page
-    assert page.count('<p class="origin">Simulated</p>') == 6
+    assert page.count('<p class="origin">Simulated</p>') == 7
+    assert "<td>did not deliver everything</td>" in page
     assert main(["study", "score", str(tmp_path)]) == 2
     assert main(["study", "score", str(tmp_path), "--force", "--seed", "-1"]) == 2
 

@@ -177,7 +177,18 @@ def test_results_without_a_rule_are_those_of_a_study_without_it():
     by_hand = [np.delete(rows, left) for left in ([0, 1, 2, 3], [0, 2, 3])]
     expected = [one_way_tests(table_of(list(kept)), "time", 6)[0].value for kept in by_hand]
     assert [change.all_rules["statistic"], change.without["statistic"]] == [t.statistic for t in expected]
+    assert ("time", "mixed model", None) in changes and ("time", "HC3", 6) in changes
     assert change.decision_changes == ((expected[0].p < 0.05) != (expected[1].p < 0.05))
+
+
+def test_ordinal_models_are_computed_again_without_a_rule():
+    rows = [row | {"user": "human", "likert_useful": 1 + k % 5} for k, row in enumerate(changed({}))]
+    rows[0]["completion_time_s"] = 900.0
+    [slow, _] = leave_one_out(rows, read_measures(), "here", Exclusions((SLOW,)))
+    change = next(c for c in slow.changes if c.test == "ordinal" and c.objects == 6)
+    expected = analyse(table_of(rows), read_measures()).find("likert_useful", "ordinal", 6).value.test
+    assert change.without == {"statistic": expected.statistic, "df": 2, "p": expected.p}
+    assert change.all_rules != change.without
 
 
 @pytest.fixture

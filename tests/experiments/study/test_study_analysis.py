@@ -86,6 +86,28 @@ def test_the_report_begins_with_every_hypothesis(analysed):
     assert first.count("optimal - none") == 4 * 4
 
 
+def test_every_figure_has_a_caption_and_one_shows_all_readings_of_a_measure(tmp_path):
+    people = made_up_people(SMALL)
+    folder = study(tmp_path, [row | {"nd_bin_tied": row["nd_feasible"] ** 2} for row in people])
+    assert main(["study", "analyze", str(folder)]) == 0
+    page = (folder / "analysis" / "report.html").read_text()
+    assert page.count("<svg") == page.count("<figcaption>Figure ") == 8  # four of them specification curves
+    tests = pyarrow.csv.read_csv(folder / "analysis" / "tests.csv").to_pylist()
+    assert {t["test"] for t in tests if t["measure"] == "nd_bin_tied"} > {"HC3", "two-way, Welch-James"}
+    assert "nd_bin_tied" not in re.sub("<svg.*?</svg>", "", page, flags=re.DOTALL)
+
+
+def test_diagnostics_and_tests_without_equal_variances_stand_beside_the_others(analysed):
+    found = json.loads((analysed / "stats.json").read_text())["results"]
+    diagnostics = next(r for r in found if r["kind"] == "diagnostics" and r["measure"] == "deviations")
+    assert diagnostics["value"]["largest_deviation"][0].startswith("optimal")
+    assert diagnostics["value"]["equal_variances"]["p"] < 0.001
+    assert diagnostics["value"]["kurtosis"] > 0.5  # the mixture of two spreads has long tails
+    page = (analysed / "report.html").read_text().split("<h2>Assumptions</h2>")[1].split("</section>")[0]
+    rows = re.findall(r"<td>(assistance|objects|interaction)</td>.*?(the same|differ)</td>", page)
+    assert len(rows) == 4 * (4 + 3)
+
+
 def test_simulated_stands_on_every_output(analysed):
     text = (analysed / "report.html").read_text()
     assert text.count('<p class="origin">Simulated</p>') == text.count("<h2>") + 1
@@ -288,6 +310,7 @@ def test_the_power_command(tmp_path, capsys):
     assert main([*words, "--out", str(out)]) == 0
     found = json.loads(out.read_text())
     assert found["origin"] == SIMULATED
+    assert [person["person"] for person in found["left_out"]] == ["4"]
     told = capsys.readouterr().out
     assert f"{found['per_cell']} [90 % interval" in told
     assert "left out, as not everything was delivered: 4" in told
