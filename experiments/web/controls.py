@@ -40,7 +40,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     scroll: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
 
     def at_rest(self) -> "Input":
-        """What of it counts while the clock stands: nothing is held, turned or pressed then."""
+        """What of it counts while the clock is paused: nothing is held, turned or pressed then."""
         return Input(number=self.number, scroll=self.scroll)
 
 

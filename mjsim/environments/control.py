@@ -34,7 +34,7 @@ class Control(Protocol):
         Args:
             action: Conforms to `spec`.
             observation: State before the action.
-            world: The world that will take them: who walks in it, and its time step; not to be changed.
+            world: The world that will take them: its person and time step; not to be changed.
 
         Raises:
             ActionError: The action does not conform.

@@ -45,7 +45,7 @@ class EnvironmentOptions:
         person: Speeds, reach, size and eyes of the person.
         world: Rules of the world.
         keep: How many compiled episodes are cached, about 20 MB each; None for all if `episodes` is a number, else 8.
-        physics_errors: `raise`, or `truncate` so that training goes on: an error of the physics then truncates the
+        physics_errors: `raise`, or `truncate` so that training continues: an error of the physics then truncates the
             episode, with the last valid observation and the error in `info["physics_error"]`.
         navigable: Computes where one can walk; None for the installed builder.
 

@@ -1,4 +1,4 @@
-"""Connections that have to be quick: a request comes whole within seconds, and who has most makes room for others."""
+"""Connections of limited time and number: a request comes whole within seconds; the busiest address makes room."""
 
 import asyncio
 from collections import Counter

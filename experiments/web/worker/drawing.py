@@ -33,7 +33,7 @@ class _Moment(NamedTuple):
     markers: tuple[Marker, ...]
     step: int
     input: int
-    hidden: bool  # nothing is shown while the clock does not run, so that nobody studies the plan for free
+    hidden: bool  # whether the clock is not running: then nothing of the task is shown
 
     def content(self) -> object:
         """What a frame depends on."""

@@ -253,7 +253,7 @@ def test_a_missing_builder_is_named(offers, said, monkeypatch):
 
 
 def test_physics_errors_can_cut_an_episode_off(open_floor, monkeypatch):
-    """Where training should go on, the step that failed truncates with the last state that was sound."""
+    """Where training should continue, the step that failed truncates with the last state that was sound."""
     core = core_of(open_floor, physics_errors="truncate")
     core.reset(0)
     core.step(np.ones(4))

@@ -324,9 +324,9 @@ def story(world):
 
 @tiers
 def test_a_state_is_all_there_is(house, fidelity):
-    """Right after a motion, with both hands full, a fresh world goes on from it as the one whose state it is.
+    """Right after a motion, with both hands full, a fresh world continues from it as the one whose state it is.
 
-    In physics, as that one goes on when it is set back to it.
+    In physics, as that one does when it is set back to it.
     """
     going, other = world_of(house, fidelity), world_of(house, fidelity)
     for name in ("o0", "o1"):
