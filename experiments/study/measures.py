@@ -1,10 +1,13 @@
-"""Which columns of a table of trials are analysed: experiments/study/designs/metrics.toml."""
+"""Which columns of a table of trials are analysed: experiments/study/designs/metrics.toml, or another such file."""
 
 from collections.abc import Collection
+from pathlib import Path
 
 import msgspec
 
+from experiments.errors import ConfigError
 from experiments.study.designs import FOLDER
+from mjsim.files import read_bytes
 
 FILE = FOLDER / "metrics.toml"
 LIKERT_PREFIX = "likert_"  # columns of answers
@@ -45,9 +48,19 @@ class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return {LIKERT_PREFIX + name: label for name, label in self.likert.items()}
 
 
-def read_measures() -> Measures:
-    """The committed choice."""
-    return msgspec.toml.decode(FILE.read_bytes(), type=Measures)
+def read_measures(path: Path = FILE) -> Measures:
+    """The measures of a file, by default the committed choice; a ConfigError says what is wrong with it."""
+    try:
+        return decoded_measures(read_bytes(path))
+    except OSError as error:
+        raise ConfigError(f"cannot read measures {path}: {error.strerror}") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: {error}; {FILE} shows what such a file holds") from error
+
+
+def decoded_measures(content: bytes) -> Measures:
+    """The measures in the content of a file; what msgspec raises where there are none."""
+    return msgspec.toml.decode(content, type=Measures)
 
 
 def resolve(measure: Measure, known: Collection[str]) -> str | None:

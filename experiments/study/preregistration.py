@@ -20,7 +20,7 @@ import msgspec
 from experiments.errors import ConfigError
 from experiments.record import records
 from experiments.record.run_directory import TRIALS
-from experiments.study import measures
+from experiments.study.measures import FILE, Measures, decoded_measures, read_measures
 from experiments.trials.design import counted, read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import PATHS, SETTINGS
@@ -50,16 +50,18 @@ class Preregistration:
     files: Mapping[str, bytes]
     sha256: str  # of the ZIP
     exclusions: Exclusions
+    measures: Measures
     versions: Mapping[str, str]
     design: Sequence[Mapping[str, Any]]  # settings of each trial
 
 
-def write_preregistration(study: Path, out: Path) -> str:
-    """Freeze a study file as a ZIP; its SHA-256."""
+def write_preregistration(study: Path, out: Path, measures: Path = FILE) -> str:
+    """Freeze a study file and a file of measures as a ZIP; its SHA-256."""
     design = read_design(study)
+    read_measures(measures)
     if out.exists() and out.samefile(study):
         raise ConfigError(f"{out} is the study file itself; name another file to write")
-    files = _frozen(design.exclusions or Exclusions())
+    files = _frozen(design.exclusions or Exclusions(), measures.read_bytes())
     files[STUDY] = study.read_bytes()
     files[DESIGN] = _json([_comparable(trial.settings()) for trial in design.trials])
     files[MANIFEST] = _json(
@@ -77,12 +79,12 @@ def write_preregistration(study: Path, out: Path) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _frozen(exclusions: Exclusions) -> Files:
+def _frozen(exclusions: Exclusions, measures: bytes) -> Files:
     """All but the design."""
     places = [ROOT / place for place in ANALYSIS]
     sources = [path for place in places for path in ([place] if place.is_file() else place.rglob("*.py"))]
     return {
-        MEASURES: measures.FILE.read_bytes(),
+        MEASURES: measures,
         EXCLUSIONS: _json(msgspec.to_builtins(exclusions)),
         VERSIONS: _json(
             {"python": platform.python_version(), **_versions(), "code of mjsim": source_digest()}
@@ -117,6 +119,7 @@ def read_preregistration(path: Path) -> Preregistration:
                 f"it was changed after it was written: {changed[0]} is not what its manifest says"
             )
         exclusions = msgspec.json.decode(files[EXCLUSIONS], type=Exclusions)
+        measures = decoded_measures(files[MEASURES])
         versions = msgspec.json.decode(files[VERSIONS], type=dict[str, str])
         design = msgspec.json.decode(files[DESIGN], type=list[dict[str, Any]])
         for trial in design:
@@ -130,7 +133,7 @@ def read_preregistration(path: Path) -> Preregistration:
         raise ConfigError(f"{path} is no preregistration: it has no {error}") from error
     except Exception as error:  # zipfile raises a dozen types on damaged files
         raise ConfigError(f"{path} is no preregistration that can be used: {error}") from error
-    return Preregistration(files, hashlib.sha256(data).hexdigest(), exclusions, versions, design)
+    return Preregistration(files, hashlib.sha256(data).hexdigest(), exclusions, measures, versions, design)
 
 
 def _unpacked(data: bytes) -> Files:
@@ -147,13 +150,17 @@ def _unpacked(data: bytes) -> Files:
 
 
 def departures(
-    frozen: Preregistration, exclusions: Exclusions, people: Sequence[Mapping[str, Any]], folder: Path
+    frozen: Preregistration,
+    exclusions: Exclusions,
+    people: Sequence[Mapping[str, Any]],
+    folder: Path,
+    measures: Measures,
 ) -> list[str]:
     """What is run otherwise than it was preregistered, a sentence each."""
-    now = _frozen(exclusions)
+    now = _frozen(exclusions, b"")
     found = [*_of_exclusions(frozen.exclusions, exclusions)]
-    if frozen.files.get(MEASURES) != now[MEASURES]:
-        found.append("The measures are others: metrics.toml was changed.")
+    if frozen.measures != measures:
+        found.append("The measures are others.")
     found += _of_versions(frozen.versions, json.loads(now[VERSIONS]))
     names = {name for name in (*frozen.files, *now) if name.startswith(CODE)}
     if changed := sorted(

@@ -204,8 +204,8 @@ def _check_answer_columns(row: Mapping[str, Any], measures: Measures, path: Path
         if name.lower().startswith(LIKERT_PREFIX.rstrip("_")) and name not in known:
             near = difflib.get_close_matches(name, known, 1, cutoff=0.0)[0]
             raise RecordError(
-                f"{path} has answers {name!r}, which no item of {FILE} has (the nearest is {near}); add the item "
-                "under [likert] there, or rename or remove the column"
+                f"{path} has answers {name!r}, which is no item of the survey (the nearest is {near}); rename or drop "
+                f"the column, or add the item under [likert] to a copy of {FILE}, for --measures"
             )
 
 

@@ -19,8 +19,9 @@ each in one cell of assistance x number of objects. Writes
 People who did not finish are left out, and so are those that --exclude selects by rules over columns or by id; the
 report lists them, the reasons, and how results change without each rule.
 
-Which column stands for which measure is fixed in experiments/study/designs/metrics.toml. docs/study.md explains how
-to read it. All output from simulated people is marked as such."""
+Which column stands for which measure, and what the items of the survey are called, is fixed in
+experiments/study/designs/metrics.toml, or in a file of your own. docs/study.md explains how to read it. All output
+from simulated people is marked as such."""
 
 
 def add_parser(commands: Any) -> None:
@@ -41,6 +42,12 @@ def add_parser(commands: Any) -> None:
         type=Path,
         metavar="FILE",
         help="ZIP of `mjsim study preregister`: its exclusions apply, and the report says what departs from it",
+    )
+    parser.add_argument(
+        "--measures",
+        type=Path,
+        metavar="FILE.toml",
+        help="measures and items of the survey (default: those preregistered, else those of the paper)",
     )
     add_force(parser, "replace an earlier analysis")
 
@@ -64,12 +71,15 @@ def run(arguments: argparse.Namespace) -> int:
     exclusions = Exclusions() if frozen is None else frozen.exclusions
     if arguments.exclude is not None:
         exclusions = read_exclusions(arguments.exclude)
-    measures, path, everybody = read_measures(), people_path(arguments.folder), read_people(arguments.folder)
+    measures = read_measures() if frozen is None else frozen.measures
+    if arguments.measures is not None:
+        measures = read_measures(arguments.measures)
+    path, everybody = people_path(arguments.folder), read_people(arguments.folder)
     analysis = analyse(study_table(everybody, measures, path, exclusions), measures)
     without = leave_one_out(everybody, measures, path, exclusions)
     selection = Selection(without)
     if frozen is not None:
-        departing = departures(frozen, exclusions, everybody, arguments.folder)
+        departing = departures(frozen, exclusions, everybody, arguments.folder, measures)
         selection = Selection(without, frozen.sha256, departing)
     write_analysis(out, analysis, report(analysis, arguments.folder, selection), selection.as_json())
     print(

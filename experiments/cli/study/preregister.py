@@ -20,6 +20,12 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ZIP to write")
+    parser.add_argument(
+        "--measures",
+        type=Path,
+        metavar="FILE.toml",
+        help="measures and items of the survey, if not the paper's",
+    )
     add_force(parser, "replace a file that exists")
 
 
@@ -27,9 +33,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Freeze, say the hash."""
     require_extra("study")
     from experiments.record.run_directory import check_file
+    from experiments.study.measures import FILE
     from experiments.study.preregistration import write_preregistration
     from experiments.study.simulate import study_path
 
     check_file(arguments.out, replace=arguments.force)
-    print(f"{write_preregistration(study_path(arguments.study), arguments.out)}  {arguments.out}")
+    measures = FILE if arguments.measures is None else arguments.measures
+    print(f"{write_preregistration(study_path(arguments.study), arguments.out, measures)}  {arguments.out}")
     return 0

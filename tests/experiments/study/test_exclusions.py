@@ -3,6 +3,7 @@
 import json
 import zipfile
 
+import msgspec
 import numpy as np
 import pytest
 from study_people import made_up_people, table_of
@@ -10,7 +11,7 @@ from study_people import made_up_people, table_of
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError
 from experiments.study.analysis import analyse, one_way_tests
-from experiments.study.measures import read_measures
+from experiments.study.measures import FILE, read_measures
 from experiments.study.preregistration import departures, read_preregistration, write_preregistration
 from experiments.study.robustness import leave_one_out
 from experiments.study.table import study_table
@@ -243,14 +244,16 @@ def test_nothing_departs_from_a_study_that_was_run_as_planned_and_each_change_is
         "There is no run directory for each person; settings that are no columns of the table are not compared."
     ]
     rows = people_as_planned()
-    assert departures(frozen, frozen.exclusions, rows, tmp_path) == unknown
+    assert departures(frozen, frozen.exclusions, rows, tmp_path, frozen.measures) == unknown
     other = Exclusions(people=(Person(3, "a friend"),), unfinished="keep")
     rows[0] = {**rows[0], "house_seed": 99}
-    found = "\n".join(departures(frozen, other, rows[:-1], tmp_path))
+    fewer = msgspec.structs.replace(frozen.measures, likert={})
+    found = "\n".join(departures(frozen, other, rows[:-1], tmp_path, fewer))
     for part in (
         "rule completion_time_s > 600 was preregistered and is not applied",
         "rule ended != 'all delivered' was preregistered and is not applied",
         "person 3 was not preregistered (a friend)",
+        "The measures are others",
         "optimal, 6 objects has 5 trials, preregistered 6",
         "house_seed is not as preregistered in 1 trial, such as none, 6 objects: 99",
     ):
@@ -265,7 +268,7 @@ def test_settings_that_are_no_columns_are_read_from_the_logs(study, tmp_path):
         run.mkdir(parents=True)
         behaviour = {"decision": {"temperature": 9.0}} if k == 0 else {}
         (run / "events.jsonl").write_text(json.dumps({**trial.settings(), "behaviour": behaviour}) + "\n")
-    [found] = departures(frozen, frozen.exclusions, people_as_planned(), tmp_path)
+    [found] = departures(frozen, frozen.exclusions, people_as_planned(), tmp_path, frozen.measures)
     assert found.startswith("behaviour is not as preregistered in 1 trial, such as none, 6 objects: ")
 
 
@@ -302,6 +305,25 @@ def test_a_changed_preregistration_is_refused(study, tmp_path, change, message):
     rewritten(path, change)
     with pytest.raises(ConfigError, match=message):
         read_preregistration(path)
+
+
+def test_a_survey_of_ones_own_is_frozen_and_named_in_the_report(study, tmp_path, capsys):
+    own = tmp_path / "own.toml"
+    own.write_text(FILE.read_text().replace("[likert]", '[likert]\nease = "Felt at ease"'))
+    write_tables(
+        tmp_path,
+        [row | {"user": "human", "likert_ease": 4 - k % 3} for k, row in enumerate(people_as_planned())],
+    )
+    assert main(["study", "analyze", str(tmp_path)]) == 2
+    assert "--measures" in capsys.readouterr().err
+    frozen = str(tmp_path / "p.zip")
+    assert main(["study", "preregister", str(study), "--measures", str(own), "--out", frozen]) == 0
+    for words in (["--measures", str(own)], ["--preregistration", frozen, "--force"]):
+        assert main(["study", "analyze", str(tmp_path), *words]) == 0
+        assert "Felt at ease" in (tmp_path / "analysis" / "report.html").read_text()
+    own.write_text("[likert]\nease = 3")
+    assert main(["study", "analyze", str(tmp_path), "--measures", str(own), "--force"]) == 2
+    assert "own.toml" in capsys.readouterr().err
 
 
 def test_the_commands_say_who_is_left_out_and_what_departs(study, tmp_path, capsys):
