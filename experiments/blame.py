@@ -10,6 +10,7 @@ from hud.errors import HudError
 from mjsim.errors import MjsimError
 from planner.errors import PlannerError
 
+ROOT = Path(__file__).resolve().parents[1]
 OUR_ERRORS = (ExperimentError, HudError, MjsimError, PlannerError)
 PACKAGES = ("experiments", "hud", "mjsim", "planner", "studies")
 LIBRARIES = tuple({path + os.sep for path in sysconfig.get_paths().values()} | {"<frozen "})
@@ -42,15 +43,20 @@ def _cut(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
+def is_own_file(file: str) -> bool:
+    """Whether a file of code is none of Python, of a library or of this project."""
+    own = Path(file).is_absolute() and not file.startswith(
+        LIBRARIES
+    )  # compiled libraries name relative files
+    return own and not any(Path(file).is_relative_to(ROOT / package) for package in PACKAGES)
+
+
 def place(error: BaseException | None) -> str:
     """File and line of the innermost frame of a user's own code, empty if there is none."""
     trace, found = error.__traceback__ if error is not None else None, ""
     while trace is not None:
         file, module = trace.tb_frame.f_code.co_filename, str(trace.tb_frame.f_globals.get("__name__", ""))
-        own = Path(file).is_absolute() and not file.startswith(
-            LIBRARIES
-        )  # compiled libraries name relative files
-        if own and module.partition(".")[0] not in PACKAGES:
+        if is_own_file(file) and module.partition(".")[0] not in PACKAGES:
             found = f" ({file}, line {trace.tb_lineno})"
         trace = trace.tb_next
     return found

@@ -74,7 +74,7 @@ def replacing(path: Path) -> Iterator[Path]:
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     remove_leftovers(path.parent)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=WORK, suffix=path.suffix)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f"{WORK}{os.getpid()}-", suffix=path.suffix)
     os.close(handle)
     temporary = Path(name)
     try:
@@ -93,17 +93,23 @@ def replacing(path: Path) -> Iterator[Path]:
 def work_folder(parent: Path) -> Iterator[Path]:
     """Yield a new folder in the existing folder `parent`; it is removed afterwards unless it was moved."""
     remove_leftovers(parent)
-    folder = Path(tempfile.mkdtemp(dir=parent, prefix=WORK))
+    folder = Path(tempfile.mkdtemp(dir=parent, prefix=f"{WORK}{os.getpid()}-"))
     try:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def remove_leftovers(folder: Path, max_age: float = MAX_AGE) -> None:
+def remove_work(folder: Path, process: int) -> None:
+    """Remove from `folder` the work of a process that has ended."""
+    if folder.is_dir():
+        remove_leftovers(folder, 0.0, f"{WORK}{process}-")
+
+
+def remove_leftovers(folder: Path, max_age: float = MAX_AGE, prefix: str = WORK) -> None:
     """Remove from `folder` the work of killed processes: all that has not changed for `max_age` seconds."""
     with os.scandir(folder) as entries:
-        paths = [Path(entry) for entry in entries if entry.name.startswith(WORK)]
+        paths = [Path(entry) for entry in entries if entry.name.startswith(prefix)]
     for path in paths:
         with contextlib.suppress(OSError):  # removed by another process
             changed = max(part.lstat().st_mtime for part in (path, *path.rglob("*")))

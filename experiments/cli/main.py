@@ -11,6 +11,7 @@ from typing import NoReturn
 
 from experiments.cli.failures import USAGE_ERROR, drop_output, end_with, flush_output
 from experiments.cli.requirements import add_checkout_command
+from experiments.session.own_process import in_own_child
 from experiments.session.signals import exit_code, signal_of, signals_raised
 from mjsim.errors import brief
 from mjsim.gl_choice import postpone_gl
@@ -35,6 +36,8 @@ COMMANDS = {
 }
 MODULES = {"import": "import_"}  # where a module cannot be called as its command
 CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # modules outside the wheel
+
+WATCHED = ("run", "plan", "replay")  # call a user's own code in their own process
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
@@ -119,7 +122,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the process
     with signals_raised():
         try:
-            return _run(words)
+            return _run(words, watch=argv is None)
         except KeyboardInterrupt as stop:
             number = signal_of(stop)
             print(f"mjsim: stopped by {number.name}; what was finished is kept", file=sys.stderr)
@@ -128,7 +131,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return end_with(error, words)
 
 
-def _run(words: list[str]) -> int:
+def _run(words: list[str], *, watch: bool) -> int:
     known = words[:1] if words and words[0] in COMMANDS else []
     try:
         here = str(Path.cwd())
@@ -148,6 +151,8 @@ def _run(words: list[str]) -> int:
         from experiments.trials.compile_notice import announce_compiling
 
         announce_compiling()
+    if watch and words[0] in WATCHED and (ended := in_own_child(arguments)) is not None:
+        return ended
     code = int(arguments.run(arguments))
     if sys.stdout is not None:
         try:

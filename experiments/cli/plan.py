@@ -127,6 +127,7 @@ class _Search(threading.Thread):
         self.best: Plan | None = None
         self._error: Exception | None = None
         self._stop_planning = threading.Event()
+        self._over = threading.Event()  # a `join` that a signal interrupts takes the thread for over
         self._planner, self._problem = planner, problem
         self._since, self._seconds = started, seconds
 
@@ -136,6 +137,8 @@ class _Search(threading.Thread):
                 self.best = plan
         except Exception as error:
             self._error = error
+        finally:
+            self._over.set()
 
     def _plans(self) -> Iterator[Plan]:
         """Better and better plans, within a time or a large budget of the exact planner's work."""
@@ -161,8 +164,8 @@ class _Search(threading.Thread):
         self.start()
         ends = float("inf") if self._seconds is None else self._since + self._seconds + GRACE
         report = self._since + REPORT_EVERY
-        while self.is_alive() and (self.best is None or time.perf_counter() < ends):
-            self.join(max(0.01, min(ends, report) - time.perf_counter()))
+        while not self._over.is_set() and (self.best is None or time.perf_counter() < ends):
+            self._over.wait(max(0.01, min(ends, report) - time.perf_counter()))
             if time.perf_counter() >= report:
                 self._report()
                 report += REPORT_EVERY
@@ -175,8 +178,7 @@ class _Search(threading.Thread):
     def end(self) -> None:
         """Stop planning; a planner in the middle of a step may take a moment."""
         self._stop_planning.set()
-        if self.is_alive():
-            self.join(1.0)
+        self._over.wait(1.0)
 
     def _report(self) -> None:
         text = f"planning for {time.perf_counter() - self._since:.0f} s"

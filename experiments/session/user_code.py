@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any, NoReturn, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from experiments.errors import ConfigError, UserCodeError
 from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Participant, Percept
+from experiments.session import own_process
 from hud.conditions import Condition
 from hud.errors import SchemaError
 from hud.schema import check_state
@@ -48,7 +49,7 @@ def user_code(code: object, what: str) -> Iterator[None]:
         return
     limit = _call_limit()
     try:
-        with _time_limit(limit), _exit_raised():
+        with _time_limit(limit), _exit_raised(), _watched(what):
             yield
     except PASSED_ON:
         raise
@@ -67,20 +68,26 @@ def _call_limit() -> float:
 
 
 @contextmanager
-def _exit_raised() -> Iterator[None]:
-    """Let `os._exit` of this thread raise `SystemExit` in the block; other threads and processes end as they ask."""
-    leave, here = os._exit, (os.getpid(), threading.get_ident())
-
-    def refuse(status: int) -> NoReturn:
-        if here == (os.getpid(), threading.get_ident()):
-            raise SystemExit(status)
-        leave(status)
-
-    os._exit = refuse
+def _watched(what: str) -> Iterator[None]:
+    """Tell the parent, where there is one that watches, that a user's own code is called."""
+    if own_process.watched is None:
+        yield
+        return
+    own_process.watched.begin(what)
     try:
         yield
     finally:
-        os._exit = leave
+        own_process.watched.end()
+
+
+@contextmanager
+def _exit_raised() -> Iterator[None]:
+    """Let `os._exit` of this thread raise `SystemExit` in the block."""
+    leave = own_process.refuse_exit()
+    try:
+        yield
+    finally:
+        os._exit = leave  # type: ignore[assignment]  # it never returns either
 
 
 @contextmanager

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from msgspec import structs
-from user_code import participant
 
+from benchmarks.support.user_code import condition, participant
 from experiments.cli.main import main
 from experiments.errors import ConfigError, UserCodeError
 from experiments.record import records
@@ -17,20 +17,6 @@ from experiments.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from faults.conftest import BRIEF, FAST, one_line
-
-CONDITION = """
-from dataclasses import replace
-import numpy as np
-from hud.conditions.none import hud_state as shown
-from hud.state import Marker, Message, MessageKind
-count = 0
-def hud_state(view):
-    global count
-    count, state = count + 1, shown(view)
-    if count > {after}:
-        {fault}
-    return state
-"""
 
 
 def run(house, out, **settings):
@@ -95,7 +81,7 @@ def test_a_participant_that_fails(after, fault, said, house, tmp_path, own_modul
     ],
 )
 def test_a_condition_that_fails_ends_the_run_though_nobody_looks(fault, said, house, tmp_path, own_module):
-    own_module(CONDITION.format(after=5, fault=fault))
+    own_module(condition(fault, 5))
     own_module(participant("pass"), name="own_person")
     with pytest.raises(UserCodeError, match=re.escape(said)) as failure:
         run(house, tmp_path / "out", assistance="own_code:hud_state", user="own_person:build")
@@ -105,7 +91,7 @@ def test_a_condition_that_fails_ends_the_run_though_nobody_looks(fault, said, ho
 
 def test_numbers_and_lists_of_numpy_can_be_shown(house, tmp_path, own_module):
     marker = "Marker('box', np.zeros(3), [np.float32(1)] * 3, (1, 1, 1, 1), 'mine')"
-    own_module(CONDITION.format(after=0, fault=f"return replace(state, markers=[{marker}])"))
+    own_module(condition(f"return replace(state, markers=[{marker}])", 0))
     run(house, tmp_path / "out", assistance="own_code:hud_state", user="searcher")
 
 
@@ -135,7 +121,7 @@ def test_names_are_text(name):
 
 
 def test_a_condition_that_never_works_leaves_a_record_too(house, tmp_path, own_module):
-    own_module(CONDITION.format(after=0, fault="1 / 0"))
+    own_module(condition("1 / 0", 0))
     with pytest.raises(UserCodeError, match="ZeroDivisionError"):
         run(house, tmp_path / "out", assistance="own_code:hud_state", user="searcher")
     assert read_json(tmp_path / "out" / records.METRICS)["ended"] == "error"

@@ -3,8 +3,7 @@
 import os
 import sys
 
-from user_code import participant
-
+from benchmarks.support.user_code import participant
 from experiments.trials.batch import run_batch
 from experiments.trials.design import factorial
 

@@ -1,10 +1,10 @@
-"""Code of a user's own, as modules that the tests write."""
+"""Code of a user's own that misbehaves, as text of modules."""
 
 
-def participant(statement, after=0):
+def participant(statement: str, after: int = 0) -> str:
     """A module with a participant that walks in circles; after so many control steps it does something else."""
     return f"""
-import os, signal, time
+import os, signal, sys, time
 from mjsim.actions import FollowPath, Move, Pick, Place, Wait
 class Own:
     needs = frozenset()
@@ -19,7 +19,7 @@ def build(house, rng):
 """
 
 
-def planner(statement, after=0):
+def planner(statement: str, after: int = 0) -> str:
     """A module with a planner that goes to the nearest first; after so many plans it does something else."""
     return f"""
 import os, signal, sys, time
@@ -33,4 +33,22 @@ class Own:
         if self.count > {after}:
             {statement}
         return plan
+"""
+
+
+def condition(statement: str, after: int = 0) -> str:
+    """A module with a condition that shows what `none` shows; after so many calls it does something else."""
+    return f"""
+import os, sys, time
+from dataclasses import replace
+import numpy as np
+from hud.conditions.none import hud_state as shown
+from hud.state import Marker, Message, MessageKind
+count = 0
+def hud_state(view):
+    global count
+    count, state = count + 1, shown(view)
+    if count > {after}:
+        {statement}
+    return state
 """

@@ -1,0 +1,135 @@
+"""A command with code of a user's own runs in a child: where that code ends the process, the trial is kept.
+
+The child counts the calls of such code. Where it dies in one, another child runs the command again up to this call,
+which then raises an error in its name. Trials repeat bit for bit, so that this one keeps what was simulated before.
+"""
+
+import atexit
+import ctypes
+import faulthandler
+import mmap
+import os
+import re
+import signal
+import struct
+import tempfile
+import threading
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import IO, Any, NoReturn
+
+from experiments.blame import is_own_file
+from experiments.errors import UserCodeError
+from experiments.session.signals import SIGNALS
+from mjsim.files import remove_work
+
+CRASHES = (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL)
+_NAMES = ("user", "assistance", "training_assistance", "planner")
+_OWN = re.compile(r":[A-Za-z_]")  # package.module:attribute
+_FRAME = re.compile(r'File "([^"]+)", line (\d+)')
+_CALLS, _CALLED, _ENDED = 0, 8, 16  # places in memory that both processes see
+
+
+class _Watched:
+    """What a child tells of its calls; `fatal` is the number of the call that must not be made, with what to say."""
+
+    def __init__(self) -> None:
+        self._memory = mmap.mmap(-1, 24)
+        self.fatal: tuple[int, str] | None = None
+
+    def read(self, place: int) -> int:
+        return int(struct.unpack_from("q", self._memory, place)[0])
+
+    def write(self, place: int, value: int) -> None:
+        struct.pack_into("q", self._memory, place, value)
+
+    def begin(self, what: str) -> None:
+        """A call of a user's own code begins; raises a `UserCodeError` if it is the fatal one."""
+        number = self.read(_CALLS) + 1
+        if self.fatal is not None and self.fatal[0] == number:
+            raise UserCodeError(f"{what} {self.fatal[1]}")
+        self.write(_CALLS, number)
+        self.write(_CALLED, 1)
+
+    def end(self) -> None:
+        """The call came back."""
+        self.write(_CALLED, 0)
+
+
+watched: _Watched | None = None  # in a child
+
+
+def in_own_child(arguments: Any) -> int | None:
+    """Go on in a child, where this returns None, if a command has code of a user's own; here, its exit code."""
+    given = vars(arguments)
+    if not any(_OWN.search(str(given.get(name))) for name in _NAMES):
+        return None
+    places = (given.get(name) for name in ("out", "video", "certificate"))
+    return _in_child([place.absolute().parent for place in places if isinstance(place, Path)])
+
+
+def _in_child(folders: Iterable[Path]) -> int | None:
+    global watched  # noqa: PLW0603 - of the process
+    fatal = None
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # whoever started this may have ignored it
+    for _ in range(2):
+        told = _Watched()
+        told.fatal = fatal
+        with tempfile.TemporaryFile("w+", errors="replace") as dump:
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {*SIGNALS, signal.SIGCHLD})
+            if (child := os.fork()) == 0:
+                watched = told
+                atexit.register(told.write, _ENDED, 1)
+                _begin(dump, before)
+                return None
+            code = _wait(child)
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            if told.read(_ENDED) or (code < 0 and -code not in CRASHES):
+                return code if code >= 0 else 128 - code
+            for folder in folders:
+                remove_work(folder, child)
+            dump.seek(0)
+            how = f"ended the process{f' by {signal.Signals(-code).name}' if code < 0 else ''}{_where(dump.read())}"
+        if not told.read(_CALLED):
+            raise UserCodeError(f"code of your own {how}, outside of its calls")
+        fatal = (told.read(_CALLS), how)
+    raise UserCodeError(
+        f"code of your own {how}; it does so at different calls, so that nothing could be kept"
+    )
+
+
+def refuse_exit() -> Callable[[int], NoReturn]:
+    """Let `os._exit` of this thread raise `SystemExit`; other threads and processes end as they ask. What it was."""
+    leave, here = os._exit, (os.getpid(), threading.get_ident())
+
+    def refuse(status: int) -> NoReturn:
+        if here == (os.getpid(), threading.get_ident()):
+            raise SystemExit(status)
+        leave(status)
+
+    os._exit = refuse
+    return leave
+
+
+def _begin(dump: IO[str], mask: Iterable[int]) -> None:
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: end with the parent
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    faulthandler.enable(open(os.dup(dump.fileno()), "w"), all_threads=False)  # noqa: PTH123, SIM115 - as long as the process
+    refuse_exit()
+
+
+def _wait(child: int) -> int:
+    """The exit code of a child, negative for a signal; signals that were sent to this process alone are passed on."""
+    while True:
+        found = signal.sigwaitinfo({*SIGNALS, signal.SIGCHLD})
+        if found.si_signo != signal.SIGCHLD and found.si_code <= 0:  # by a process, not by a terminal
+            os.kill(child, found.si_signo)
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status)
+
+
+def _where(dump: str) -> str:
+    """File and line of the innermost frame of a user's own code, from what `faulthandler` wrote."""
+    frames = [(file, line) for file, line in _FRAME.findall(dump) if is_own_file(file)]
+    return f" ({frames[0][0]}, line {frames[0][1]})" if frames else ""
