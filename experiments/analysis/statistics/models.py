@@ -1,14 +1,20 @@
-"""Proportional odds of ordinal answers, by statsmodels."""
+"""Proportional odds of ordinal answers, by Newton's method.
 
-import warnings
+The likelihood has one maximum; statsmodels climbs to 1e-4 of it, in a hundred times the time.
+"""
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit, logit
 from scipy.stats import chi2
 
 from experiments.analysis.statistics.anova import Values, varies
 from experiments.errors import StatisticsError
+
+MAX_STEPS = 60
+FARTHEST = 25.0  # of a cut or a shift, in logits: beyond, it goes to infinity
 
 
 @dataclass(frozen=True)
@@ -35,28 +41,64 @@ def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
 
     Source: McCullagh 1980, doi:10.1111/j.2517-6161.1980.tb01109.x.
     """
-    from statsmodels.miscmodels.ordinal_model import OrderedModel
-
     if len(groups) < 2:
         raise StatisticsError("there is only one group")
     answers = np.concatenate(list(groups.values()))
     if not varies(answers):
         raise StatisticsError("all answers are the same")
-    codes, counts = np.unique(answers, return_inverse=True)[1], np.unique(answers, return_counts=True)[1]
-    members = np.repeat(np.arange(len(groups)), [len(v) for v in groups.values()])
-    dummies = (members[:, None] == np.arange(1, len(groups))).astype(float)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # convergence is checked below
-        fit = OrderedModel(codes, dummies, distr="logit").fit(method="bfgs", maxiter=500, disp=False)
-    if not fit.mle_retvals["converged"] or not np.isfinite(fit.llf):
-        raise StatisticsError(
-            "the ordinal model does not converge: a group gives none of the answers of another"
-        )
-    alone = float((counts * np.log(counts / counts.sum())).sum())  # likelihood without conditions
-    gain, df = max(2 * (float(fit.llf) - alone), 0.0), len(groups) - 1
-    ratios = np.exp(fit.params[:df])
+    given = np.unique(answers)
+    counts = np.array([(values[:, None] == given).sum(axis=0) for values in groups.values()], float)
+    likelihood, shifts = _climb(counts)
+    total = counts.sum(axis=0)
+    alone = float((total * np.log(total / total.sum())).sum())  # likelihood without conditions
+    gain, df = max(2 * (likelihood - alone), 0.0), len(groups) - 1
     return OrdinalModel(
         Chi2Test(gain, df, float(chi2.sf(gain, df))),
-        dict(zip(list(groups)[1:], ratios.tolist(), strict=True)),
+        dict(zip(list(groups)[1:], np.exp(shifts).tolist(), strict=True)),
         len(answers),
     )
+
+
+def _climb(counts: Values) -> tuple[float, Values]:
+    """The largest log likelihood of counts (groups, answers), and the shifts of all groups but the first."""
+    groups, cuts = counts.shape[0], counts.shape[1] - 1
+    share = counts.sum(axis=0).cumsum()[:-1] / counts.sum()
+    point = np.concatenate([logit(share), np.zeros(groups - 1)])
+    # logits of "at most this answer" by cut and group: the cut less the shift of the group
+    member = np.repeat(np.eye(groups)[:, 1:], cuts, axis=0)
+    design = np.hstack([np.tile(np.eye(cuts), (groups, 1)), -member])
+    value, gradient, curvature = _likelihood(counts, design, point)
+    for _ in range(MAX_STEPS):
+        step = np.linalg.solve(curvature, gradient)
+        for _ in range(MAX_STEPS):
+            found = _likelihood(counts, design, point + step)
+            if found[0] >= value - 1e-12 * abs(value):
+                break
+            step /= 2
+        point = point + step
+        value, gradient, curvature = found
+        if np.abs(point).max() > FARTHEST:
+            break
+        if np.abs(step).max() < 1e-10:
+            return value, point[cuts:]
+    raise StatisticsError("the ordinal model does not converge: a group gives none of the answers of another")
+
+
+def _likelihood(counts: Values, design: Values, point: Values) -> tuple[float, Values, Values]:
+    """Log likelihood, its gradient, and minus its second derivatives; minus infinity where cuts are not in order."""
+    groups, cuts = counts.shape[0], counts.shape[1] - 1
+    below = expit(design @ point).reshape(groups, cuts)
+    chance = np.diff(below, prepend=0.0, append=1.0, axis=1)
+    if chance.min() <= 0.0:
+        return -np.inf, point, design
+    slope = below * (1 - below)
+    rate, curve = counts / chance, counts / chance**2
+    by_logit = slope * (rate[:, :-1] - rate[:, 1:])
+    inner = np.zeros((groups, cuts, groups, cuts))
+    k = np.arange(groups)[:, None]
+    j = np.arange(cuts)
+    inner[k, j, k, j] = slope**2 * (curve[:, :-1] + curve[:, 1:]) - by_logit * (1 - 2 * below)
+    between = -slope[:, :-1] * slope[:, 1:] * curve[:, 1:-1]
+    inner[k, j[:-1], k, j[1:]] = inner[k, j[1:], k, j[:-1]] = between
+    curvature = design.T @ inner.reshape(groups * cuts, -1) @ design
+    return float((counts * np.log(chance)).sum()), design.T @ by_logit.ravel(), curvature
