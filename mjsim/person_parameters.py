@@ -29,6 +29,10 @@ class PersonParameters:
 
     Where no source is given, a value is this project's choice.
 
+    Example:
+        >>> round(PersonParameters(walking_speed=1.0).fastest_walk, 3)
+        1.077
+
     Attributes:
         walking_speed: Usual walk, m/s, at which simulated participants walk; healthy adults walk comfortably at 0.94 to
             1.43 m/s (Bohannon and Williams Andrews, Physiotherapy 97, 2011). `fastest_walk` is 14/13 of it.

@@ -65,6 +65,17 @@ class World:
     Attributes:
         scene: The composed episode; its model is never modified.
         options: The rules, and how much of the world is physics (docs/fidelity.md).
+
+    Example:
+        >>> import mjsim
+        >>> catalogue = mjsim.Catalogue.load("apartment")
+        >>> episode = mjsim.sample_episode(catalogue, objects=2, seed=3)
+        >>> world = World(mjsim.compose(episode, catalogue))
+        >>> step = world.step(mjsim.Move(forward=1.0))
+        >>> round(step.observation.time, 2)
+        0.04
+        >>> world.step(mjsim.Pick()).result.refusal
+        <Refusal.NOTHING_IN_REACH: 'nothing_in_reach'>
     """
 
     def __init__(

@@ -43,6 +43,13 @@ class Geodesics:
 
     A point that is not navigable stands for the nearest point of the largest island (`NavMesh.snap`); the gap
     to it does not count as distance. A navigable point on a smaller island stays there.
+
+    Example:
+        >>> wall = np.array([[2.0, 0.0], [2.2, 0.0], [2.2, 3.0], [2.0, 3.0]])
+        >>> floor = Geodesics(NavMesh.build([wall], (0.0, 0.0, 4.0, 4.0)))
+        >>> around = floor.distances(np.array([[1.0, 1.0], [3.0, 1.0]]))[0, 1]
+        >>> bool(around > 2.0)
+        True
     """
 
     navmesh: NavMesh  # where one may walk

@@ -43,6 +43,12 @@ class RoutingProblem:
     Raises:
         ProblemError: Not square, negative, not finite, of a scale beyond computing, asymmetric, an index out of range,
             more onboard than the capacity, or names that are too few, too many or not unique.
+
+    Example:
+        >>> distances = np.array([[0.0, 3.0, 5.0], [3.0, 0.0, 4.0], [5.0, 4.0, 0.0]])
+        >>> problem = RoutingProblem(distances, start=0, shipments=(Shipment(pickup=1, delivery=2),), names=("mug",))
+        >>> problem.location(problem.pick(0))
+        1
     """
 
     distances: NDArray[np.float64]

@@ -73,6 +73,14 @@ def solver(name: str) -> Solver:
     """The planner of this name, or one by `package.module:attribute`: a class, or a function without arguments.
 
     `PlannerError` where none has this name, or it cannot be made.
+
+    Example:
+        >>> import numpy as np
+        >>> from planner.problem import RoutingProblem, Shipment
+        >>> distances = np.array([[0.0, 3.0, 5.0], [3.0, 0.0, 4.0], [5.0, 4.0, 0.0]])
+        >>> plan = solver("exact").solve(RoutingProblem(distances, 0, (Shipment(1, 2),), names=("mug",)))
+        >>> plan.cost, plan.status.value, [(visit.kind.value, visit.object) for visit in plan.visits]
+        (7.0, 'optimal', [('pick', 'mug'), ('place', 'mug')])
     """
     if name in SOLVERS:
         module, attribute = SOLVERS[name]

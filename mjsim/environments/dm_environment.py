@@ -13,8 +13,6 @@ from mjsim.environments.options import build, parse_options
 def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment":
     """Make an environment with the dm_env interface.
 
-        env = mjsim.make(objects=6, seed=0, observations=("state", "rgb"), actions="discrete")
-
     Args:
         seed: Seed of the first episode, and of the generator of all later seeds; None for a random one.
         **options: Fields of `mjsim.environments.options.EnvironmentOptions`.
@@ -22,6 +20,13 @@ def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment"
     Raises:
         EnvironmentConfigError: An option is unknown or unusable.
         AssetError: The house is malformed.
+
+    Example:
+        >>> env = make(objects=2, seed=0, observations=("state", "in_view"), actions="discrete")
+        >>> env.reset().observation["in_view"].shape
+        (2,)
+        >>> env.step(0).last()  # walk 0.25 m
+        False
     """
     return RearrangeDmEnvironment(build(parse_options(options)), seed=seed)
 

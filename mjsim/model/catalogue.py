@@ -95,6 +95,11 @@ class Catalogue:
         Raises:
             AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused
                 or used twice; the message names the culprit.
+
+        Example:
+            >>> catalogue = Catalogue.load("apartment")
+            >>> sorted(catalogue.categories)
+            ['books', 'dishes', 'laundry', 'office', 'recycling', 'toys']
         """
         path = catalogue_path(house)
         tables, text = read_tables(path)

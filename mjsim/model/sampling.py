@@ -68,6 +68,11 @@ def sample_episode(
             the start.
         AssetError: A model of the catalogue is unusable.
         PhysicsError: MuJoCo warned while the objects settled.
+
+    Example:
+        >>> episode = sample_episode(Catalogue.load("apartment"), objects=2, seed=3)
+        >>> episode.targets
+        {'object_00': 'toy_box', 'object_01': 'bookshelf'}
     """
     _check_arguments(objects, seed, points)
     require_usable(compiled_house(catalogue))

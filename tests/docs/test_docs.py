@@ -1,6 +1,8 @@
 """The documents are true: their code and commands run, their tables list what there is, their links lead somewhere."""
 
 import dataclasses
+import doctest
+import importlib
 import json
 import math
 import re
@@ -96,6 +98,24 @@ def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
     for row in json.loads(Path("my-house/toy_robot/report.json").read_text(encoding="utf-8")):
         cells = " | ".join((row["what"], row["choice"], row["reason"])).strip()
         assert f"| {cells} |" in page("import.md")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "mjsim.environments.dm_environment",
+        "mjsim.model.catalogue",
+        "mjsim.model.sampling",
+        "mjsim.person_parameters",
+        "mjsim.world",
+        "planner.geodesics",
+        "planner.problem",
+        "planner.solver",
+    ],
+)
+def test_examples_in_docstrings_are_true(name):
+    found = doctest.testmod(importlib.import_module(name))
+    assert found.attempted and not found.failed
 
 
 @pytest.mark.slow
