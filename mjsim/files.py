@@ -9,6 +9,7 @@ import ctypes
 import errno
 import json
 import os
+import select
 import shutil
 import stat
 import tempfile
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 MAX_INPUT = 256_000_000  # bytes of a file that is read
+MAX_SILENCE, MAX_WAIT = 8.0, 60.0  # s to wait for the next part of a stream, and for all of it
 WORK = ".mjsim-work-"
 MAX_AGE = 24 * 3600  # s since the last change of a leftover, after which it is removed
 
@@ -39,6 +41,20 @@ def read_bytes(path: Path) -> bytes:
     check_input(path)
     with path.open("rb") as file:
         return file.read(MAX_INPUT)
+
+
+def read_stream(stream: int) -> bytes:
+    """What a pipe or another stream holds, to its end; an OSError where it has too much, or nothing comes for a while."""
+    text, ends = bytearray(), time.monotonic() + MAX_WAIT
+    while True:
+        silence = min(MAX_SILENCE, ends - time.monotonic())
+        if not os.isatty(stream) and not select.select([stream], [], [], max(0.0, silence))[0]:
+            raise OSError(errno.ETIMEDOUT, "sends nothing more, and does not end")
+        if not (part := os.read(stream, 1 << 20)):
+            return bytes(text)
+        text += part
+        if len(text) > MAX_INPUT:
+            raise OSError(errno.EFBIG, f"larger than {MAX_INPUT // 10**6} MB")
 
 
 def read_text(path: Path) -> str:

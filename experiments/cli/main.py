@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from experiments.cli.failures import USAGE_ERROR, drop_output, end_with, flush_output
 from experiments.cli.requirements import add_checkout_command
-from experiments.session.own_process import in_own_child
+from experiments.session.own_process import in_own_child, tell_end
 from experiments.session.signals import exit_code, signal_of, signals_raised
 from mjsim.errors import brief
 from mjsim.gl_choice import postpone_gl
@@ -129,6 +129,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             return exit_code(number)
         except Exception as error:
             return end_with(error, words)
+        finally:
+            tell_end()
 
 
 def _run(words: list[str], *, watch: bool) -> int:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from experiments.errors import ConfigError
-from mjsim.files import MAX_INPUT, read_bytes
+from mjsim.files import read_bytes, read_stream
 from planner.errors import PlannerError, ProblemError
 from planner.plan import Plan, Status
 from planner.problem import RoutingProblem
@@ -218,16 +218,15 @@ def _check(problem_name: str, claim_name: str) -> int:
 def _standard_input() -> bytes:
     if sys.stdin is None:
         raise ConfigError("standard input is closed; give a file, or open it")
-    if len(text := sys.stdin.buffer.read(MAX_INPUT + 1)) > MAX_INPUT:
-        raise ConfigError(f"standard input has more than {MAX_INPUT // 10**6} MB; give a smaller problem")
-    return text
+    return read_stream(sys.stdin.fileno())
 
 
 def _read(name: str, parse: Callable[[bytes], T]) -> T:
     try:
         text = _standard_input() if name == "-" else read_bytes(Path(name))
     except OSError as error:
-        raise ConfigError(f"cannot read {name}: {error.strerror}") from error
+        what = "standard input" if name == "-" else name
+        raise ConfigError(f"cannot read {what}: {error.strerror}") from error
     try:
         return parse(text)
     except ProblemError as error:

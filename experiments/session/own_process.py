@@ -4,7 +4,6 @@ The child counts the calls of such code. Where it dies in one, another child run
 which then raises an error in its name. Trials repeat bit for bit, so that this one keeps what was simulated before.
 """
 
-import atexit
 import ctypes
 import faulthandler
 import mmap
@@ -59,6 +58,12 @@ class _Watched:
 watched: _Watched | None = None  # in a child
 
 
+def tell_end() -> None:
+    """Tell the parent, where there is one that watches, that the command came to its end."""
+    if watched is not None:
+        watched.write(_ENDED, 1)
+
+
 def in_own_child(arguments: Any) -> int | None:
     """Go on in a child, where this returns None, if a command has code of a user's own; here, its exit code."""
     given = vars(arguments)
@@ -79,7 +84,6 @@ def _in_child(folders: Iterable[Path]) -> int | None:
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {*SIGNALS, signal.SIGCHLD})
             if (child := os.fork()) == 0:
                 watched = told
-                atexit.register(told.write, _ENDED, 1)
                 _begin(dump, before)
                 return None
             code = _wait(child)

@@ -79,6 +79,12 @@ class InteractiveViewer:
         self._last_shown = (time.monotonic(), simulated)
 
 
+def has_window() -> bool:
+    """Whether a window can be opened, as far as the environment variables say."""
+    here = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return here and os.environ.get(_BACKEND, "glfw") == "glfw"
+
+
 def _load() -> tuple[Any, Any, Any, Any]:
     """dm_control's viewer modules, with GLFW as the OpenGL backend.
 

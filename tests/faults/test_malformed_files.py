@@ -9,7 +9,7 @@ import pytest
 
 from experiments.cli.main import main
 from faults.conftest import FAST, PROBLEM, one_line
-from mjsim.files import replacing
+from mjsim.files import read_stream, replacing
 
 DEEP = 200_000  # brackets in brackets
 BAD_TEXTS = {
@@ -86,6 +86,20 @@ def test_inputs_without_end(name, kind, tmp_path, capsys):
         path.touch()
         os.truncate(path, 1 << 40)  # a hole
     assert str(tmp_path) in told(ENDLESS[name].replace("FOLDER", str(tmp_path)), tmp_path, capsys)
+
+
+@pytest.mark.usefixtures("alarm")
+@pytest.mark.parametrize("limits", [{"MAX_SILENCE": 0.05}, {"MAX_WAIT": 0.05}, {"MAX_INPUT": 10}], ids=str)
+def test_a_stream_that_does_not_end(limits, monkeypatch):
+    """One that sends nothing more, or goes on too long, or has too much."""
+    for name, value in limits.items():
+        monkeypatch.setattr(f"mjsim.files.{name}", value)
+    reading, writing = os.pipe()
+    os.write(writing, b'{"distances": ')
+    with pytest.raises(OSError, match=r"does not end|larger than"):
+        read_stream(reading)
+    os.close(writing)
+    os.close(reading)
 
 
 TWICE = json.dumps(PROBLEM)[:-1]

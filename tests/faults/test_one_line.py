@@ -102,6 +102,7 @@ def test_an_output_that_takes_nothing(target, code, problem, tmp_path):
     ("command", "code", "said"),
     [
         ("plan - <&-", 2, "standard input is closed"),
+        ("plan - </dev/zero", 2, "cannot read standard input: larger than 256 MB"),
         ("--version >&-", 0, ""),
         ("study power nope.toml --pool .", 2, "no study 'nope.toml'"),
         ("plan {problem} --check {problem} --time-limit 1", 2, "--check plans nothing"),

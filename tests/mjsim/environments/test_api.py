@@ -124,6 +124,8 @@ def test_make_is_seeded():
 @pytest.fixture
 def windows(monkeypatch):
     """Stand-ins for the windows that are opened."""
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
     opened = []
 
     def open_fake():
@@ -145,6 +147,14 @@ def test_gymnasium_checks_pass_without_a_warning(easy, actions, observations, wi
         check_env(env.unwrapped)
     env.close()
     assert windows and windows[0].closed
+
+
+def test_gymnasium_checks_pass_where_there_is_no_display(easy, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    env = gymnasium.make(ID, **easy)
+    check_env(env.unwrapped)
+    env.close()
 
 
 def test_human_mode_shows_every_control_step(easy, windows):
