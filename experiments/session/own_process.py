@@ -65,7 +65,7 @@ def tell_end() -> None:
 
 
 def in_own_child(arguments: Any) -> int | None:
-    """Go on in a child, where this returns None, if a command has code of a user's own; here, its exit code."""
+    """Continue in a child, where this returns None, if a command has code of a user's own; here, its exit code."""
     given = vars(arguments)
     if not any(_OWN.search(str(given.get(name))) for name in _NAMES):
         return None
