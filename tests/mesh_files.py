@@ -189,6 +189,65 @@ def _bent():
     return trimesh.util.concatenate([_MAKE.box((0.2, 0.04, 0.03)), arm])
 
 
+def _mug_on_its_side():
+    handle = _less(_moved(_MAKE.torus(0.028, 0.006), 0.04, 0, 0), _turned(_MAKE.cylinder(0.037, 0.2)))
+    return trimesh.boolean.union([_turned(_cup()), handle], engine="manifold")
+
+
+def _turned(mesh):
+    """A mesh whose upright axis lies along y."""
+    return mesh.apply_transform(Y_UP)
+
+
+def _frame(across, along, bar):
+    return _less(_MAKE.box((across, along, bar)), _MAKE.box((across - 2 * bar, along - 2 * bar, 1)))
+
+
+def _hollow_box():
+    return _less(_MAKE.box((0.2, 0.15, 0.1)), _moved(_MAKE.box((0.19, 0.14, 0.1)), 0, 0, 0.005))
+
+
+def _basket():
+    ring = _moved(_turned(_MAKE.torus(0.09, 0.006)), 0, 0, 0.04)
+    bow = _less(ring, _moved(_MAKE.box((1, 1, 1)), 0, 0, -0.47))
+    return trimesh.boolean.union([_hollow_box(), bow], engine="manifold")
+
+
+def _bowl():
+    half = _less(_MAKE.icosphere(4, 0.08), _moved(_MAKE.box((1, 1, 1)), 0, 0, 0.5))
+    foot = _moved(_MAKE.cylinder(0.04, 0.02), 0, 0, -0.07)
+    return _less(trimesh.boolean.union([half, foot], engine="manifold"), _MAKE.icosphere(4, 0.074))
+
+
+def tetrahedron(*top):
+    """A body on a triangle, with its top over one corner or over `top`."""
+    corners = [[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0], top or [0, 0, 0.16]]
+    return trimesh.Trimesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+
+def _plate():
+    return _MAKE.revolve([[0, 0], [0.08, 0], [0.11, 0.02], [0.11, 0.024], [0.08, 0.004], [0, 0.004]])
+
+
+# No hand reaches into their middle: name -> what builds them.
+HOLLOW = {
+    "ring": lambda: _MAKE.torus(0.08, 0.02),
+    "wire_ring": lambda: _MAKE.torus(0.1, 0.003, minor_sections=16),
+    "ring_on_edge": lambda: _turned(_MAKE.torus(0.08, 0.02)),
+    "letter_l": lambda: trimesh.util.concatenate(
+        [_MAKE.box((0.03, 0.2, 0.03)), _moved(_MAKE.box((0.17, 0.03, 0.03)), 0.1, -0.085, 0)]
+    ),
+    "tetrahedron": tetrahedron,
+    "mug_on_its_side": _mug_on_its_side,
+    "plate": _plate,
+    "bowl": _bowl,
+    "frame": lambda: _frame(0.25, 0.2, 0.02),
+    "hollow_box": _hollow_box,
+    "basket": _basket,
+    "handle": lambda: _less(_MAKE.torus(0.1, 0.01), _moved(_MAKE.box((1, 1, 1)), 0, -0.5, 0)),
+    "arch": lambda: _less(_MAKE.box((0.25, 0.08, 0.13)), _moved(_MAKE.box((0.2, 1, 0.13)), 0, 0, 0.03)),
+}
+
 MESHES = {
     "brick": MeshFile(".stl", lambda: _MAKE.box((0.12, 0.07, 0.05))),
     "globe": MeshFile(".stl", lambda: _MAKE.icosphere(4, 0.07)),
@@ -218,4 +277,5 @@ MESHES = {
     "bent": MeshFile(".stl", _bent, ImportOptions(mass=0.4)),
     "heavy": MeshFile(".stl", lambda: _MAKE.cylinder(0.05, 0.04), ImportOptions(mass=1.5)),
     "tiny_scaled": MeshFile(".stl", lambda: _MAKE.box((0.003, 0.002, 0.002)), ImportOptions("m", scale=40.0)),
+    **{f"own_{name}": MeshFile(".stl", build, category="laundry") for name, build in HOLLOW.items()},
 }

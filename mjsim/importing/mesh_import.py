@@ -4,12 +4,15 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from mjsim.errors import RenderError
+from mjsim.errors import AssetError, RenderError
+from mjsim.importing.grip import MAX_OFFSET
 from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.model_writer import write_model
-from mjsim.importing.object_import import import_object
+from mjsim.importing.object_import import ImportedObject, import_object
 from mjsim.importing.preview import write_preview
 from mjsim.importing.values import ImportDecision, ImportOptions
+from mjsim.model.validation.findings import Finding, errors
+from mjsim.model.validation.object_rules import check_object
 
 PREVIEW, REPORT = "preview.png", "report.json"
 
@@ -20,7 +23,7 @@ def add_mesh(
     """Import a mesh file into a catalogue; returns the report, which is also kept beside the object.
 
     Without OpenGL there is no preview, and the report says so. The catalogue is as before on `AssetError` (the file,
-    the entry or the object is unusable) and `OSError`.
+    the entry or the object is unusable) and `OSError`; of an object that cannot be held there is a picture.
     """
     extension.check(entry, force=force)
     item = import_object(path, options)
@@ -32,8 +35,31 @@ def add_mesh(
             write_preview(model, folder / PREVIEW)
         except RenderError as error:
             decisions.append(ImportDecision("preview", "none", str(error)))
+        if reason := _not_held(item, check_object(model, entry.key)):
+            shown = _keep_picture(folder, extension.folder / f"{entry.key}-{PREVIEW}")
+            raise AssetError(f"{path}: this shape cannot be held: {reason}{shown}")
         text = json.dumps([asdict(decision) for decision in decisions], indent=2, ensure_ascii=False)
         (folder / REPORT).write_text(text + "\n", encoding="utf-8")
 
     extension.add(entry, write, force=force)
     return tuple(decisions)
+
+
+def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
+    """Why an object cannot be held; empty where it can."""
+    if found := errors(findings):
+        return found[0].message
+    if item.grip.offset <= MAX_OFFSET:
+        return ""
+    return (
+        f"its top is {100 * item.grip.offset:.0f} cm beside its centre of mass, and a hand takes it there from above "
+        f"(at most {100 * MAX_OFFSET:.0f} cm); turn or change it so that its top is nearer, or use --scale"
+    )
+
+
+def _keep_picture(folder: Path, target: Path) -> str:
+    """Keep the preview in a folder under another name; says where, if there is one."""
+    if not (folder / PREVIEW).exists():
+        return ""
+    (folder / PREVIEW).replace(target)
+    return f" ({target} shows it)"

@@ -1,5 +1,6 @@
 """An imported object as files: MJCF, OBJ meshes, a PNG picture; the same object gives the same bytes."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,8 +37,8 @@ _MJCF = """\
       <inertial pos="{centre}" mass="{mass}" fullinertia="{inertia}"/>
       <geom class="look" type="mesh" mesh="{key}_look" material="{key}_look"/>
 {geoms}
-      <site name="grip_0" pos="0 0 {top}"/>
-      <site name="grip_1" pos="0 0 {top}" euler="0 0 3.14159265"/>
+      <site name="grip_0" pos="{grip}" euler="0 0 {yaw:.6f}"/>
+      <site name="grip_1" pos="{grip}" euler="0 0 {opposite:.6f}"/>
     </body>
   </worldbody>
 </mujoco>
@@ -70,7 +71,9 @@ def _mjcf(item: ImportedObject, key: str, label: str, source: str) -> str:
         mass=f"{weight.mass:.6g}",
         inertia=" ".join(f"{value:.6g}" for value in corner),
         geoms="\n".join(f"      {line}" for line in _geoms(item, key)),
-        top=f"{np.concatenate(item.hulls)[:, 2].max():.5f}",
+        grip=_numbers(item.grip.point),
+        yaw=item.grip.yaw,
+        opposite=item.grip.yaw + math.pi,
     )
 
 

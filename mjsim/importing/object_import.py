@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from trimesh.transformations import translation_matrix
 
 from mjsim.errors import AssetError
+from mjsim.importing.grip import Grip, find_grip
 from mjsim.importing.look import Look, make_look
-from mjsim.importing.parts import Parts, convex_parts, one_part
+from mjsim.importing.parts import Parts, convex_parts
 from mjsim.importing.reading import missing_colours, read_surface
 from mjsim.importing.resting import STEADY, RestingPose, foot, resting_pose
 from mjsim.importing.scaling import Scaling, scaling
@@ -16,7 +18,10 @@ from mjsim.importing.solid import MAX_TRIANGLES, Solid, close, simplified
 from mjsim.importing.surface import Floats, Surface, cleaned
 from mjsim.importing.values import ImportDecision, ImportOptions
 from mjsim.importing.weight import Weight, weigh
-from mjsim.model.validation.object_rules import GRIP_REACH, SIZE
+from mjsim.model.validation.object_rules import SIZE
+
+_COARSE = 0.005  # of the longest side, greatest distance between numbers of 32 bits
+_FAR = 10.0  # longest sides from the origin, from where on the report says so
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +31,7 @@ class ImportedObject:
     look: Look  # what is drawn
     hulls: tuple[Floats, ...]  # vertices of the convex parts that it collides with, m, (k, 3) each
     weight: Weight  # mass, centre of mass, inertia
+    grip: Grip  # where a hand takes it from above
     rolls: bool  # whether it is round, so that it stands on a foot and rolls badly
     decisions: tuple[ImportDecision, ...]  # the report
 
@@ -58,10 +64,9 @@ def _check_options(options: ImportOptions) -> None:
 
 
 def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObject:
-    found = scaling(
-        path.suffix.lower(), _longest_side(raw), units=options.units, up=options.up, scale=options.scale
-    )
-    surface, dropped = cleaned(raw.moved(found.transform))
+    longest, middle = _extent(raw)
+    found = scaling(path.suffix.lower(), longest, units=options.units, up=options.up, scale=options.scale)
+    surface, dropped = cleaned(raw.moved(found.transform @ translation_matrix(-middle)))
     if not len(surface):
         raise AssetError(f"none of its {len(raw)} triangles has an area; export it again")
     mesh = surface.mesh()
@@ -70,43 +75,47 @@ def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObje
     parts = convex_parts(solid)
     pose = resting_pose(parts.points, weight.centre)
     hulls = tuple(points @ pose.rotation.T for points in parts.hulls)
-    if not _has_grip(hulls):
-        parts = one_part(parts, "convex hull: parts would leave the top empty where a hand grips")
-        hulls = (parts.hulls[0] @ pose.rotation.T,)
     if rolls := pose.tilt < STEADY:
         hulls = (*hulls, foot(np.concatenate(hulls), pose.rotation @ weight.centre))
     transform = _into_place(pose.rotation, np.concatenate(hulls))
     hulls = tuple(points + transform[:3, 3] for points in hulls)
     _check_size(np.concatenate(hulls))
-    look = make_look(*_on_the_floor(surface, transform))
+    standing, weight = _on_the_floor(surface, transform), weight.moved(transform)
+    look, grip = make_look(*standing), find_grip(standing[1], weight.centre)
     decisions = (
         *_origin(path, found, raw, dropped),
+        *_moved(middle, longest),
         _body(solid, len(mesh.faces)),
         ImportDecision("mass", f"{weight.mass:.3g} kg", weight.reason),
         _collision(parts),
         _rest(pose, rolls),
+        _grip(grip),
         *_appearance(path, look, len(mesh.faces)),
     )
-    return ImportedObject(look, hulls, weight.moved(transform), rolls, decisions)
+    return ImportedObject(look, hulls, weight, grip, rolls, decisions)
 
 
-def _longest_side(surface: Surface) -> float:
-    """Longest side of the bounding box, in the file's numbers; `AssetError` without finite points or an extent."""
+def _extent(surface: Surface) -> tuple[float, Floats]:
+    """Longest side and middle (3,) of the bounding box, in the file's numbers.
+
+    `AssetError` without finite points or an extent, or where the points are too far from the origin to have a shape.
+    """
     points = surface.corners.reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=1)]
     longest = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     if not (np.isfinite(longest) and longest > 0):
         raise AssetError("all its points coincide or are not finite numbers; export it again")
-    return longest
-
-
-def _has_grip(hulls: tuple[Floats, ...]) -> bool:
-    """Whether a part is near the middle of the top, where a hand grips."""
-    points = np.concatenate(hulls)
-    low, high = points.min(axis=0), points.max(axis=0)
-    grip = np.array([*(low + high)[:2] / 2, high[2]])
-    outside = [np.maximum(np.maximum(h.min(axis=0) - grip, grip - h.max(axis=0)), 0.0) for h in hulls]
-    return min(float(np.linalg.norm(gap)) for gap in outside) < 0.8 * GRIP_REACH
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    farthest = np.abs(points).max()
+    if (
+        np.array_equal(points, points.astype(np.float32))
+        and np.spacing(np.float32(farthest)) > _COARSE * longest
+    ):
+        raise AssetError(
+            f"it lies {np.linalg.norm(middle):.3g} from the origin, in the file's unit, where numbers of 32 bits are "
+            f"too coarse for a side of {longest:.3g}; move it to the origin and export it again"
+        )
+    return longest, middle
 
 
 def _into_place(rotation: Floats, points: Floats) -> Floats:
@@ -149,6 +158,13 @@ def _origin(path: Path, found: Scaling, raw: Surface, dropped: dict[str, int]) -
     )
 
 
+def _moved(middle: Floats, longest: float) -> tuple[ImportDecision, ...]:
+    """Said of what lies far from the origin."""
+    away = float(np.linalg.norm(middle))
+    reason = f"it lies {away:.3g} from the file's origin, in the file's unit"
+    return (ImportDecision("place", "moved to the origin", reason),) if away > _FAR * longest else ()
+
+
 def _body(solid: Solid, faces: int) -> ImportDecision:
     notes = [f"simplified from {faces} triangles"] if faces > MAX_TRIANGLES else []
     if solid.flat:
@@ -177,6 +193,13 @@ def _rest(pose: RestingPose, rolls: bool) -> ImportDecision:
             "rests", "turned", f"on its steadiest side: {degrees}; in the file's pose it falls over"
         )
     return ImportDecision("rests", "as in the file", degrees)
+
+
+def _grip(grip: Grip) -> ImportDecision:
+    if not grip.offset:
+        return ImportDecision("grips", "above the centre of mass")
+    aside = f"{100 * grip.offset:.0f} cm beside the centre of mass"
+    return ImportDecision("grips", aside, "the nearest place at its top that is there")
 
 
 def _appearance(path: Path, look: Look, faces: int) -> tuple[ImportDecision, ...]:

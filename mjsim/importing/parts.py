@@ -54,11 +54,6 @@ def convex_parts(solid: Solid) -> Parts:
     return Parts(tuple(thick), reason, changed)
 
 
-def one_part(parts: Parts, reason: str) -> Parts:
-    """The convex hull of some parts as the only one."""
-    return Parts((_few_vertices(parts.points),), reason, parts.thickened)
-
-
 def width(points: Floats) -> float:
     """Least extent of the convex hull of points (n, 3) in any direction, m."""
     return _narrowest(points)[1]

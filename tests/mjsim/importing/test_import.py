@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 
 import mujoco
@@ -10,7 +11,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mesh_files import MESHES, Y_UP, MeshFile, picture, plain
+from mesh_files import HOLLOW, MESHES, Y_UP, MeshFile, picture, plain, tetrahedron
 from scipy.spatial import Delaunay
 from small_worlds import dropped
 
@@ -86,7 +87,9 @@ def test_an_imported_object_rests_where_it_is_put(imported, key):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tier", ["full", "event"])
-@pytest.mark.parametrize("name", ["long_stick", "cup", "many_parts", "truck"])
+@pytest.mark.parametrize(
+    "name", ["long_stick", "cup", "many_parts", "truck", *(f"own_{name}" for name in HOLLOW)]
+)
 def test_imported_objects_are_carried_and_placed(imported, name, tier):
     house = House.load(str(imported[0].path))
     category = house.catalogue.categories[house.catalogue.objects[name].category]
@@ -224,6 +227,48 @@ def test_the_pose_is_steady_or_the_file_s_own(seed):
         low, high = support.min(axis=0), support.max(axis=0)
         middle = (pose.rotation @ centre)[:2]
         assert np.all(middle > low) and np.all(middle < high)
+
+
+@pytest.mark.parametrize("name", HOLLOW)
+def test_grips_are_on_something_at_the_top(tmp_path, name):
+    item = take(tmp_path, HOLLOW[name]())
+    look = trimesh.Trimesh(item.look.vertices, item.look.faces)
+    points, _ = trimesh.sample.sample_surface(look, 100_000, seed=1)
+    gaps = np.linalg.norm(points - item.grip.point, axis=1)
+    assert gaps.min() < 0.003
+    assert points[gaps.argmin(), 2] > points[:, 2].max() - 0.012
+    assert np.hypot(*(item.grip.point - item.weight.centre)[:2]) < 0.12
+
+
+def test_a_shape_that_no_hand_can_hold_is_refused_with_a_picture(tmp_path, capsys):
+    path = MeshFile(".stl", lambda: tetrahedron(-0.1, -0.1, 0.16)).write(tmp_path, "horn")
+    own = tmp_path / "own"
+    assert run(path, "--category", "toys", "--out", own) == 2
+    said = capsys.readouterr().err
+    picture = own / "horn-preview.png"
+    assert f"{path}: this shape cannot be held: its top is 1" in said and f"({picture} shows it)" in said
+    assert said.count("\n") == 1 and ".mjsim-work" not in said
+    assert list(contents(own)) == [picture]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "away", "want"),
+    [
+        (".obj", 5e6, "lies 5e\\+06 from"),
+        (".stl", 5e6, "32 bits .* move it to the origin"),
+        (".ply", 30.0, "lies 30 "),
+    ],
+)
+def test_what_lies_far_from_its_origin_is_moved_or_refused(tmp_path, suffix, away, want):
+    brick = MAKE.box((0.12, 0.07, 0.05)).apply_translation((away, 0, 0))
+    if suffix == ".stl":
+        with pytest.raises(AssetError, match=want):
+            take(tmp_path, brick, suffix)
+        return
+    item = take(tmp_path, brick, suffix, up="z")
+    assert re.search(want, report(item.decisions, "place"))
+    assert item.size == pytest.approx((0.12, 0.07, 0.05), abs=1e-5)
+    assert item.weight.centre == pytest.approx((0, 0, 0.025), abs=1e-5)
 
 
 def test_parts_cover_the_body(tmp_path):
