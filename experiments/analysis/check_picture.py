@@ -14,7 +14,8 @@ from mjsim.model.validation.report import Report
 from mjsim.model.validation.views import Drawing
 
 SIDE = 9.0  # inches of the longest side of a drawing
-LINES = 12  # findings below the drawing
+LINES = 100  # findings below the drawing: more would make a picture that viewers do not open
+LETTERS = 13.0  # an inch
 COLOURS = {"error": "#D55E00", "warning": "#E69F00"}
 
 
@@ -22,9 +23,12 @@ def draw_check(path: Path, report: Report) -> None:
     """Write a PNG with the views of a report and the numbers of its findings, as in its table."""
     views = report.views or (Drawing("nothing could be compiled", (0, 1), ()),)
     listed = [f"{n}. {f}" for n, f in enumerate(report.findings[:LINES], 1)]
-    text = "\n".join(textwrap.fill(line, 130) for line in listed) or "no findings"
-    below = 0.3 + 0.17 * (text.count("\n") + 1)
-    figure = Figure(figsize=(SIDE * (1.0 if len(views) == 1 else 1.4), SIDE * 0.7 + below), dpi=100)
+    if len(report.findings) > LINES:
+        listed.append(f"and {len(report.findings) - LINES} more: `mjsim check` prints them all")
+    wide = SIDE * (1.0 if len(views) == 1 else 1.4)
+    text = "\n".join(textwrap.fill(line, int(wide * LETTERS)) for line in listed) or "no findings"
+    below = 0.3 + 0.145 * (text.count("\n") + 1)
+    figure = Figure(figsize=(wide, SIDE * 0.7 + below), dpi=100)
     FigureCanvasAgg(figure)
     base = below / figure.get_figheight()
     for column, view in enumerate(views):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from mjsim.model.clearance import ClearanceField
+from mjsim.model.rooms import RoomMap
 from mjsim.model.validation.bin_rules import check_bins
 from mjsim.model.validation.compiled import Compiled
 from mjsim.model.validation.findings import Finding
@@ -29,6 +30,19 @@ _CHEST = 1.0  # m, where rays begin: nothing that a person can stand at is there
 def check_floor(floor: WalkableFloor) -> list[Finding]:
     """All that is wrong with a house as a place to walk in."""
     return [finding for rule in RULES for finding in rule(floor)]
+
+
+def nowhere_to_stand(compiled: Compiled, rooms: RoomMap) -> Finding:
+    """What is wrong with a house in which no place is free: most often its floor is too high."""
+    steps = np.stack(np.meshgrid(*2 * [np.linspace(-0.9, 0.9, 7)]), axis=-1).reshape(-1, 2)
+    offsets = np.einsum("kij,nkj->nki", rooms.axes, steps[:, None] * rooms.half_sizes)
+    points = (rooms.centers + offsets).reshape(-1, 2)
+    height = float(np.median([_CHEST - _free(compiled, point, -1.0) for point in points]))
+    if math.isfinite(height) and abs(height) > FLOOR_GAP:
+        remedy = f"move the house by {-height:.3f} m along z: floors lie at z = 0"
+        return compiled.error("floor", f"most of the floor is at z = {height:.3f} m", remedy)
+    remedy = f"leave ways of at least {PASSAGE} m between what collides"
+    return compiled.error("rooms", "nowhere in its rooms can a person stand", remedy)
 
 
 def _shell(floor: WalkableFloor) -> Iterator[Finding]:

@@ -5,12 +5,12 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import AssetError
+from mjsim.errors import AssetError, MjsimError
 from mjsim.model.house import CompiledHouse
 from mjsim.model.validation.compiled import Compiled, compile_model
 from mjsim.model.validation.findings import Finding, errors, one_line
 from mjsim.model.validation.floor import WalkableFloor
-from mjsim.model.validation.floor_rules import check_floor
+from mjsim.model.validation.floor_rules import check_floor, nowhere_to_stand
 from mjsim.model.validation.house_rules import check_house_file
 from mjsim.model.validation.object_rules import check_compiled_object
 from mjsim.model.validation.receptacle_rules import check_receptacle
@@ -50,16 +50,17 @@ def check_house(house: CompiledHouse) -> list[Finding]:
 def _check_composed(house: CompiledHouse) -> list[Finding]:
     try:
         compiled = Compiled.of("house", house.catalogue.house_path, house.model)
-        floor = WalkableFloor(
-            compiled,
-            house.rooms,
-            house.receptacles,
-            {r.key: r.room for r in house.catalogue.receptacles.values()},
-            house.navigable,
-        )
+        rooms, receptacles = house.rooms, house.receptacles
     except AssetError as error:
         return [Finding("file", "house", str(error), "correct it")]
-    return check_floor(floor)
+    try:
+        navigable = house.navigable
+    except MjsimError:
+        raise
+    except Exception:  # of whichever package computes it, where nothing is free
+        return [nowhere_to_stand(compiled, rooms)]
+    rooms_of = {r.key: r.room for r in house.catalogue.receptacles.values()}
+    return check_floor(WalkableFloor(compiled, rooms, receptacles, rooms_of, navigable))
 
 
 def _check_sizes(house: CompiledHouse, footprints: Mapping[str, NDArray[np.float64]]) -> Iterator[Finding]:

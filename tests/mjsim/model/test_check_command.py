@@ -3,12 +3,16 @@
 import json
 
 import cv2
+import numpy as np
 import pytest
 
+from experiments.analysis.check_picture import draw_check
 from experiments.cli.main import main
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.sampling import sample_episode
+from mjsim.model.validation.findings import Finding
+from mjsim.model.validation.report import Report
 
 MUG = models_root() / "objects" / "mug.xml"
 
@@ -61,6 +65,20 @@ def test_all_findings_are_listed_and_drawn(fresh_house, tmp_path, capsys):
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert "'hinge'" in said and "3 more; `mjsim check` lists them" in said
     assert not (tmp_path / "run").exists()
+
+
+def test_a_picture_cuts_no_finding_off(tmp_path):
+    findings = tuple(
+        Finding("groups", "house", f"{n} {'W' * 70} {'x' * 400}", "use group 0") for n in range(30)
+    )
+    heights = []
+    for count in (1, 30):
+        draw_check(tmp_path / "faults.png", Report("house", "own", findings[:count]))
+        image = cv2.imread(str(tmp_path / "faults.png"))
+        heights.append(image.shape[0])
+        assert (image[:, -15:] == 255).all() and (image[-10:] == 255).all()
+    lines = np.flatnonzero((image[heights[0] - 100 :] < 128).any(axis=(1, 2)))
+    assert np.count_nonzero(np.diff(lines) > 1) > 29 * 4  # gaps between lines of text
 
 
 def test_a_small_house_says_how_many_points_fit(small_house, capsys):
