@@ -21,6 +21,7 @@ NEAR = 0.7  # share of the reach from which a pick is tried
 ALIGNED = 0.12  # rad off a way on which one walks
 MAX_STRETCH = 1.2  # m walked before looking again
 TIME_LIMIT = 300.0  # s
+SETTLED = 30.0  # s within which a few simulated seconds pass
 
 
 class Watcher:
@@ -65,7 +66,9 @@ class KeyPresser:
                 self._step(loose, loose, NEAR * self._house.person.reach)
 
     def _playing(self):
-        return self._watcher.snapshot is not None and not self._page.locator("#panel").is_visible()
+        """Whether the clock runs; it does not on the next page, which may be there before one looks again."""
+        running = self._page.locator("#play[data-phase=running]")
+        return self._watcher.snapshot is not None and running.is_visible()
 
     @property
     def _position(self):
@@ -102,7 +105,7 @@ class KeyPresser:
     def _settle(self, seconds):
         """Wait until `seconds` have been simulated."""
         wanted = self._watcher.snapshot["time"] + seconds
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + SETTLED
         while self._watcher.snapshot["time"] < wanted and self._playing() and time.monotonic() < until:
             self._page.wait_for_timeout(20)
 
