@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.support.play_hostile import NGINX, measure_hostile
 from benchmarks.support.play_load import load, measure_capacity, measure_latency
 from benchmarks.support.play_server import Report
 from benchmarks.support.requirements import Requirement, requirement_lines
@@ -15,6 +16,7 @@ from experiments.errors import ConfigError
 
 SESSIONS, SNAPSHOT_SESSIONS = 3, 10  # a core, with frames and with snapshots
 SECONDS, QUICK_SECONDS = 15.0, 4.0  # of each case
+HOSTILE_SOCKETS = 2000
 TRIES = 3  # numbers of sessions that are tried, each smaller than the one before
 FAST = ("--fidelity", "event")
 REQUIREMENTS = {
@@ -28,6 +30,12 @@ REQUIREMENTS = {
         Requirement(
             "sessions a core that hold 15 snapshots a second and 150 ms", "snapshots", ">=", SNAPSHOT_SESSIONS
         ),
+    ),
+    "hostile": (
+        Requirement(
+            "states a second of another person, one machine being hostile", "states_per_s", ">=", 24.0
+        ),
+        Requirement("slowest new visit meanwhile, s", "slowest_visit_s", "<=", 2.0),
     ),
 }
 
@@ -46,7 +54,7 @@ def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]
         if name not in REQUIREMENTS:
             raise ConfigError(f"benchmark play has no part {name!r}; there are {', '.join(REQUIREMENTS)}")
     result: dict[str, Any] = {"load": load()}
-    measures = {"latency": _latency, "capacity": _capacity}
+    measures = {"latency": _latency, "capacity": _capacity, "hostile": _hostile}
     with tempfile.TemporaryDirectory(prefix="mjsim-play-") as folder:
         for name in parts or measures:
             place = Path(folder) / name
@@ -60,7 +68,8 @@ def lines(result: Mapping[str, Any]) -> Iterator[str]:
     yield f"load at the start: {result['load']:.1f} processes a core"
     for name, requirements in REQUIREMENTS.items():
         if name in result:
-            yield from (_line(name, case) for name, case in result[name]["cases"].items())
+            line = _hostile_line if name == "hostile" else _line
+            yield from (line(case_name, case) for case_name, case in result[name]["cases"].items())
             yield from requirement_lines(result[name], requirements)
 
 
@@ -69,6 +78,14 @@ def _line(name: str, case: Mapping[str, Any]) -> str:
         f"{name}: {case['fps']:.1f} fps or more, {case['width']:.0f} px wide, input to frame "
         f"{case['median_ms']:.0f} ms (95 %: {case['p95_ms']:.0f}), {case['kbit_s']:.0f} kbit/s, "
         f"{case['memory_mb']:.0f} MB and {case['cores']:.2f} cores each, server {case['server_cores']:.2f}"
+    )
+
+
+def _hostile_line(name: str, case: Mapping[str, Any]) -> str:
+    return (
+        f"{name}: {case['states_per_s']:.1f} states/s, slowest new visit {case['slowest_visit_s']:.2f} s; "
+        f"of the hostile machine {case['sockets_served']} sockets of one visit were served, {case['visits_begun']} "
+        f"visits begun, and its flood left {case['journal_kb']:.0f} kB"
     )
 
 
@@ -100,6 +117,21 @@ def _capacity(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
         cases.update({f"{case['sessions']:.0f} sessions, {name}": case for case in tried})
         held[name] = tried[-1]["sessions"] / cores if tried[-1]["holds"] else 0.0
     return {"cases": cases, **held}
+
+
+def _hostile(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
+    seconds, words = _size(quick)
+    cases = {}
+    for name in ("directly", *(["through NGINX"] if NGINX else [])):
+        report(f"{name}, {seconds:.0f} s")
+        place = folder / name.replace(" ", "-")
+        place.mkdir()
+        cases[name] = measure_hostile(place, HOSTILE_SOCKETS, seconds, *words, nginx=name != "directly")
+    return {
+        "cases": cases,
+        "states_per_s": min(case["states_per_s"] for case in cases.values()),
+        "slowest_visit_s": max(case["slowest_visit_s"] for case in cases.values()),
+    }
 
 
 def _size(quick: bool) -> tuple[float, tuple[str, ...]]:

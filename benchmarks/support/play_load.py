@@ -95,7 +95,7 @@ async def _sessions_at_once(
         "median_ms": float(median),
         "p95_ms": float(p95),
         "holds": int(fps >= MIN_FPS and p95 <= MAX_MS),
-        "width": float(np.median([browser.frames[-1].width for browser in browsers])),
+        "width": median_width(browsers),
         "kbit_s": float(np.mean([0.008 * browser.bytes / passed for browser in browsers])),
         "memory_mb": float(np.mean([memory(worker) for worker in workers])),
         "cores": float(np.mean(busy[: len(browsers)])),
@@ -104,6 +104,11 @@ async def _sessions_at_once(
     }
     await asyncio.gather(*(browser.close() for browser in browsers))
     return result
+
+
+def median_width(browsers: Sequence[SimulatedBrowser]) -> float:
+    """Width of the last frames, px; 0 where none came."""
+    return float(np.median([browser.frames[-1].width if browser.frames else 0 for browser in browsers]))
 
 
 async def _show_something(browser: SimulatedBrowser, settling: float) -> None:

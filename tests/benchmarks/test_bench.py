@@ -3,6 +3,8 @@
 import pytest
 
 from benchmarks._command import benchmark, benchmark_names
+from benchmarks.support.play_browser import SeenFrame, SimulatedBrowser
+from benchmarks.support.play_load import median_width
 from experiments.cli.main import main
 from experiments.errors import ConfigError
 
@@ -27,3 +29,9 @@ def test_a_module_that_measures_nothing_is_refused(tmp_path):
     assert list(benchmark("good", tmp_path).lines({"n": 1})) == ["1"]
     with pytest.raises(ConfigError, match=r"empty\.py is no benchmark"):
         benchmark("empty", tmp_path)
+
+
+def test_a_session_without_a_frame_has_a_width_of_nothing():
+    blind, seeing = SimulatedBrowser("/"), SimulatedBrowser("/")
+    seeing.frames.append(SeenFrame(0.0, 0, 320))
+    assert (median_width([blind]), median_width([seeing])) == (0.0, 320.0)
