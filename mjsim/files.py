@@ -44,7 +44,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_stream(stream: int) -> bytes:
-    """What a pipe or another stream holds, to its end; an OSError where it has too much, or nothing comes for a while."""
+    """What a pipe or another stream holds, to its end; an OSError where it has too much or stops sending."""
     text, ends = bytearray(), time.monotonic() + MAX_WAIT
     while True:
         silence = min(MAX_SILENCE, ends - time.monotonic())

@@ -125,7 +125,7 @@ class _Search(threading.Thread):
     ) -> None:
         super().__init__(daemon=True)
         self.best: Plan | None = None
-        self._error: Exception | None = None
+        self._error: BaseException | None = None
         self._stop_planning = threading.Event()
         self._over = threading.Event()  # a `join` that a signal interrupts takes the thread for over
         self._planner, self._problem = planner, problem
@@ -135,7 +135,7 @@ class _Search(threading.Thread):
         try:
             for plan in self._plans():
                 self.best = plan
-        except Exception as error:
+        except BaseException as error:  # of a user's own planner, too
             self._error = error
         finally:
             self._over.set()

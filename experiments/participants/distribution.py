@@ -17,6 +17,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from experiments.blame import shown
 from experiments.errors import ConfigError
 from mjsim.files import read_text
 
@@ -154,6 +155,8 @@ class Distributions(Mapping[str, Distribution]):
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> "Distributions":
         """Distributions as in TOML; tables of several are joined with a dot: `[compliance] follows = 1`."""
+        if not isinstance(values, Mapping):
+            raise ConfigError(f"{shown(values)} is no table of values, such as {{ walking_speed = 1.2 }}")
         found: dict[str, Distribution] = {}
         for name, value in values.items():
             if isinstance(value, Mapping) and set(value).isdisjoint(Distribution.__struct_fields__):

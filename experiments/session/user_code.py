@@ -26,7 +26,7 @@ from mjsim.errors import PhysicsError, RenderError
 from planner.errors import UnreachableError
 
 LONGEST_LIMIT = 1e6  # s
-PASSED_ON = (KeyboardInterrupt, GeneratorExit, UserCodeError, UnreachableError, PhysicsError, RenderError)
+PASSED_ON = (KeyboardInterrupt, UserCodeError, UnreachableError, PhysicsError, RenderError)
 
 
 class _Overdue(BaseException):

@@ -1,15 +1,26 @@
 """Which columns of a table of trials are analysed: experiments/study/designs/metrics.toml, or another such file."""
 
-from collections.abc import Collection
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
+from experiments.blame import shown
 from experiments.errors import ConfigError
+from experiments.record.metrics import CIRCUMSTANCES, Metrics
 from experiments.study.designs import FOLDER
+from experiments.trials.trial_config import SETTINGS
 from mjsim.files import read_bytes
 
 FILE = FOLDER / "metrics.toml"
+SHOWN = 20  # columns in a sentence
+_OF_A_TRIAL = re.compile(
+    r"(person|behaviour|max|mean|p99)_\w+|simulated(_s)?|fingerprint|participant|releases_settled|ejections|"
+    "tunnellings|grips_lost"
+)
 LIKERT_PREFIX = "likert_"  # columns of answers
 
 
@@ -61,6 +72,23 @@ def read_measures(path: Path = FILE) -> Measures:
 def decoded_measures(content: bytes) -> Measures:
     """The measures in the content of a file; what msgspec raises where there are none."""
     return msgspec.toml.decode(content, type=Measures)
+
+
+def present_columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Columns of a table, in order."""
+    return list(dict.fromkeys(name for row in rows for name in row))
+
+
+def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
+    """A sentence on columns that are neither measures nor part of a trial's record, if there are any."""
+    read = {c for m in measures.objective.values() for c in (m.column, m.without, *m.others)}
+    known = {*read, *SETTINGS, *CIRCUMSTANCES, *(field.name for field in fields(Metrics))}
+    answers = {LIKERT_PREFIX + name for name in measures.likert}
+    unread = [shown(c) for c in columns if c not in known | answers and not _OF_A_TRIAL.fullmatch(c)]
+    more = f" and {len(unread) - SHOWN} more" if len(unread) > SHOWN else ""
+    return [f"Nothing here analyses the table's further columns: {', '.join(unread[:SHOWN])}{more}."] * bool(
+        unread
+    )
 
 
 def resolve(measure: Measure, known: Collection[str]) -> str | None:

@@ -16,7 +16,7 @@ from experiments.record.origin import RECORDED, origin_of
 from experiments.record.phases import TASK
 from experiments.record.run_directory import VISIT, is_run, visit_folders
 from experiments.session.endings import ALL_DELIVERED
-from experiments.study.measures import FILE, LIKERT_PREFIX, Measures, resolve
+from experiments.study.measures import FILE, LIKERT_PREFIX, Measures, present_columns, resolve, unread_note
 from experiments.trials.batch_folder import read_trial
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_name
@@ -147,7 +147,7 @@ def study_table(
 ) -> StudyTable:
     """People by their rows, but for those who are left out; a RecordError names `path` and a value that is invalid."""
     _check_design(everybody, path)
-    _check_answer_columns(everybody[0], measures, path)
+    _check_answer_columns(present_columns(everybody), measures, path)
     absent = left_out(exclusions, everybody, path)
     kept = {k: row for k, row in enumerate(everybody) if k not in absent}
     rows = list(kept.values())
@@ -155,7 +155,7 @@ def study_table(
         rules = Counter(rule for person in absent.values() for rule in person.rules)
         each = ", ".join(f"{count} by {rule}" for rule, count in rules.items())
         raise RecordError(f"{path}: all {counted(len(absent), 'row')} are left out: {each}")
-    present = {name for row in rows for name in row}
+    present = present_columns(rows)
     read = {column: _numbers(kept, column, path) for column in _candidates(measures) if column in present}
     numbers = {column: np.where(np.isinf(values), np.nan, values) for column, values in read.items()}
     known = {column for column, values in numbers.items() if not np.isnan(values).all()}
@@ -184,7 +184,7 @@ def study_table(
         columns,
         sources,
         origin,
-        tuple(_notes(rows)),
+        tuple(_notes(rows, measures)),
         tuple(absent.values()),
         tuple(_gaps(kept, read, sources)),
     )
@@ -198,9 +198,9 @@ def _check_design(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
             raise RecordError(f"{path}: row {k} has {row['objects']!r} objects, not a whole number from 1 on")
 
 
-def _check_answer_columns(row: Mapping[str, Any], measures: Measures, path: Path) -> None:
+def _check_answer_columns(columns: Sequence[str], measures: Measures, path: Path) -> None:
     known = _likert_columns(measures)
-    for name in row:
+    for name in columns:
         if name.lower().startswith(LIKERT_PREFIX.rstrip("_")) and name not in known:
             near = difflib.get_close_matches(name, known, 1, cutoff=0.0)[0]
             raise RecordError(
@@ -268,8 +268,8 @@ def _gaps(
                 yield Gap(names.get(column, column), value, people)
 
 
-def _notes(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    notes = []
+def _notes(rows: Sequence[Mapping[str, Any]], measures: Measures) -> list[str]:
+    notes = unread_note(present_columns(rows), measures)
     unfinished = sum(row.get("ended", ALL_DELIVERED) != ALL_DELIVERED for row in rows)
     if unfinished:
         notes.append(

@@ -72,10 +72,13 @@ class Continuous:
         Raises:
             ActionError: The action is not four finite numbers.
         """
-        values = np.asarray(action, dtype=np.float64)
+        try:
+            values = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError):
+            values = np.empty(0)
         if values.shape != (4,) or not np.isfinite(values).all():
             raise ActionError(
-                f"an action is (forward, left, turn, trigger), four finite numbers; got {action!r}"
+                f"an action is (forward, left, turn, trigger), four finite numbers; got {action!r:.200}"
             )
         forward, left, turn, trigger = np.clip(values, -1.0, 1.0).tolist()
         person = world.scene.person

@@ -69,8 +69,9 @@ class EnvironmentOptions:
     navigable: NavigableBuilder | None = None
 
     def __post_init__(self) -> None:
+        _check_types(self)
         counts = self.objects if isinstance(self.objects, tuple | list) else (self.objects, self.objects)
-        others = [self.time_limit or 0, self.slots or 0, self.keep or 0]
+        others = [value for value in (self.time_limit, self.slots, self.keep) if value is not None]
         whole = len(counts) == 2 and all(type(count) is int for count in counts)
         if not whole or not all(isinstance(number, Real) for number in others):
             raise EnvironmentConfigError(
@@ -107,6 +108,29 @@ class EnvironmentOptions:
             counts = [len(e.objects) for e in self.episodes]
             return min(counts), max(counts)
         return (self.objects, self.objects) if isinstance(self.objects, int) else self.objects
+
+
+def _check_types(options: EnvironmentOptions) -> None:
+    """Raise an EnvironmentConfigError where an option is of a kind that none of its values is."""
+    episodes, made = options.episodes, options.actions
+    several = isinstance(episodes, Sequence) and all(isinstance(one, Episode) for one in episodes)
+    for name, fits, wanted in (
+        ("house", isinstance(options.house, str), "a name or a path as text"),
+        (
+            "observations",
+            isinstance(options.observations, str | list | tuple),
+            "names of sensors, or Sensors",
+        ),
+        ("actions", isinstance(made, str) or hasattr(made, "steps"), "a name or a Control"),
+        ("reward", isinstance(options.reward, str) or callable(options.reward), "a name or a function"),
+        ("episodes", type(episodes) in (int, type(None)) or several, "None, a number or Episodes"),
+        ("camera", isinstance(options.camera, CameraOptions), "CameraOptions"),
+        ("person", isinstance(options.person, PersonParameters), "PersonParameters"),
+        ("world", isinstance(options.world, WorldOptions), "WorldOptions"),
+        ("navigable", options.navigable is None or callable(options.navigable), "None or a function"),
+    ):
+        if not fits:
+            raise EnvironmentConfigError(f"{name} must be {wanted}; got {getattr(options, name)!r:.200}")
 
 
 def parse_options(given: dict[str, Any]) -> EnvironmentOptions:

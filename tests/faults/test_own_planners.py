@@ -41,6 +41,7 @@ WRONG = {
     "return None": "answered None",
     "1 / 0": "raised ZeroDivisionError: division by zero",
     "raise SystemExit(0)": "raised SystemExit",
+    "raise GeneratorExit": "raised GeneratorExit",
     "raise type('Odd', (BaseException,), {})()": "raised Odd",
 }
 

@@ -26,6 +26,13 @@ from experiments.web.server.pages import CLIENT
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
 
 
+def test_columns_that_nothing_analyses_are_named():
+    rows = made_up_people({("none", 6): 3, ("optimal", 6): 3})
+    rows[-1] |= {"excluded": True, "mood\n": 3}
+    *_, note = table_of(rows).notes
+    assert note == "Nothing here analyses the table's further columns: 'excluded', 'mood\\n'."
+
+
 def test_a_measure_has_one_column_wherever_it_is_named():
     """Normalized deviations and inverse path length: study, score, table of a run, comparison, result page."""
     columns = {m.label.lower(): m.column for m in read_measures().objective.values()}

@@ -105,6 +105,14 @@ def test_unusable_discrete_actions_are_refused(walker, action):
         walker.step(action)
 
 
+@pytest.mark.parametrize("action", [None, "x", {}, [], [math.nan] * 4, ["a"] * 4, [[0] * 4]])
+def test_unusable_continuous_actions_are_refused(open_floor, action):
+    core = core_of(open_floor)
+    core.reset(0)
+    with pytest.raises(ActionError, match="four finite numbers"):
+        core.step(action)
+
+
 @given(
     weight=st.floats(0.1, 3.0),
     discount=st.floats(0.5, 1.0),
