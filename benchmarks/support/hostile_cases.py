@@ -5,7 +5,7 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,7 +18,9 @@ from benchmarks.support.hostile_files import (
     damage_text,
     damage_toml,
     damage_values,
+    is_problem,
     pick,
+    rows_of,
 )
 from benchmarks.support.warm_commands import CLOSED, PIPE, REFUSED, USED, Case, Workshop
 
@@ -92,8 +94,7 @@ def make_case(number: int, folder: Path) -> Case:
     rng = np.random.default_rng(number)
     kinds, weights = zip(*KINDS.items(), strict=True)
     chosen = kinds[int(rng.choice(len(kinds), p=np.array(weights) / sum(weights)))]
-    made: Case = chosen(folder, rng)
-    return made
+    return cast(Case, chosen(folder, rng))
 
 
 def _plan(folder: Path, rng: Rng) -> Case:
@@ -101,6 +102,8 @@ def _plan(folder: Path, rng: Rng) -> Case:
     if rng.uniform() < 0.5:
         kind, text, must = damage_values(json.loads(json.dumps(PROBLEM)), rng)
         path.write_text(text)
+        if kind == "other number" and not is_problem(json.loads(text)):
+            must = REFUSED
     else:
         kind, must = damage_text(path, rng)
     extra = pick([[], ["--planner", "greedy"], ["--planner", "ortools"], ["--time-limit", "0.5"]], rng)
@@ -188,9 +191,11 @@ def _run_folder(folder: Path, rng: Rng) -> Case:
         kind = "file missing"
         must = must if path.name != "SHA256SUMS" else ""
     else:
-        before = path.read_bytes()
+        before, rows = path.read_bytes(), rows_of(path)
         kind = damage_file(path, rng)
         must = must if path.read_bytes().strip() != before.strip() else ""
+        if command in ("compare", "study analyze") and rows_of(path) != rows:
+            must = REFUSED
     line = {"metrics batch": command, "study analyze": "study analyze batch --out out"}.get(
         command, BASES.get(command, "")
     )

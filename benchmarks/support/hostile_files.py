@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -110,11 +111,12 @@ def damage_text(path: Path, rng: Rng) -> tuple[str, str]:
     changed = TEXTS[name](text, rng)
     data = changed if isinstance(changed, bytes) else changed.encode()
     path.write_bytes(data)
-    return name, "" if path.suffix != ".json" or is_strict(data) else REFUSED
+    known = {".json": json.loads, ".toml": tomllib.loads}.get(path.suffix)
+    return name, "" if known is None or is_strict(data, known) else REFUSED
 
 
-def is_strict(data: bytes) -> bool:
-    """Whether this is JSON without keys that are there twice, NaN and infinity."""
+def is_strict(data: bytes, read: Callable[..., Any] = json.loads) -> bool:
+    """Whether this is JSON, or TOML, without keys that are there twice, NaN and infinity."""
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(dict(pairs)) < len(pairs):
@@ -122,7 +124,8 @@ def is_strict(data: bytes) -> bool:
         return dict(pairs)
 
     try:
-        value = json.loads(data.decode("utf-8-sig"), object_pairs_hook=once, parse_constant=float)
+        options = {"object_pairs_hook": once} if read is json.loads else {}
+        value = read(data.decode("utf-8-sig").replace("\r\n", "\n"), **options)
     except (ValueError, RecursionError):
         return False
     return all(not isinstance(leaf, float) or np.isfinite(leaf) for _, _, leaf in _leaves(value))
@@ -134,6 +137,14 @@ def _leaves(value: Any) -> Iterator[tuple[Any, Any, Any]]:
     for key, inner in pairs:
         yield value, key, inner
         yield from _leaves(inner)
+
+
+def is_problem(value: Any) -> bool:
+    """Whether a routing problem is one: a symmetric matrix of finite distances, indices of its rows."""
+    matrix = np.array(value["distances"], float)
+    indices = [value["start"], *value["onboard"], *(i for s in value["shipments"] for i in s.values())]
+    good = (matrix == matrix.T).all() and (matrix >= 0).all() and np.isfinite(matrix).all()
+    return bool(good) and all(type(i) is int and 0 <= i < len(matrix) for i in indices)
 
 
 def damage_values(value: Any, rng: Rng) -> tuple[str, str, str]:
@@ -200,6 +211,15 @@ def damage_file(path: Path, rng: Rng) -> str:
     name: str = pick(changes, rng)
     path.write_bytes(changes[name]())
     return name
+
+
+def rows_of(path: Path) -> Any:
+    """Values of a Parquet file, read without care; none of another file."""
+    try:
+        rows = pa.parquet.read_table(path).to_pylist() if path.suffix == ".parquet" else []
+        return str([list(row.values()) for row in rows])
+    except (OSError, ValueError, pa.ArrowException):
+        return "nothing"
 
 
 IMPOSSIBLE = {

@@ -26,7 +26,7 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
     table = pa.table({c: [row.get(c) for row in rows] for c in columns})
     parquet, csv = folder / f"{NAME}.parquet", folder / f"{NAME}.csv"
     with replacing(parquet) as temporary:
-        pa.parquet.write_table(table, temporary)
+        pa.parquet.write_table(table, temporary, write_page_checksum=True)
     # An empty column has no type that CSV could hold.
     present = [c for c in columns if table[c].null_count < len(rows)]
     with replacing(csv) as temporary:
@@ -42,8 +42,8 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """
     try:
         check_input(path)
-        rows: list[dict[str, Any]] = pa.parquet.read_table(path).to_pylist()
-    except (OSError, ValueError) as error:
+        rows: list[dict[str, Any]] = pa.parquet.read_table(path, page_checksum_verification=True).to_pylist()
+    except (OSError, ValueError, pa.ArrowException) as error:
         raise RecordError(f"{path} cannot be read ({error})") from error
     seen: dict[tuple[Any, ...], int] = {}
     for k, row in enumerate(rows):

@@ -26,6 +26,19 @@ from experiments.web.server.pages import CLIENT
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
 
 
+def test_a_table_whose_values_are_damaged_is_refused(tmp_path):
+    path, _ = write_tables(tmp_path, made_up_people({("none", 6): 3, ("optimal", 6): 3}))
+    good, data = read_rows(path), path.read_bytes()
+    footer, refused = int.from_bytes(data[-8:-4], "little"), 0  # which has no checksum
+    for at in range(0, len(data) - 8 - footer, 5):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 1 << at % 8]) + data[at + 1 :])
+        try:
+            assert read_rows(path) == good
+        except RecordError:
+            refused += 1
+    assert refused > 20
+
+
 def test_columns_that_nothing_analyses_are_named():
     rows = made_up_people({("none", 6): 3, ("optimal", 6): 3})
     rows[-1] |= {"excluded": True, "mood\n": 3}
