@@ -1,6 +1,7 @@
 """Text: measuring, shortening, wrapping and rasterising with the font that OpenCV carries inside."""
 
 import functools
+import re
 
 import cv2
 import numpy as np
@@ -10,6 +11,9 @@ from hud.theme import Face
 
 ELLIPSIS = "…"
 BUILT_IN_FONT = "sans"
+_SMALL = 10  # px, below which words run together at the font's own spaces, and digits at its decimal points
+_POINT = re.compile(r"(?<=\d)\.(?=\d)")
+_WORD = re.compile(r"\S+(?:\sm(?!\S))?")  # a length in metres stays in one line with its unit
 
 
 class Typeface:
@@ -29,7 +33,9 @@ class Typeface:
         if not text:
             return 0
         size = max(1, self.px(face.size))
-        left, _, width, _ = cv2.getTextSize((0, 0), text, (0, 0), self._font, size, face.weight)
+        left, _, width, _ = cv2.getTextSize(
+            (0, 0), _spaced(text, size), (0, 0), self._font, size, face.weight
+        )
         return int(max(width, left + width))
 
     def fit(self, text: str, face: Face, width: int) -> str:
@@ -49,7 +55,7 @@ class Typeface:
     def wrap(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
         """`text` broken between words into at most `lines` lines of `width` px; the last is cut with an ellipsis."""
         done: list[str] = []
-        words = text.split()
+        words: list[str] = _WORD.findall(text)
         while words and len(done) < lines - 1:
             count = 1
             while count < len(words) and self.width(" ".join(words[: count + 1]), face) <= width:
@@ -78,5 +84,10 @@ class Typeface:
         size = max(1, self.px(face.size))
         baseline = size + size // 4
         mask = np.zeros((baseline + size // 2, self.width(text, face) + size), dtype=np.uint8)
-        cv2.putText(mask, text, (1, baseline), 255, self._font, size, face.weight)
+        cv2.putText(mask, _spaced(text, size), (1, baseline), 255, self._font, size, face.weight)
         return mask, baseline
+
+
+def _spaced(text: str, size: int) -> str:
+    """Text as it is drawn at a size, px."""
+    return _POINT.sub(" . ", text.replace(" ", "  ")) if size < _SMALL else text

@@ -112,6 +112,10 @@ def work_folder(parent: Path) -> Iterator[Path]:
     folder = Path(tempfile.mkdtemp(dir=parent, prefix=f"{WORK}{os.getpid()}-"))
     try:
         yield folder
+    except OSError as error:
+        if error.filename is None:  # of a write: a full disk
+            error.filename = str(parent)
+        raise
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

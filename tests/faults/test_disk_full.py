@@ -68,7 +68,7 @@ def test_a_full_disk_at_the_floor_plan_costs_the_floor_plan_alone(house, tmp_pat
     monkeypatch.setattr("experiments.trials.trial.draw_topdown", full)
     warnings = []
     run_trial(BRIEF, tmp_path / "out", house=house, on_warning=warnings.append)
-    assert warnings == ["no floor plan: OSError: [Errno 28] No space left on device"]
+    assert warnings == [f"no floor plan: OSError: [Errno 28] No space left on device: '{tmp_path}'"]
     assert replay(tmp_path / "out", house=house).ended == "all delivered"
 
 

@@ -1,5 +1,6 @@
 """Work in progress of processes that were killed is removed after a day."""
 
+import errno
 import os
 import time
 
@@ -29,6 +30,14 @@ def test_work_that_fails_leaves_nothing(failure, tmp_path):
         with pytest.raises(failure), make():
             raise failure
     assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_is_told_with_the_place_that_was_written(tmp_path):
+    for place in (tmp_path, tmp_path / "house.xml"):
+        make = work_folder if place == tmp_path else replacing
+        with pytest.raises(OSError, match=str(place)) as failure, make(place):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        assert failure.value.filename == str(place)
 
 
 def test_what_others_hide_is_kept(tmp_path):

@@ -126,7 +126,18 @@ def test_the_metres_of_alternatives_are_never_cut_off(base, steps):
         for item, row in shown:
             text = " ".join(row.detail)
             assert "…" not in text and (" m" in item.detail) == (" m" in text)
+            assert "m" not in row.detail, "a unit stays with its number"
         assert found.stop - found.first >= 5
+
+
+@pytest.mark.parametrize("gap", [" ", "."])
+@pytest.mark.parametrize("face", [theme.DETAIL, theme.TITLE, theme.ITEM_CURRENT])
+def test_words_and_decimals_are_apart_in_the_smallest_frame(face, gap):
+    typeface = Typeface(unit_of(*theme.MIN_FRAME))
+    columns = [typeface.rasterise(text, face)[0].max(axis=0) > 60 for text in ("22", f"2{gap}2")]
+    together, apart = (np.flatnonzero(inked) for inked in columns)
+    assert np.ptp(apart) >= np.ptp(together) + 2
+    assert typeface.width(f"2{gap}2", face) >= np.ptp(apart)
 
 
 @settings(max_examples=50, deadline=None)
