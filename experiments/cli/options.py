@@ -163,10 +163,10 @@ def add_task_options(parser: argparse.ArgumentParser, objects: int) -> None:
     )
 
 
-def add_trial_options(parser: argparse.ArgumentParser) -> None:
-    """Add the settings that run, batch and play have in common; options that are not given are None."""
+def add_trial_options(parser: argparse.ArgumentParser, **defaults: str) -> None:
+    """Add the settings that run, batch and play have in common; options without a default are None if not given."""
     for name in TRIAL_OPTIONS:
-        add_setting(parser, name)
+        add_setting(parser, name, **({"default": defaults[name]} if name in defaults else {}))
     usual = PersonParameters()
     for name, what in PERSON_VALUES.items():
         low, high, unit = RANGES[name]

@@ -56,7 +56,7 @@ def add_parser(commands: Any) -> None:
     parser = add_command(commands, "play", run, description=DESCRIPTION)
     add_task_options(parser, OBJECTS)
     parser.add_argument("--user", default=HUMAN, metavar="NAME", help="name of the participant")
-    add_trial_options(parser)
+    add_trial_options(parser, phases=",".join(PHASES))
     group = parser.add_argument_group("server")
     group.add_argument(
         "--port", type=_number(0, 65535), default=PORT, help="TCP port; 0 for any that is free"
@@ -136,8 +136,9 @@ def _phases(arguments: argparse.Namespace) -> tuple[str, ...]:
     Raises:
         ConfigError: There is no such phase.
     """
-    names = phases_of(arguments.phases or ",".join(PHASES))
-    return tuple(name for name in names if name != FLYTHROUGH or arguments.film is not None)
+    return tuple(
+        name for name in phases_of(arguments.phases) if name != FLYTHROUGH or arguments.film is not None
+    )
 
 
 def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], listener: socket.socket) -> None:

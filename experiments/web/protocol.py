@@ -175,7 +175,7 @@ class Frame(WireMessage, frozen=True):
 
 
 class Snapshot(WireMessage, frozen=True):
-    """Poses and HUD at the start of a control step, for clients that draw by themselves.
+    """Poses of what is in view or in hand, and HUD, at the start of a control step, for clients that draw themselves.
 
     `eye` has the position, m, then heading and pitch, rad; `objects` the position (3), m, and orientation wxyz (4) by
     instance name.

@@ -30,7 +30,7 @@ from experiments.web.server.limit import SessionLimit
 from experiments.web.server.pages import STATIC, message_page, page
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.sessions import Sessions
-from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, token_hash
+from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, following, token_hash
 
 LOG = logging.getLogger("mjsim.play")
 MAX_QUEUE = 100  # visits that may wait for a place
@@ -115,6 +115,7 @@ class PlayServer:
             condition=str(self._config.trials[TASK]["assistance"]).split("-")[0],
             training=TRAINING in self._config.phases,
             opened=round(1000.0 * time.monotonic()),
+            after=request.query_params.get("after", ""),
         )
 
     async def _begin(self, request: Request) -> Response:
@@ -124,16 +125,27 @@ class PlayServer:
             return message_page(request, 503, "All places are taken", "Please come back later.")
         left_out = (STORY,) if self._config.film else (STORY, FLYTHROUGH)
         phases = [name for name in self._config.phases if name not in left_out]
-        reading = self._reading(await request.body())
-        token = await run_in_threadpool(self._visits.create, phases, self._config.trials, reading)
+        form = parse_qs((await request.body()).decode("ascii", "replace"))
+        trials = await run_in_threadpool(self._trials, form.get("after", [""])[0])
+        token = await run_in_threadpool(self._visits.create, phases, trials, self._reading(form))
         LOG.info("session %s begins", token_hash(token)[:12])
         return RedirectResponse(f"/play/{token}", 303)
 
-    def _reading(self, form: bytes) -> list[Ended]:
+    def _trials(self, after: str) -> Mapping[str, dict[str, Any]]:
+        """Settings of the trials; who has seen the best way through an episode gets the next one."""
+        before = self._visits.find(after)
+        if before is None or before.phase != RESULT:
+            return self._config.trials
+        return {
+            name: {**trial, "house_seed": following(before.settings(name)["house_seed"])}
+            for name, trial in self._config.trials.items()
+        }
+
+    def _reading(self, form: Mapping[str, Sequence[str]]) -> list[Ended]:
         """The phase of reading the story; its form tells when the page was made."""
         if STORY not in self._config.phases:
             return []
-        opened = parse_qs(form.decode("ascii", "replace")).get("opened", [""])[0]
+        opened = form.get("opened", [""])[0]
         seconds = time.monotonic() - int(opened) / 1000.0 if OPENED.fullmatch(opened) else 0.0
         return [Ended(STORY, round(min(max(0.0, seconds), MAX_READING), 3))]
 
@@ -149,7 +161,10 @@ class PlayServer:
         if visit.phase in PLAYED:
             objects = visit.settings(visit.phase)["objects"]
             return page(request, "play", trial=visit.phase, objects=objects)
-        return page(request, "result", metrics=visit.metrics(TASK))
+        again = visit.settings(TASK)["episode"] is None  # else there is but one, whose best way was shown
+        return page(
+            request, "result", metrics=visit.metrics(TASK), again=again, token=request.path_params["token"]
+        )
 
     def _film(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])

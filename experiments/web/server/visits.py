@@ -19,6 +19,7 @@ from experiments.record import records
 from experiments.record.journal import sync_folder
 from experiments.record.phases import TASK, TRAINING
 from experiments.record.run_directory import VISIT
+from experiments.trials.trial_config import MAX_SEED
 from mjsim.files import write_text_atomically
 
 JOURNALS = "journals"
@@ -139,7 +140,10 @@ class Visits:
         folder.mkdir(0o700)
         with self._lock:
             later, self._begun = self._begun, self._begun + 1
-        own = {name: {**trial, "order_seed": trial["order_seed"] + later} for name, trial in trials.items()}
+        own = {
+            name: {**trial, "order_seed": following(trial["order_seed"], later)}
+            for name, trial in trials.items()
+        }
         visit = Visit(folder, _Stored(phases[0], list(phases), own, list(ended)))
         visit._save()
         sync_folder(self._folder)
@@ -161,6 +165,11 @@ class Visits:
                 except msgspec.DecodeError as error:
                     raise RecordError(f"{path} is damaged: {error}") from error
             return self._known.get(name)
+
+
+def following(seed: int, by: int = 1) -> int:
+    """A seed so many after another one."""
+    return (seed + by) % (MAX_SEED + 1)
 
 
 def token_hash(token: str) -> str:

@@ -14,6 +14,7 @@ from experiments.web.worker.live_session import LiveSession
 from hud.projection import CameraView, project
 from hud.state import HudState
 from mjsim.actions import Pick
+from mjsim.model.sight import visible_objects
 from mjsim.observation import Observation
 from mjsim.world import World
 
@@ -57,7 +58,7 @@ class BrowserViewer(Viewer):
         if hidden:
             return
         if view.snapshots:
-            self._send(_snapshot(observation, hud_state, step, number))
+            self._send(_snapshot(world, observation, hud_state, step, number))
         for message in (
             _hud(hud_state),
             self._moment(self.live, observation, hud_state, step),
@@ -93,16 +94,19 @@ class BrowserViewer(Viewer):
         return Reach(catalogue.objects[model].label, receptacle, at if in_view else None)
 
 
-def _snapshot(seen: Observation, state: HudState, step: int, number: int) -> Snapshot:
+def _snapshot(world: World, seen: Observation, state: HudState, step: int, number: int) -> Snapshot:
+    """What the person sees: objects that are out of view are nobody's business."""
     poses = zip(
         seen.object_names, seen.object_positions.tolist(), seen.object_quaternions.tolist(), strict=True
     )
+    in_view = visible_objects(world.scene, world.data, seen.eye, seen.heading, seen.pitch)
+    shown = {*in_view, *seen.carried}
     return Snapshot(
         step,
         number,
         seen.time,
         [*map(float, seen.eye), seen.heading, seen.pitch],
-        {name: [*position, *quaternion] for name, position, quaternion in poses},
+        {name: [*position, *quaternion] for name, position, quaternion in poses if name in shown},
         state,
     )
 

@@ -29,6 +29,7 @@ class Watcher:
 
     def __init__(self, page):
         self.snapshot = None
+        self.objects = {}  # name -> where it was seen last
         page.route_web_socket("**/play/*", self._route)
 
     def _route(self, socket):
@@ -38,6 +39,7 @@ class Watcher:
         def forward(message):
             if isinstance(message, str) and message.startswith('{"type":"snapshot"'):
                 self.snapshot = json.loads(message)
+                self.objects |= self.snapshot["objects"]
             else:
                 socket.send(message)
 
@@ -50,6 +52,7 @@ class KeyPresser:
     def __init__(self, page, watcher, house, episode):
         self._page, self._watcher, self._house = page, watcher, house
         ((self._name, receptacle),) = episode.targets.items()
+        self._start = episode.objects[0].position
         self._bin = house.receptacles[receptacle].center[:2]
         self._stand = house.approaches[receptacle]
 
@@ -62,7 +65,7 @@ class KeyPresser:
             elif any(slot and slot["label"] for slot in self._watcher.snapshot["hud"]["inventory"]):
                 self._step(self._bin, self._stand, 0.1)
             else:
-                loose = np.array(self._watcher.snapshot["objects"][self._name][:2])
+                loose = np.array(self._watcher.objects.get(self._name, self._start)[:2])
                 self._step(loose, loose, NEAR * self._house.person.reach)
 
     def _playing(self):

@@ -483,6 +483,37 @@ def test_visits_have_orders_of_their_own_and_folders_that_nobody_else_reads(tmp_
     assert all((tmp_path / token_hash(token)).stat().st_mode & 0o077 == 0 for token in tokens)
 
 
+def test_who_has_seen_the_best_way_plays_another_episode(client, tmp_path):
+    def house_seed(link):
+        return Visits(tmp_path).find(link[6:]).settings("task")["house_seed"]
+
+    link = new_visit(client)
+    assert house_seed(new_visit(client, after=link[6:])) == 0, "that visit is not over"
+    go_through(client, link)
+    for expected in (1, 2):
+        again = re.search(r'href="(/\?after=[\w-]+)"', client.get(link).text)[1]
+        after = re.search(r'name="after" value="([\w-]+)"', client.get(again).text)[1]
+        link = new_visit(client, after=after)
+        assert house_seed(link) == expected
+        go_through(client, link)
+
+
+@pytest.mark.parametrize("after", ["", "x", "A" * 43, '"><script>'])
+def test_another_episode_needs_the_link_of_a_visit(tmp_path, pool, after):
+    with serving(tmp_path, pool) as client:
+        assert '"><script>' not in client.get("/", params={"after": after}).text
+        token = new_visit(client, after=after)[6:]
+        assert Visits(tmp_path).find(token).settings("task")["house_seed"] == 0
+
+
+def test_a_fixed_episode_is_not_offered_again(tmp_path, pool, monkeypatch):
+    monkeypatch.setitem(TRIALS, "task", {**TASK, "episode": "e.json"})
+    with serving(tmp_path, pool) as client:
+        link = new_visit(client)
+        go_through(client, link)
+        assert "Play again" not in client.get(link).text
+
+
 def test_a_step_of_the_wall_clock_changes_no_duration(tmp_path, pool, monkeypatch):
     with serving(tmp_path, pool) as client:
         opened = re.search(r'name="opened" value="(\d+)"', client.get("/").text)[1]

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
-from experiments.web.protocol import Hud, Moment, View
+from experiments.web.protocol import Hud, Moment, Snapshot, View
 from experiments.web.worker.drawing import Drawer
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.viewer import BrowserViewer
@@ -37,6 +37,17 @@ def test_nothing_of_the_task_is_sent_while_the_clock_stands(shown):
     shown.live.session.show()
     assert {type(message).__name__ for message in shown.sent} == {"Snapshot", "Hud", "Moment", "Busy"}
     assert shown.drawer.drawn == [True, False]
+
+
+def test_a_snapshot_has_only_what_is_in_view(shown, monkeypatch):
+    shown.drawer.hidden = False
+    names = shown.live.world.observation().object_names
+    for in_view in ((), names[1:2]):
+        monkeypatch.setattr("experiments.web.worker.viewer.visible_objects", lambda *_, seen=in_view: seen)
+        shown.viewer.set_view(View(640, 480, snapshots=True))
+        shown.live.session.show()
+        snapshot = [message for message in shown.sent if isinstance(message, Snapshot)][-1]
+        assert tuple(snapshot.objects) == in_view
 
 
 def test_the_display_has_no_markers_and_survives_the_way_to_the_page(shown):
