@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -115,6 +116,22 @@ def test_clumsy_command_lines(command, code, said, problem, tmp_path):
     done = subprocess.run(line, shell=True, cwd=tmp_path, capture_output=True, text=True, env=environment)
     assert done.returncode == code and said in done.stderr
     assert len(done.stderr.splitlines()) == bool(said)
+
+
+def test_no_error_is_longer_than_a_few_lines(problem, capsys):
+    assert main(["plan", problem, "--planner", "x" * 10_000]) == 2
+    assert len(one_line(capsys.readouterr().err)) < 700
+
+
+def test_warnings_of_libraries_reach_nobody(problem, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["mjsim", "plan", problem])
+    monkeypatch.setattr(sys, "warnoptions", [])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.resetwarnings()
+        warn = Mock(side_effect=lambda *_: warnings.warn("x", RuntimeWarning, stacklevel=2))
+        monkeypatch.setattr("experiments.cli.plan._publish", warn)
+        assert main() == 0
+    assert warn.called and not caught
 
 
 def test_a_folder_that_is_gone(problem, tmp_path, capsys, monkeypatch):

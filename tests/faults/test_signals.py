@@ -4,11 +4,13 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
 from benchmarks.support.user_code import participant
+from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.files import read_json
 from experiments.record.records import read_events
@@ -57,6 +59,23 @@ def test_who_does_not_look_is_interrupted_after_a_while():
     with pytest.raises(Stopped), signals_postponed():
         os.kill(os.getpid(), signal.SIGHUP)
         time.sleep(PATIENCE + 5)
+
+
+@pytest.fixture(scope="module")
+def walked(house, tmp_path_factory):
+    out = tmp_path_factory.mktemp("walked") / "run"
+    run_trial(BRIEF, out, topdown=False, house=house)
+    return out
+
+
+@pytest.mark.parametrize("seconds", [0.6, 1.1, 1.6])
+def test_a_replay_that_films_names_the_signal_that_stops_it(seconds, walked, tmp_path, capsys):
+    stop = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGTERM))
+    stop.start()
+    code = main(["replay", str(walked), "--video", str(tmp_path / "film.mp4"), "--size", "1280x960"])
+    assert code == 128 + signal.SIGTERM
+    assert "stopped by SIGTERM" in one_line(capsys.readouterr().err)
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_ignored_signal_stays_ignored():

@@ -110,6 +110,42 @@ def test_a_house_for_stock_mujoco(tmp_path, capsys):
     assert f"{len(episode.objects)} misplaced objects" in capsys.readouterr().out
 
 
+def test_regrets_that_nobody_worked_out_are_unknown(tmp_path, capsys):
+    words = [
+        "run",
+        "--objects",
+        "1",
+        "--fidelity",
+        "event",
+        "--no-regret",
+        "--no-video",
+        "--no-floor-plan",
+        "--time-limit",
+        "1",
+        "--out",
+    ]
+    assert main([*words, str(tmp_path / "out")]) == 0
+    said = {" ".join(line.split()) for line in capsys.readouterr().err.splitlines()}
+    assert {"visits with regret unknown", "total regret unknown"} <= said
+
+
+def test_a_study_that_holds_more_people_than_asked_for_says_so(tmp_path, capsys, monkeypatch):
+    (tmp_path / "study.toml").write_text(
+        "[[cells]]\nobjects = 2\nassistance = 'none'\npeople = 3\nuser = 'guest'"
+    )
+    monkeypatch.setattr("experiments.cli.study.simulate.run_with_progress", lambda *_: ([{}] * 5, 0))
+    assert main(["study", "simulate", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert "has 2 more rows than the 3 asked for" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(("command", "phases"), [("run", "task"), ("play", "story,flythrough,training,task")])
+def test_the_help_names_the_phases_that_are_usual(command, phases, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert f"(docs/procedure.md) (default: {phases})" in text
+
+
 def test_the_doctor_names_the_renderer(capsys):
     assert main(["doctor"]) == 0
     text = capsys.readouterr().out

@@ -304,3 +304,9 @@ def test_the_printed_limits_are_within_the_range(name):
         assert getattr(PersonParameters(**{name: float(f"{limit:.4g}")}), name) == pytest.approx(
             limit, rel=1e-3
         )
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_the_limits_are_possible_as_they_are_printed(name):
+    for limit in RANGES[name][:2]:
+        PersonParameters(**{name: float(f"{limit:.4g}")})
