@@ -22,13 +22,10 @@ def write(name):
     Path(name).write_text("new")
 
 
-def attempt(case):
-    def prepare(folder):
-        (folder / "there").write_text("old")
-
-    shop = Workshop(lambda _: None, lambda _number, _folder: case)
-    prepare(shop.template)
-    return shop.attempt(0)
+@pytest.fixture
+def attempt(tmp_path):
+    (tmp_path / "there").write_text("old")
+    return lambda case: Workshop(lambda _: None, lambda *_: case, tmp_path).attempt(0)
 
 
 @pytest.mark.parametrize(
@@ -51,13 +48,13 @@ def attempt(case):
         (lambda: print("mjsim: " + "long " * 1000) or refuse(), "", "refused at length"),
     ],
 )
-def test_what_is_wrong_is_found(call, must, fault, monkeypatch):
+def test_what_is_wrong_is_found(call, must, fault, attempt, monkeypatch):
     monkeypatch.setattr(warm_commands, "HUNG", 1)
     monkeypatch.setattr(warm_commands, "WAITS", 3)
     assert attempt(Case("any", "kind", must=must, call=call)).fault == fault
 
 
-def test_a_reason_is_asked_for():
+def test_a_reason_is_asked_for(attempt):
     assert attempt(Case("any", "kind", call=refuse, said="whose")).fault == "refused without its reason"
 
 
