@@ -104,7 +104,9 @@ return replace(plan, cost=0, lower_bound=0)
 problem.distances.flags.writeable = True; problem.distances[:] = 0; return replace(plan, cost=0)
 """,
 }
-HARMLESS = re.compile(r"os\.chdir|sys\.(stdout|path)|Pick\(\)|Place\(\)|no such'|object=''|1e308|until=-1|__dict__|1e6")
+HARMLESS = re.compile(
+    r"os\.chdir|sys\.(stdout|path)|Pick\(\)|Place\(\)|no such'|object=''|1e308|until=-1|__dict__|1e6"
+)
 MODULES = (  # that cannot be loaded, or hold nothing of use
     "1 / 0",
     "raise SystemExit(0)",

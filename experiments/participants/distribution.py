@@ -159,6 +159,8 @@ class Distributions(Mapping[str, Distribution]):
             raise ConfigError(f"{shown(values)} is no table of values, such as {{ walking_speed = 1.2 }}")
         found: dict[str, Distribution] = {}
         for name, value in values.items():
+            if value == {}:
+                raise ConfigError(f"{name} is an empty table; give its values, or leave it out")
             if isinstance(value, Mapping) and set(value).isdisjoint(Distribution.__struct_fields__):
                 found |= {f"{name}.{part}": distribution(f"{name}.{part}", v) for part, v in value.items()}
             else:

@@ -21,6 +21,7 @@ from experiments.errors import ConfigError
 from experiments.record import records
 from experiments.record.run_directory import TRIALS
 from experiments.study.measures import FILE, Measures, decoded_measures, read_measures
+from experiments.trials.batch_checks import check_names
 from experiments.trials.design import counted, read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import PATHS, SETTINGS
@@ -58,6 +59,7 @@ class Preregistration:
 def write_preregistration(study: Path, out: Path, measures: Path = FILE) -> str:
     """Freeze a study file and a file of measures as a ZIP; its SHA-256."""
     design = read_design(study)
+    check_names(design.trials)
     read_measures(measures)
     if out.exists() and out.samefile(study):
         raise ConfigError(f"{out} is the study file itself; name another file to write")

@@ -25,8 +25,8 @@ from planner.solver import solver
 Houses = Callable[[str], House]
 
 
-def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
-    """What each trial depends on; raises the error of a trial that cannot be run, as far as that shows beforehand."""
+def check_names(trials: Sequence[TrialConfig]) -> None:
+    """Raise the error of a trial whose participant, assistance, planner or behaviour there is not."""
     for check, names in (
         (participant, {trial.user for trial in trials}),
         (condition, {name for trial in trials for name in (trial.assistance, trial.training_assistance)}),
@@ -36,6 +36,11 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
             check(name)
     for trial in {(t.user, t.behaviour): t for t in trials}.values():
         draw_behaviour(trial)
+
+
+def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
+    """What each trial depends on; raises the error of a trial that cannot be run, as far as that shows beforehand."""
+    check_names(trials)
     catalogue = functools.cache(Catalogue.load)
     house = functools.cache(House.load)
     for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():

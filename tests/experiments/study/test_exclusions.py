@@ -213,6 +213,20 @@ def test_the_study_file_is_never_replaced_by_its_preregistration(study, capsys):
     assert study.read_text() == STUDY + RULES
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"optimal"', '"optimale"', "no assistance condition 'optimale'"),
+        ("people = 6", "people = 6\nuser = 'gest'", "no participant 'gest'"),
+        ("people = 6", "people = 6\nuser = 'guest'\nbehaviour = { compliance = { folows = 1 } }", "folows"),
+    ],
+)
+def test_what_there_is_not_is_not_frozen(old, new, said, tmp_path, capsys):
+    (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
+    assert main(["study", "preregister", str(tmp_path / "study.toml"), "--out", str(tmp_path / "x.zip")]) == 2
+    assert said in capsys.readouterr().err and not (tmp_path / "x.zip").exists()
+
+
 def test_any_damage_to_a_preregistration_is_a_refusal_in_one_line(study, tmp_path):
     """Each of 100 bytes is changed in turn; what is still read is what was written."""
     path = tmp_path / "p.zip"
