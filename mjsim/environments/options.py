@@ -162,6 +162,10 @@ def build(options: EnvironmentOptions) -> Rearrangement:
     else:
         build_floor = options.navigable
         navigable = build_floor(floor.obstacles, floor.bounds) if build_floor else navigable_floor(catalogue)
+        if not hasattr(navigable, "sample"):
+            raise EnvironmentConfigError(
+                f"navigable answered {navigable!r:.200}; it must be a NavigableFloor"
+            )
         make = partial(sample, catalogue, navigable, options.object_range)
         count, cache_size = options.episodes, options.episodes or DEFAULT_CACHE_SIZE
     max_objects = options.object_range[1]
