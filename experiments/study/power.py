@@ -181,26 +181,24 @@ def _squares(means: Mapping[Cell, float], effect: str) -> float:
 
 
 def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int, int]:
-    """90 % interval of the people in each cell."""
-    found = []
-    for _ in range(RESAMPLES):
-        drawn = {cell: rng.choice(v, len(v)) for cell, v in pool.items()}
+    """90 % interval of the people in each cell: the more, the smaller the effect of people drawn from the pool."""
+    drawn = {cell: rng.choice(v, (RESAMPLES, len(v))) for cell, v in pool.items()}
+    sizes = []
+    for k in range(RESAMPLES):
         try:
-            size = _eta_squared(drawn, wanted, draws=2)
-            freedom = _freedom(pool, wanted.effect)
-            found.append(people_per_cell(size, freedom, len(pool), wanted.power, wanted.alpha))
-        except StatisticsError:  # these people show no effect, or too small a one
-            found.append(_UNLIMITED)
-    low, high = np.quantile(found, [(1 - SHARE) / 2, (1 + SHARE) / 2], method="nearest")
-    if high == _UNLIMITED:
+            sizes.append(_eta_squared({cell: v[k] for cell, v in drawn.items()}, wanted, draws=2))
+        except StatisticsError:  # these people show no effect
+            sizes.append(0.0)
+    small, large = np.quantile(sizes, [(1 - SHARE) / 2, (1 + SHARE) / 2], method="nearest").tolist()
+    cells, freedom = len(pool), _freedom(pool, wanted.effect)
+    try:
+        low, high = (people_per_cell(e, freedom, cells, wanted.power, wanted.alpha) for e in (large, small))
+    except StatisticsError as error:
         raise StatisticsError(
             f"the pool does not say how many people are needed: its effect of {wanted.effect} is not clear of none; "
             "simulate more people, or name an effect"
-        )
-    return int(low), int(high)
-
-
-_UNLIMITED = 2**31
+        ) from error
+    return low, high
 
 
 def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:

@@ -1,7 +1,7 @@
 """Analyses of variance between subjects, with one or two factors."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -92,6 +92,54 @@ def _fisher(groups: Mapping[str, Values]) -> FTest:
     return FTest(between / df1 / (within / df2), df1, float(df2), people)
 
 
+@dataclass(frozen=True)
+class Cells:
+    """Values by cell of a design with one or two factors; arrays have one entry per cell, (c,)."""
+
+    # columns of a linear model by effect, (c, columns) each: sum coded, 1 at a level, -1 at the last one, else 0
+    columns: Mapping[str, Values]
+    member: NDArray[np.int64]  # cell of each person, (n,)
+    people: NDArray[np.int64]
+    means: Values
+    squares: Values  # sums of squares around the means
+
+    def residual(self, names: Iterable[str]) -> float:
+        """Residual sum of squares of a linear model with these effects, without the squares within cells."""
+        weights = np.sqrt(self.people)[:, None]
+        design = np.hstack([self.columns[name] for name in names]) * weights
+        wanted = self.means * weights[:, 0]
+        return float(((wanted - design @ np.linalg.lstsq(design, wanted)[0]) ** 2).sum())
+
+
+def cells_of(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells:
+    """The cells of a design; where the second factor has one level, of the first factor alone.
+
+    Values and both factors have one entry per person, (n,). Raises `StatisticsError` if a cell is empty.
+    """
+    names, others = np.unique(first), np.unique(second)
+    if len(names) < 2:
+        raise StatisticsError(f"there is only one level ({', '.join(map(str, names))})")
+    member = np.searchsorted(names, first) * len(others) + np.searchsorted(others, second)
+    people = np.bincount(member, minlength=len(names) * len(others))
+    if not people.all():
+        name, other = divmod(int(np.argmin(people)), len(others))
+        raise StatisticsError(
+            f"no people in the cell {names[name]}, {others[other]}; tests of two factors need all"
+        )
+    means = np.bincount(member, values) / people
+    squares = np.bincount(member, np.square(values - means[member])).astype(float)
+    one, other_one = (_sum_coded(len(levels)) for levels in (names, others))
+    columns = {"constant": np.ones((len(people), 1)), EFFECTS[0]: np.repeat(one, len(others), axis=0)}
+    if len(others) > 1:
+        both = np.einsum("ap,bq->abpq", one, other_one).reshape(len(people), -1)
+        columns |= {EFFECTS[1]: np.tile(other_one, (len(names), 1)), EFFECTS[2]: both}
+    return Cells(columns, member, people, means, squares)
+
+
+def _sum_coded(levels: int) -> Values:
+    return np.vstack([np.eye(levels - 1), -np.ones((1, levels - 1))])
+
+
 def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2) -> dict[str, FTest]:
     """Analysis of variance of two crossed factors with unequal numbers of people, by name of `EFFECTS`.
 
@@ -99,15 +147,15 @@ def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int
     `StatisticsError` if a cell is empty, each has one person only, or nothing varies within cells.
     Source: Langsrud 2003, doi:10.1023/A:1023260610025.
     """
-    columns = sum_coded(first, second)
-    freedom = len(values) - sum(block.shape[1] for block in columns.values())
+    cells = _crossed(values, first, second)
+    freedom = len(values) - len(cells.people)
     if freedom < 1:
         raise StatisticsError("each cell has one person only; the variance within cells is unknown")
-    residual = _residual(values, columns, columns)
+    residual = float(cells.squares.sum())
     if residual <= 1e-20 * max(1.0, float((values**2).sum())):
         raise StatisticsError("the values do not vary within any cell")
-    sums = two_way_squares(values, first, second, kind)
-    df = {effect: columns[effect].shape[1] for effect in EFFECTS}
+    sums = _squares(cells, kind)
+    df = {effect: cells.columns[effect].shape[1] for effect in EFFECTS}
     return {
         effect: FTest(sums[effect] / df[effect] / (residual / freedom), df[effect], freedom, len(values))
         for effect in EFFECTS
@@ -117,51 +165,25 @@ def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int
 def two_way_squares(
     values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2
 ) -> dict[str, float]:
-    """Sums of squares of the effects of a two-way analysis; arguments as in `two_way`.
+    """Sums of squares of the effects of a two-way analysis; arguments as in `two_way`."""
+    return _squares(_crossed(values, first, second), kind)
 
-    Each is the reduction of the residual sum of squares by the effect: in Type II compared with the model without it
-    and its interaction, in Type III with the full model without it. `anova_lm` of statsmodels gives the same from a
-    formula in six times the time.
+
+def _crossed(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells:
+    cells = cells_of(values, first, second)
+    if len(cells.columns) <= len(EFFECTS):
+        raise StatisticsError(f"there is only one level ({second[0]})")
+    return cells
+
+
+def _squares(cells: Cells, kind: int) -> dict[str, float]:
+    """Each is the reduction of the residual sum of squares by the effect.
+
+    In Type II compared with the model without it and its interaction, in Type III with the full model without it.
     """
-    columns, sums = sum_coded(first, second), {}
+    sums = {}
     for effect in EFFECTS:
-        full = [name for name in columns if kind == 3 or effect == "interaction" or name != "interaction"]
-        without = _residual(values, columns, [name for name in full if name != effect])
-        sums[effect] = max(without - _residual(values, columns, full), 0.0)
+        full = [name for name in cells.columns if kind == 3 or effect == name or name != "interaction"]
+        without = cells.residual(name for name in full if name != effect)
+        sums[effect] = max(without - cells.residual(full), 0.0)
     return sums
-
-
-def sum_coded(first: NDArray[Any], second: NDArray[Any]) -> dict[str, Values]:
-    """Columns of a two-way design by effect, each (n, columns): 1 at a level, -1 at the last one, else 0."""
-    for levels in (first, second):
-        if len(np.unique(levels)) < 2:
-            raise StatisticsError(f"there is only one level ({', '.join(map(str, np.unique(levels)))})")
-    present = set(zip(first.tolist(), second.tolist(), strict=True))
-    empty = [(a, b) for a in np.unique(first) for b in np.unique(second) if (a, b) not in present]
-    if empty:
-        raise StatisticsError(
-            f"no people in the cell {empty[0][0]}, {empty[0][1]}; tests of two factors need all"
-        )
-    one, other = (_contrasts(levels, np.unique(levels)) for levels in (first, second))
-    both = (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
-    return {"constant": np.ones((len(one), 1)), **dict(zip(EFFECTS, (one, other, both), strict=True))}
-
-
-def design_columns(assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, Values]:
-    """Columns of `sum_coded`, or of assistance alone where there is one number of objects."""
-    if len(np.unique(objects)) > 1:
-        return sum_coded(assistance, objects)
-    names = np.unique(assistance)
-    if len(names) < 2:
-        raise StatisticsError(f"there is only one level ({names[0]})")
-    return {"constant": np.ones((len(assistance), 1)), EFFECTS[0]: _contrasts(assistance, names)}
-
-
-def _contrasts(levels: NDArray[Any], names: NDArray[Any]) -> Values:
-    return np.asarray(1.0 * (levels[:, None] == names[:-1]) - (levels == names[-1])[:, None])
-
-
-def _residual(values: Values, columns: Mapping[str, Values], names: Iterable[str]) -> float:
-    """Residual sum of squares of a linear model with the named columns."""
-    design = np.hstack([columns[name] for name in names])
-    return float(((values - design @ np.linalg.lstsq(design, values)[0]) ** 2).sum())

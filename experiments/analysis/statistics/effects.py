@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
-from scipy.stats import f, ncf
+from scipy.special import fdtrc, gammaln, ncfdtr
 
 from experiments.analysis.statistics.noncentral import Interval, f_interval, t_interval
 
@@ -32,7 +31,7 @@ class FTest:
     @cached_property
     def p(self) -> float:
         """Probability of such an F or a larger one without an effect."""
-        return float(f.sf(self.statistic, self.df1, self.df2))
+        return float(fdtrc(self.df1, self.df2, self.statistic))
 
     @property
     def eta_squared(self) -> float:
@@ -57,7 +56,7 @@ class FTest:
 
         Source: Campbell and Lakens 2021, doi:10.1111/bmsp.12201.
         """
-        return float(ncf.cdf(self.statistic, self.df1, self.df2, self.people * bound / (1.0 - bound)))
+        return float(ncfdtr(self.df1, self.df2, self.people * bound / (1.0 - bound), self.statistic))
 
     def as_json(self) -> dict[str, Any]:
         """The test, its p, and its effect size."""

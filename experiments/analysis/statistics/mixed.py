@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import f
+from scipy.special import fdtrc
 
-from experiments.analysis.statistics.anova import Values, design_columns, varies
+from experiments.analysis.statistics.anova import Values, cells_of, varies
 from experiments.errors import StatisticsError
 
 MIN_HOUSES = 5  # fewer say little about the variance between houses
@@ -53,7 +53,8 @@ def mixed_model(
         raise StatisticsError(f"a mixed model needs at least {MIN_HOUSES} houses; there are {len(names)}")
     if not varies(values):
         raise StatisticsError("the values do not vary")
-    columns = design_columns(assistance, objects)
+    cells = cells_of(values, assistance, objects)
+    columns = {effect: block[cells.member] for effect, block in cells.columns.items()}
     unit = float(values.std())
     fit = _Fit(np.hstack(list(columns.values())), values / unit, np.eye(len(names))[member])
     fit.climb()
@@ -70,7 +71,8 @@ class _Fit:
     def __init__(self, design: Values, values: Values, member: Values) -> None:
         self.design, self.values, self.member = design, values, member
         self.freedom = len(values) - design.shape[1]
-        within = np.linalg.matrix_rank(np.hstack([design, member]))
+        both = np.hstack([design, member])
+        within = np.linalg.matrix_rank(both.T @ both, hermitian=True)
         if within >= len(values):
             raise StatisticsError("there are as many houses and cells as people; their variances are one")
         if within <= design.shape[1]:
@@ -78,6 +80,9 @@ class _Fit:
         self.at(0.0)
         if self.residual <= 1e-20:
             raise StatisticsError("the values do not vary within any cell")
+        # What the likelihood depends on, from here on of the residuals without houses.
+        self.inner, self.by_house = design.T @ design, member.T @ design
+        self.people, self.sums, self.squares = member.sum(axis=0), member.T @ self.left, self.left @ self.left
 
     def at(self, ratio: float) -> None:
         """Generalised least squares at a ratio."""
@@ -97,21 +102,33 @@ class _Fit:
         """P v, with P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1."""
         return self._inverse(v) - self.weighted @ (self.covariance @ (self.weighted.T @ v))
 
-    def _deviance(self, ratio: float) -> float:
-        """Minus twice the restricted log likelihood, up to a constant."""
-        self.at(ratio)
-        houses = np.log1p(self.member.sum(axis=0) * ratio).sum()
-        return float(self.freedom * np.log(self.residual) + houses - np.linalg.slogdet(self.covariance)[1])
+    def _deviance(self, ratios: Values) -> Values:
+        """Minus twice the restricted log likelihood at each ratio, up to a constant, (r,)."""
+        shrink = ratios[:, None] / (1.0 + self.people * ratios[:, None])
+        inner = self.inner - np.einsum("rg,gp,gq->rpq", shrink, self.by_house, self.by_house)
+        moved = (shrink * self.sums) @ self.by_house
+        effects = np.linalg.solve(inner, moved[:, :, None])[:, :, 0]
+        squares = self.squares - shrink @ self.sums**2 - (moved * effects).sum(axis=1)
+        houses = np.log1p(self.people * ratios[:, None]).sum(axis=1)
+        return np.asarray(
+            self.freedom * np.log(squares / self.freedom) + houses + np.linalg.slogdet(inner)[1]
+        )
 
     def _slope(self, ratio: float) -> float:
         """Its derivative by the ratio."""
-        self.at(ratio)
-        trace = (self.member * self._project(self.member)).sum()
-        return float(trace - ((self.member.T @ self.left) ** 2).sum() / self.residual)
+        weight = 1.0 / (1.0 + self.people * ratio)
+        shrink = ratio * weight
+        covariance = np.linalg.inv(self.inner - (self.by_house * shrink[:, None]).T @ self.by_house)
+        moved = (shrink * self.sums) @ self.by_house
+        weighted = weight[:, None] * self.by_house
+        squares = self.squares - shrink @ self.sums**2 - moved @ covariance @ moved
+        left = weight * self.sums + weighted @ (covariance @ moved)
+        trace = (self.people * weight).sum() - ((weighted @ covariance) * weighted).sum()
+        return float(trace - left @ left / (squares / self.freedom))
 
     def climb(self) -> None:
         """Go to the ratio of the largest likelihood."""
-        best = int(np.argmin([self._deviance(r) for r in RATIOS]))
+        best = int(np.argmin(self._deviance(RATIOS)))
         if best == len(RATIOS) - 1:
             raise StatisticsError("people in the same house and condition do not differ")
         low, high = RATIOS[max(best - 1, 0)], RATIOS[best + 1]
@@ -133,7 +150,7 @@ class _Fit:
         freedom = 2.0 * sizes**2 / np.einsum("iq,ij,jq->q", gradient, self._variances(), gradient)
         q, statistic = len(places), float(squares.mean())
         df2 = _joint_freedom(freedom)
-        return WaldTest(statistic, q, df2, float(f.sf(statistic, q, df2)))
+        return WaldTest(statistic, q, df2, float(fdtrc(q, df2, statistic)))
 
     def _slopes(self) -> tuple[Values, Values]:
         """Derivatives of the covariance of the effects by the variances of houses and of people."""

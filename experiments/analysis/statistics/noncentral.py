@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import f, ncf, nct
+from scipy.special import fdtr, ncfdtr, nctdtr
 
 Interval = tuple[float, float]
 
@@ -26,7 +26,7 @@ def t_interval(statistic: float, freedom: int, confidence: float) -> Interval | 
 
     def bound(share: float) -> float | None:
         def excess(center: float) -> float:
-            return float(nct.cdf(statistic, freedom, center)) - share
+            return float(nctdtr(freedom, center, statistic)) - share
 
         # Widened step by step: far away from the statistic, scipy's values are NaN.
         for width in step * np.arange(1.0, MAX_WIDTH):
@@ -45,9 +45,9 @@ def f_interval(statistic: float, df1: int, df2: float, confidence: float) -> Int
 
     def bound(share: float) -> float | None:
         def excess(center: float) -> float:
-            return float(ncf.cdf(statistic, df1, df2, center)) - share
+            return float(ncfdtr(df1, df2, center, statistic)) - share
 
-        if not f.cdf(statistic, df1, df2) > share:
+        if not fdtr(df1, df2, statistic) > share:
             return 0.0
         low, high = 0.0, max(statistic * df1, 1.0)
         for _ in range(MAX_STEPS):

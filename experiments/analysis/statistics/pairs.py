@@ -4,7 +4,6 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from scipy import stats
 from experiments.analysis.statistics.anova import Values, check_groups, people_in, varies
 from experiments.analysis.statistics.effects import ALPHA, CONFIDENCE, hedges_g
 from experiments.analysis.statistics.noncentral import Interval
+from experiments.analysis.statistics.studentized import range_quantile, range_sf
 from experiments.errors import StatisticsError
 
 DIFFERENT, EQUIVALENT, UNDECIDED = "different", "equivalent", "undecided"
@@ -100,13 +100,12 @@ def tukey_p(statistic: float, groups: int, freedom: float) -> float:
 
     Source: Tukey 1953 and Kramer 1956, doi:10.2307/3001469, for unequal numbers of people.
     """
-    return float(stats.studentized_range.sf(statistic * math.sqrt(2), groups, freedom))
+    return range_sf(statistic * math.sqrt(2), groups, freedom)
 
 
-@lru_cache(maxsize=256)
 def tukey_quantile(groups: int, freedom: float) -> float:
     """Standard errors by which two of several groups may differ by chance, at 95 %."""
-    return float(stats.studentized_range.ppf(CONFIDENCE, groups, freedom)) / math.sqrt(2)
+    return range_quantile(CONFIDENCE, groups, freedom) / math.sqrt(2)
 
 
 def pooled_deviation(groups: Mapping[str, Values]) -> float:
@@ -120,6 +119,7 @@ def holm(p: Values) -> Values:
 
     Source: Holm 1979, Scandinavian Journal of Statistics 6.
     """
-    from statsmodels.stats.multitest import multipletests
-
-    return np.asarray(multipletests(p, method="holm")[1], float)
+    order = np.argsort(p)
+    found = np.empty(len(p))
+    found[order] = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)).clip(max=1.0)
+    return found

@@ -4,13 +4,13 @@ Both test unweighted means (the hypotheses of Type III), each cell with a varian
 Welch-James is Welch's analysis of variance.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.analysis.statistics.anova import OWN_VARIANCE, Values, design_columns, varies
+from experiments.analysis.statistics.anova import OWN_VARIANCE, Cells, Values, cells_of, varies
 from experiments.analysis.statistics.effects import FTest
 from experiments.errors import StatisticsError
 
@@ -45,33 +45,27 @@ def _tests(
     scaled: Callable[[float, int, Values], tuple[float, float | None]],
 ) -> dict[str, FTest]:
     """Wald tests of each effect, the variance of a cell's mean being its variance over its people less `fewer`."""
-    columns = design_columns(assistance, objects)
-    cells, member = np.unique(np.hstack(list(columns.values())), axis=0, return_inverse=True)
-    groups = [values[member == k] for k in range(len(cells))]
-    if min(map(len, groups)) < 2:
+    cells = cells_of(values, assistance, objects)
+    if cells.people.min() < 2:
         raise StatisticsError("a cell has one person only; its variance is unknown")
-    if not all(map(varies, groups)):
+    if not all(varies(values[cells.member == k]) for k in range(len(cells.people))):
         raise StatisticsError("the values of a cell do not vary")
-    people = np.array([len(v) for v in groups])
-    means = np.array([v.mean() for v in groups])
-    variances = np.array([v.var(ddof=1) for v in groups]) / (people - fewer)
-    within = int(people.sum()) - len(cells)
+    variances = cells.squares / (cells.people - 1) / (cells.people - fewer)
+    within = len(values) - len(cells.people)
     found = {}
-    for effect, rows in _contrasts(columns, cells).items():
+    for effect, rows in _contrasts(cells).items():
         weight = rows.T @ np.linalg.solve(rows * variances @ rows.T, rows)
-        shares = (variances * weight.diagonal()) ** 2 / (people - 1)
-        statistic, df2 = scaled(float(means @ weight @ means), len(rows), shares)
-        found[effect] = FTest(
-            statistic, len(rows), float(df2 or within), int(people.sum()), within, OWN_VARIANCE
-        )
+        shares = (variances * weight.diagonal()) ** 2 / (cells.people - 1)
+        statistic, df2 = scaled(float(cells.means @ weight @ cells.means), len(rows), shares)
+        found[effect] = FTest(statistic, len(rows), float(df2 or within), len(values), within, OWN_VARIANCE)
     return found
 
 
-def _contrasts(columns: Mapping[str, Values], cells: Values) -> dict[str, Values]:
+def _contrasts(cells: Cells) -> dict[str, Values]:
     """Rows by effect, (q, cells), that give its parameters from the means of the cells."""
-    rows = np.asarray(np.linalg.inv(cells), float)
+    rows = np.asarray(np.linalg.inv(np.hstack(list(cells.columns.values()))), float)
     found, start = {}, 0
-    for effect, block in columns.items():
+    for effect, block in cells.columns.items():
         found[effect] = rows[start : start + block.shape[1]]
         start += block.shape[1]
     found.pop("constant")
