@@ -8,7 +8,7 @@ import resource
 import socket
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
@@ -26,6 +26,7 @@ from experiments.cli.options import (
     trial_options,
 )
 from experiments.errors import ConfigError, RecordError
+from experiments.procedure.comprehension import Question, read_questions
 from experiments.procedure.story import story_text
 from experiments.record.origin import HUMAN
 from experiments.record.phases import FLYTHROUGH, PHASES, STORY, TASK, TRAINING, phases_of
@@ -91,6 +92,19 @@ def add_parser(commands: Any) -> None:
         help="seconds without a sign of the person after which the place is given to another one",
     )
     group.add_argument("--film", type=Path, metavar="FILE.mp4", help="film of the house to show first")
+    group.add_argument(
+        "--minimum",
+        type=_minimum,
+        default={},
+        metavar="PHASE=S,..",
+        help="seconds before which story, flythrough and training cannot be ended (docs/play.md)",
+    )
+    group.add_argument(
+        "--questions",
+        type=Path,
+        metavar="FILE",
+        help="TOML file of questions about the story, to be answered before the visit begins (docs/play.md)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -99,8 +113,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.film is not None and not arguments.film.is_file():
         raise ConfigError(f"there is no film {arguments.film}; leave out --film, or name an MP4 file")
     _check_public(arguments.public_url)
+    questions = _questions(arguments)
     with _listen(arguments.host, arguments.port) as listener, _locked(arguments.out):
-        _serve(arguments, trials, listener)
+        _serve(arguments, trials, questions, listener)
     return 0
 
 
@@ -141,7 +156,20 @@ def _phases(arguments: argparse.Namespace) -> tuple[str, ...]:
     )
 
 
-def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], listener: socket.socket) -> None:
+def _questions(arguments: argparse.Namespace) -> Sequence[Question]:
+    """The questions about the story, after a check that the phases which options name are shown."""
+    named = {**arguments.minimum, **({STORY: 0.0} if arguments.questions else {})}
+    if missing := [name for name in named if name not in _phases(arguments)]:
+        raise ConfigError(f"--minimum or --questions is about the phase {missing[0]}, which is not shown")
+    return read_questions(arguments.questions) if arguments.questions else ()
+
+
+def _serve(
+    arguments: argparse.Namespace,
+    trials: dict[str, dict[str, Any]],
+    questions: Sequence[Question],
+    listener: socket.socket,
+) -> None:
     from experiments.web.server.pool import WorkerPool  # imported here, so that other commands start fast
 
     os.umask(0o077)  # what people did is nobody else's business
@@ -166,6 +194,8 @@ def _serve(arguments: argparse.Namespace, trials: dict[str, dict[str, Any]], lis
         idle=max(arguments.idle, 1.0),
         film=arguments.film,
         story=story_text(arguments.story) if STORY in phases else "",
+        minimum=arguments.minimum,
+        questions=questions,
         proxies=arguments.trusted_proxy,
     )
     logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
@@ -240,6 +270,14 @@ def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
         return tuple(ip_network(part.strip()) for part in text.split(","))
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _minimum(text: str) -> dict[str, float]:
+    """Seconds by phase before the task."""
+    parts = dict(part.strip().partition("=")[::2] for part in text.split(","))
+    if unknown := [name for name in parts if name not in PHASES or name == TASK]:
+        raise argparse.ArgumentTypeError(f"no phase {unknown[0]!r} before the task in {text!r}")
+    return {name: seconds(value) for name, value in parts.items()}
 
 
 def _number(smallest: int, largest: int) -> Callable[[str], int]:

@@ -93,12 +93,14 @@ class PhaseEndedEvent(LoggedEvent, frozen=True, tag="phase_ended"):
         duration_s: Time spent reading, watching, or training, s.
         bins: Of a simulated participant's fly-through: receptacle -> time at which it came into view, s.
         reason: Why the training ended, as in `end`; the run directory `training` holds its record.
+        attempts: How often the questions about the story were answered, until all answers were right.
     """
 
     phase: Literal["story", "flythrough", "training"]
     duration_s: Seconds
     bins: dict[str, Seconds] | None = None
     reason: str | None = None
+    attempts: int | None = None
 
 
 class PlanEvent(LoggedEvent, frozen=True):

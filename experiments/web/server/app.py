@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs
@@ -23,6 +23,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from experiments.errors import RecordError
+from experiments.procedure.comprehension import Question
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
@@ -34,7 +35,7 @@ from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, followi
 
 LOG = logging.getLogger("mjsim.play")
 MAX_QUEUE = 100  # visits that may wait for a place
-OPENED = re.compile(r"\d{1,15}")  # ms of the monotonic clock
+NUMBER = re.compile(r"[0-9]{1,15}")
 MAX_READING = 24 * 3600.0  # s; a page may stay open over night
 NEW_VISITS = 30, 60.0  # visits from one address, within this time, s
 SOCKETS_OF_A_VISIT, SOCKETS_OF_AN_ADDRESS = 2, 20  # open at a time
@@ -53,6 +54,8 @@ class PlayConfig:
     idle: float = 1800.0
     film: Path | None = None
     story: str = ""
+    minimum: Mapping[str, float] = field(default_factory=dict)  # s by phase before which it cannot be ended
+    questions: Sequence[Question] = ()  # about the story
     proxies: Sequence[Network] = ()  # whose word about the address of a person is believed
 
 
@@ -63,7 +66,7 @@ class PlayServer:
         self._config = config
         self._visits = Visits(config.folder)
         self._pool, self._limit = pool, SessionLimit(config.sessions)
-        self.sessions = Sessions(pool, self._limit, config.idle)
+        self.sessions = Sessions(pool, self._limit, config.idle, config.minimum)
         self._new = Rate(*NEW_VISITS)
         self._sockets: Counter[str] = Counter()  # by visit and by address
 
@@ -108,14 +111,26 @@ class PlayServer:
             await self._pool.close()
 
     def _story(self, request: Request) -> Response:
+        return self._story_page(
+            request, round(1000.0 * time.monotonic()), request.query_params.get("after", "")
+        )
+
+    def _story_page(
+        self, request: Request, opened: int, after: str, attempts: int = 0, note: str = ""
+    ) -> Response:
         return page(
             request,
             "story",
+            200,
+            wait=max(0.0, self._config.minimum.get(STORY, 0.0) - (time.monotonic() - opened / 1000.0)),
+            questions=self._config.questions,
+            attempts=attempts,
+            note=note,
             story=[text for text in self._config.story.split("\n\n") if text.strip()],
             condition=str(self._config.trials[TASK]["assistance"]).split("-")[0],
             training=TRAINING in self._config.phases,
-            opened=round(1000.0 * time.monotonic()),
-            after=request.query_params.get("after", ""),
+            opened=opened,
+            after=after,
         )
 
     async def _begin(self, request: Request) -> Response:
@@ -125,9 +140,16 @@ class PlayServer:
             return message_page(request, 503, "All places are taken", "Please come back later.")
         left_out = (STORY,) if self._config.film else (STORY, FLYTHROUGH)
         phases = [name for name in self._config.phases if name not in left_out]
-        form = parse_qs((await request.body()).decode("ascii", "replace"))
-        trials = await run_in_threadpool(self._trials, form.get("after", [""])[0])
-        token = await run_in_threadpool(self._visits.create, phases, trials, self._reading(form))
+        form = {
+            name: values[0]
+            for name, values in parse_qs((await request.body()).decode("utf-8", "replace")).items()
+        }
+        after, reading = form.get("after", ""), self._reading(form)
+        if reading and (note := self._fault(reading[0], form)):
+            opened = round(1000.0 * (time.monotonic() - reading[0].duration_s))
+            return self._story_page(request, opened, after, reading[0].attempts or 0, note)
+        trials = await run_in_threadpool(self._trials, after)
+        token = await run_in_threadpool(self._visits.create, phases, trials, reading)
         LOG.info("session %s begins", token_hash(token)[:12])
         return RedirectResponse(f"/play/{token}", 303)
 
@@ -141,13 +163,25 @@ class PlayServer:
             for name, trial in self._config.trials.items()
         }
 
-    def _reading(self, form: Mapping[str, Sequence[str]]) -> list[Ended]:
-        """The phase of reading the story; its form tells when the page was made."""
+    def _reading(self, form: Mapping[str, str]) -> list[Ended]:
+        """The phase of reading the story; its form tells when the page was made, and how often it was sent before."""
         if STORY not in self._config.phases:
             return []
-        opened = form.get("opened", [""])[0]
-        seconds = time.monotonic() - int(opened) / 1000.0 if OPENED.fullmatch(opened) else 0.0
-        return [Ended(STORY, round(min(max(0.0, seconds), MAX_READING), 3))]
+        opened, before = (
+            number if NUMBER.fullmatch(number := form.get(name, "")) else ""
+            for name in ("opened", "attempts")
+        )
+        seconds = time.monotonic() - int(opened) / 1000.0 if opened else 0.0
+        attempts = 1 + int(before or 0) if self._config.questions else None
+        return [Ended(STORY, round(min(max(0.0, seconds), MAX_READING), 3), attempts=attempts)]
+
+    def _fault(self, reading: Ended, form: Mapping[str, str]) -> str:
+        """Why the story has to be read on; empty if it was read and understood."""
+        if reading.duration_s < self._config.minimum.get(STORY, 0.0):
+            return "Please take the time to read the text."
+        answers = [form.get(f"answer{i}") for i in range(len(self._config.questions))]
+        right = [question.answer for question in self._config.questions]
+        return "" if answers == right else "Not all answers are right. Please read the text again."
 
     def _visit(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])
@@ -155,12 +189,14 @@ class PlayServer:
             return _not_found(request, None)
         if visit.phase == FLYTHROUGH and self._config.film is None:
             visit.finish(FLYTHROUGH)
-        if visit.phase == FLYTHROUGH:
+        if visit.phase != RESULT:
             visit.show()
-            return page(request, "film")
+        wait = visit.wait(self._config.minimum)
+        if visit.phase == FLYTHROUGH:
+            return page(request, "film", wait=wait)
         if visit.phase in PLAYED:
             objects = visit.settings(visit.phase)["objects"]
-            return page(request, "play", trial=visit.phase, objects=objects)
+            return page(request, "play", trial=visit.phase, objects=objects, wait=wait)
         again = visit.settings(TASK)["episode"] is None  # else there is but one, whose best way was shown
         return page(
             request, "result", metrics=visit.metrics(TASK), again=again, token=request.path_params["token"]
@@ -176,7 +212,8 @@ class PlayServer:
         visit = self._visits.find(request.path_params["token"])
         if visit is None:
             return _not_found(request, None)
-        visit.finish(FLYTHROUGH)
+        if visit.phase == FLYTHROUGH and not visit.wait(self._config.minimum):
+            visit.finish(FLYTHROUGH)
         return RedirectResponse(request.url.path.removesuffix("/film"), 303)
 
     def _floor_plan(self, request: Request) -> Response:

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -59,8 +60,10 @@ class PlayedSession:
         state: Copy of the worker's state.
     """
 
-    def __init__(self, visit: Visit, pool: WorkerPool, limit: SessionLimit) -> None:
-        self.visit = visit
+    def __init__(
+        self, visit: Visit, pool: WorkerPool, limit: SessionLimit, minimum: Mapping[str, float]
+    ) -> None:
+        self.visit, self._minimum = visit, minimum
         self.browser: Browser | None = None
         self.heard = time.monotonic()
         self.state = State()
@@ -111,6 +114,8 @@ class PlayedSession:
                 self.state = msgspec.structs.replace(self.state, input=max(self.state.input, *numbers, 0))
             case Run() | Leave() if self.state.phase is LOADING:
                 return Error("too early", "the session is not ready")
+            case Leave() if wait := self.visit.wait(self._minimum):
+                return Error("too early", f"this phase can be ended in {wait:.0f} s")
             case Run():
                 self.state = self.state.after(Trigger.RUN)
             case Pause(reason):

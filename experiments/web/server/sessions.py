@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from experiments.web import protocol
 from experiments.web.server.limit import SessionLimit
@@ -17,14 +17,16 @@ MAX_AWAY = 20.0  # s that a place is kept without a page while others wait
 class Sessions:
     """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back."""
 
-    def __init__(self, pool: WorkerPool, limit: SessionLimit, idle: float) -> None:
-        self._pool, self._limit, self._idle = pool, limit, idle
+    def __init__(
+        self, pool: WorkerPool, limit: SessionLimit, idle: float, minimum: Mapping[str, float]
+    ) -> None:
+        self._pool, self._limit, self._idle, self._minimum = pool, limit, idle, minimum
         self._sessions: dict[str, PlayedSession] = {}
 
     def of(self, visit: Visit) -> PlayedSession:
         """The session of a visit."""
         if visit.name not in self._sessions:
-            self._sessions[visit.name] = PlayedSession(visit, self._pool, self._limit)
+            self._sessions[visit.name] = PlayedSession(visit, self._pool, self._limit, self._minimum)
         return self._sessions[visit.name]
 
     async def watch(self) -> None:

@@ -34,6 +34,7 @@ class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
     phase: str
     duration_s: float
     reason: str | None = None
+    attempts: int | None = None
 
 
 class _Stored(msgspec.Struct, frozen=True):
@@ -43,7 +44,7 @@ class _Stored(msgspec.Struct, frozen=True):
     phases: list[str]  # all phases, in order
     trials: dict[str, dict[str, Any]]  # settings of the trials, by phase
     ended: list[Ended] = []  # phases that are over
-    # when the phase was shown first, s of the monotonic clock; None if it was not, or has a clock of its own
+    # when the phase was shown first, s of the monotonic clock; None if it was not
     shown: float | None = None
     version: int = 1  # of this format
 
@@ -86,6 +87,11 @@ class Visit:
         with self._lock:
             if self._stored.shown is None:
                 self._save(shown=time.monotonic())
+
+    def wait(self, minimum: Mapping[str, float]) -> float:
+        """How long until the phase under way may be ended, s, by the shortest durations of phases."""
+        now = time.monotonic()
+        return max(0.0, minimum.get(self.phase, 0.0) - (now - (self._stored.shown or now)))
 
     def finish(self, phase: str, duration: float | None = None, reason: str | None = None) -> None:
         """Move to the next phase; nothing happens if the visit is further already.

@@ -12,6 +12,9 @@ const PAUSED = {
   "taken over": "Paused while the session moved to this page.",
 };
 
+/** @type {[string, string][]} */
+const SKIP = [["Skip the training", "leave"]];
+
 /** @param {boolean} interrupted @returns {Dialog} */
 export const loading = (interrupted) => ({
   title: "One moment",
@@ -22,14 +25,15 @@ export const loading = (interrupted) => ({
  * @param {string} trial
  * @param {number} objects
  * @param {string} controls
+ * @param {boolean} skippable
  * @returns {Dialog}
  */
-export function instructions(trial, objects, controls) {
+export function instructions(trial, objects, controls, skippable) {
   if (trial === "training") {
     return {
       title: "Training",
       texts: ["Find one object, pick it up and put it into its bin. There is no time limit.", controls],
-      buttons: [["Start the training", "run"], ["Skip the training", "leave"]],
+      buttons: [["Start the training", "run"], ...(skippable ? SKIP : [])],
     };
   }
   const what = objects === 1 ? "Put the object into its bin" : `Put all ${objects} objects into their bins`;
@@ -54,12 +58,15 @@ export const paused = (reason) => ({
   buttons: [["Continue", "run"]],
 });
 
-/** @param {string} trial @returns {Dialog} */
-export const ending = (trial) => ({
-  title: `End the ${trial} now?`,
-  texts: ["What you did so far is kept."],
-  buttons: [["Continue", "hide"], [`End the ${trial}`, "leave"]],
-});
+/** @param {string} trial @param {number} left s until it may be ended @returns {Dialog} */
+export const ending = (trial, left) =>
+  left > 0
+    ? { title: "Not yet", texts: [`You can end the ${trial} in ${left} s.`], buttons: [["Continue", "hide"]] }
+    : {
+        title: `End the ${trial} now?`,
+        texts: ["What you did so far is kept."],
+        buttons: [["Continue", "hide"], [`End the ${trial}`, "leave"]],
+      };
 
 /** @param {string} reason @param {boolean} saved @returns {Dialog} */
 export const over = (reason, saved) => ({

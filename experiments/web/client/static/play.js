@@ -25,7 +25,8 @@ const DONE = 1500; // ms for which the end of a trial is shown
 const RESIZED = 300; // ms after which a new size of the page is sent
 
 const page = byId("play", HTMLElement);
-const { trial = "", objects = "" } = page.dataset;
+const { trial = "", objects = "", wait = "0" } = page.dataset;
+const endable = performance.now() + 1000 * Number(wait); // when the trial may be ended by hand, ms
 const canvas = byId("screen", HTMLCanvasElement);
 const tab = Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16)).join("-");
 
@@ -184,7 +185,7 @@ function report() {
 function showInstructions() {
   const touch = matchMedia("(pointer: coarse)").matches;
   const controls = touch ? dialogs.TOUCH_CONTROLS : dialogs.keyControls((name) => bindings.label(name));
-  const dialog = dialogs.instructions(trial, Number(objects), controls);
+  const dialog = dialogs.instructions(trial, Number(objects), controls, performance.now() >= endable);
   if (panel.title !== dialog.title) panel.show(dialog);
 }
 
@@ -203,7 +204,7 @@ function pause(reason) {
 
 function askToEnd() {
   release();
-  panel.show(dialogs.ending(trial));
+  panel.show(dialogs.ending(trial, Math.ceil((endable - performance.now()) / 1000)));
 }
 
 function openHelp() {

@@ -1,5 +1,7 @@
 // Offers to continue the visit that was started in this browser.
 
+import "./wait.js";
+
 import { byId, within } from "./dom.js";
 import { lastVisit } from "./visit.js";
 

@@ -10,8 +10,8 @@ describe("dialogs", () => {
   });
 
   test("count objects and places", () => {
-    expect(dialogs.instructions("task", 1, "").texts[0]).toContain("the object into its bin");
-    expect(dialogs.instructions("task", 6, "").texts[0]).toContain("all 6 objects into their bins");
+    expect(dialogs.instructions("task", 1, "", true).texts[0]).toContain("the object into its bin");
+    expect(dialogs.instructions("task", 6, "", true).texts[0]).toContain("all 6 objects into their bins");
     expect(dialogs.queue(1).texts[0]).toBe("You are next.");
     expect(dialogs.queue(3).texts[0]).toBe("You are number 3 in the queue.");
   });
@@ -22,8 +22,17 @@ describe("dialogs", () => {
   });
 
   test("explain the controls in the training", () => {
-    expect(dialogs.instructions("training", 1, dialogs.keyControls((name) => `<${name}>`)).texts[1]).toContain("<act> picks up");
+    expect(dialogs.instructions("training", 1, dialogs.keyControls((name) => `<${name}>`), true).texts[1]).toContain("<act> picks up");
     expect(dialogs.loading(true).texts).not.toEqual(dialogs.loading(false).texts);
+  });
+
+  test("offer no end of a training before its time", () => {
+    const ends = (/** @type {dialogs.Dialog} */ { buttons = [] }) => buttons.some(([, action]) => action === "leave");
+    for (const early of [true, false]) {
+      expect(ends(dialogs.instructions("training", 1, "", !early))).toBe(!early);
+      expect(ends(dialogs.ending("training", early ? 12 : 0))).toBe(!early);
+    }
+    expect(dialogs.ending("training", 12).texts[0]).toContain("in 12 s");
   });
 
   test("run the actions of their buttons", () => {

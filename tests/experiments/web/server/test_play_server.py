@@ -14,6 +14,7 @@ from starlette.responses import PlainTextResponse
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
+from experiments.procedure.comprehension import Question
 from experiments.record import records
 from experiments.record.phases import PHASES
 from experiments.trials.trial_config import TrialConfig
@@ -512,6 +513,59 @@ def test_a_fixed_episode_is_not_offered_again(tmp_path, pool, monkeypatch):
         link = new_visit(client)
         go_through(client, link)
         assert "Play again" not in client.get(link).text
+
+
+QUESTIONS = [Question("How many things at a time?", ["one", "two"], "two"), Question("Why?", ["a", "b"], "a")]
+
+
+def send_story(client, page, **answers):
+    """The story page sent with answers; the next page."""
+    form = dict(re.findall(r'type="hidden" name="(\w+)" value="([^"]*)"', page.text))
+    return client.post("/visits", headers={"Origin": ORIGIN}, data={**form, **answers})
+
+
+def test_a_story_is_read_for_its_time(tmp_path, pool, monkeypatch):
+    with serving(tmp_path, pool, minimum={"story": 30.0}) as client:
+        page = client.get("/")
+        assert float(re.search(r'data-wait="([\d.]+)"', page.text)[1]) > 29.0
+        early = send_story(client, page)
+        assert early.status_code == 200 and "take the time" in early.text
+        now = time.monotonic()
+        monkeypatch.setattr("experiments.web.server.app.time.monotonic", lambda: now + 31.0)
+        assert send_story(client, early).status_code == 303, "the time so far counts"
+
+
+def test_questions_about_the_story_are_answered_before_the_visit_begins(tmp_path, pool):
+    with serving(tmp_path, pool, questions=QUESTIONS) as client:
+        page = client.get("/")
+        for wrong in ({}, {"answer0": "two"}, {"answer0": "one", "answer1": "a"}):
+            page = send_story(client, page, **wrong)
+            assert page.status_code == 200 and "Not all answers are right" in page.text
+        link = send_story(client, page, answer0="two", answer1="a").headers["location"]
+        go_through(client, link)
+    assert before_the_task(pool)[0]["attempts"] == 4
+
+
+def test_film_and_training_last_their_time(tmp_path, pool, monkeypatch):
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"film")
+    minimum = {"flythrough": 10.0, "training": 20.0}
+    with serving(tmp_path / "visits", pool, film=film, minimum=minimum) as client:
+        link, clock = new_visit(client), [time.monotonic()]
+        monkeypatch.setattr("experiments.web.server.visits.time.monotonic", lambda: clock[0])
+        for _ in range(2):
+            assert "This film" in client.get(link).text, "it is not over yet"
+            client.post(f"{link}/film", headers={"Origin": ORIGIN})
+            clock[0] += 6.0
+        client.post(f"{link}/film", headers={"Origin": ORIGIN})
+        assert 'data-trial="training"' in client.get(link).text
+        with connected(client, link) as socket:
+            started(socket)
+            socket.send_json({"type": "leave"})
+            assert until(socket, "error")[-1]["code"] == "too early"
+            clock[0] += 21.0
+            left(socket)
+        assert 'data-trial="task"' in client.get(link).text
 
 
 def test_a_step_of_the_wall_clock_changes_no_duration(tmp_path, pool, monkeypatch):

@@ -1,0 +1,13 @@
+// Buttons that can be used after a while, with the seconds that are left.
+
+for (const button of document.querySelectorAll("button[data-wait]")) {
+  if (!(button instanceof HTMLButtonElement)) continue;
+  const [text, until] = [button.textContent, performance.now() + 1000 * Number(button.dataset.wait)];
+  const show = () => {
+    const left = Math.ceil((until - performance.now()) / 1000);
+    button.disabled = left > 0;
+    button.textContent = left > 0 ? `${text} (in ${left} s)` : text;
+    if (left > 0) setTimeout(show, 250);
+  };
+  show();
+}
