@@ -180,7 +180,6 @@ OPTIONS: dict[str, tuple[Any, ...]] = {
         lambda *_: float("nan"),
         lambda *_: "1",
         lambda *_: [1],
-        lambda: 1,
         lambda *_: 1j,
     ),
     "time_limit": (0, -1, float("nan"), float("inf"), "x", True, 1e308, (), [1]),

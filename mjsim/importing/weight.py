@@ -57,4 +57,7 @@ def _inertia(body: trimesh.Trimesh, mass: float) -> Floats:
     """Inertia (3, 3) about the centre of mass, kg m^2; nothing is lighter to turn than a thin rod about itself."""
     values, axes = np.linalg.eigh(np.asarray(body.moment_inertia) * mass / body.volume)
     values = np.maximum(values, mass * _MIN_GYRATION**2)
+    values[2] = min(
+        values[2], values[0] + values[1]
+    )  # a body that cuts itself may seem to exceed what is possible
     return np.asarray(axes @ np.diag(values) @ axes.T)

@@ -28,6 +28,7 @@ from mjsim.importing.object_import import import_object
 from mjsim.importing.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, width
 from mjsim.importing.resting import STEADY, resting_pose
 from mjsim.importing.values import ImportOptions
+from mjsim.importing.weight import weigh
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.validation.object_rules import check_object
 from mjsim.options import WorldOptions
@@ -191,6 +192,13 @@ def test_mass_and_inertia_of_a_brick_are_those_of_the_formula(tmp_path, density)
     want = mass / 12 * np.diag([y * y + z * z, x * x + z * z, x * x + y * y])
     assert item.weight.inertia == pytest.approx(want, abs=1e-8)
     assert item.weight.centre == pytest.approx([0, 0, z / 2], abs=1e-6)
+
+
+def test_a_body_that_cuts_itself_has_an_inertia_that_can_be():
+    box = trimesh.creation.box((0.1, 0.08, 0.06))
+    box.vertices[:] = box.vertices[[7, 1, 4, 5, 6, 4, 3, 2]]
+    low, middle, high = np.linalg.eigvalsh(weigh(box, mass=0.1, density=None).inertia)
+    assert low > 0 and high <= (low + middle) * (1 + 1e-9)
 
 
 def test_a_hollow_ball_weighs_what_its_shell_weighs(tmp_path):
