@@ -223,13 +223,14 @@ class PlayServer:
         return FileResponse(visit.floor_plan, media_type="image/png")
 
     async def _play(self, socket: WebSocket) -> None:
+        token, address = socket.path_params["token"], socket.client.host if socket.client else ""
+        visit = None
         try:
-            visit = await run_in_threadpool(self._visits.find, socket.path_params["token"])
+            if self._has_room(token_hash(token), address):
+                visit = await run_in_threadpool(self._visits.find, token)
         except (RecordError, OSError) as error:
             LOG.error("%s", error)
-            visit = None
-        address = socket.client.host if socket.client else ""
-        if visit is None or not self._has_room(visit.name, address):
+        if visit is None or not self._has_room(visit.name, address):  # others may have come meanwhile
             await socket.close(1008)
             return
         self._sockets.update((visit.name, address))
