@@ -193,7 +193,9 @@ def _serve(
         sessions=arguments.sessions,
         idle=max(arguments.idle, 1.0),
         film=arguments.film,
-        story=story_text(arguments.story) if STORY in phases else "",
+        story=story_text(None if arguments.story is None else Path(arguments.story))
+        if STORY in phases
+        else "",
         minimum=arguments.minimum,
         questions=questions,
         proxies=arguments.trusted_proxy,

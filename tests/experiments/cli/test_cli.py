@@ -149,6 +149,18 @@ def test_the_help_names_the_phases_that_are_usual(command, phases, capsys):
     assert f"(docs/procedure.md) (default: {phases})" in text
 
 
+@pytest.mark.parametrize(("text", "code"), [("Once upon a time.", 0), (None, 2)])
+def test_people_read_a_story_of_ones_own(text, code, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("experiments.web.server.pool.WorkerPool.warm_up", lambda _: None)
+    monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: None)
+    story = tmp_path / "story.txt"
+    if text is not None:
+        story.write_text(text)
+    words = ["play", "--port", "0", "--no-open", "--out", str(tmp_path / "out"), "--story", str(story)]
+    assert main(words) == code
+    assert ("cannot read the story" in capsys.readouterr().err) == bool(code)
+
+
 def test_the_doctor_names_the_renderer(capsys):
     assert main(["doctor"]) == 0
     text = capsys.readouterr().out
