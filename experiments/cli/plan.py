@@ -102,6 +102,11 @@ def run(arguments: argparse.Namespace) -> int:
     finally:
         search.end()
         gc.freeze()  # at its end the process would collect the garbage of all of numba: 0.2 s
+    if not search.answered:
+        print(
+            f"mjsim: {arguments.planner} gave no plan in time; this tour goes to the nearest first",
+            file=sys.stderr,
+        )
     reason = planner.why_not(problem) if hasattr(planner, "why_not") else ""
     if reason and plan.status is not Status.OPTIMAL:
         print(f"mjsim: planned by OR-Tools, not proven optimal: {reason}", file=sys.stderr)
@@ -125,6 +130,7 @@ class _Search(threading.Thread):
     ) -> None:
         super().__init__(daemon=True)
         self.best: Plan | None = None
+        self.answered = False
         self._error: BaseException | None = None
         self._stop_planning = threading.Event()
         self._over = threading.Event()  # a `join` that a signal interrupts takes the thread for over
@@ -134,6 +140,7 @@ class _Search(threading.Thread):
     def run(self) -> None:
         try:
             for plan in self._plans():
+                self.answered = self.best is not None or self._seconds is None  # the first is not its own
                 self.best = plan
         except BaseException as error:  # of a user's own planner, too
             self._error = error

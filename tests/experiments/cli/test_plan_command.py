@@ -137,6 +137,14 @@ def test_a_certificate_is_verified_from_its_files_alone(tmp_path, capsys, proble
         assert (answer["verified_optimal"], answer["unverified"]) == (True, "")
 
 
+def test_a_planner_that_gives_nothing_in_time_is_not_said_to_have_planned(tmp_path, capsys, own_module):
+    own_module("import time\nclass Own:\n    def solve(self, problem, **_): time.sleep(2)")
+    (tmp_path / "problem.json").write_text(json.dumps(scattered(3)))
+    words = ["plan", str(tmp_path / "problem.json"), "--planner", "own_code:Own", "--time-limit", "0.2"]
+    assert main(words) == 0
+    assert "own_code:Own gave no plan in time" in capsys.readouterr().err
+
+
 PROOF = {"proof": "full-table", "unit": 1.0, "groups": [], "multipliers": []}
 
 
