@@ -103,11 +103,16 @@ class FollowPath:
     tolerance: float = 0.4
 
     def __post_init__(self) -> None:
-        shape = np.shape(self.points)
+        try:  # kernels take arrays of floats alone
+            for name in ("points", "goal"):
+                object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), np.float64))
+        except (TypeError, ValueError) as error:
+            raise ActionError(f"points and goal of a path must be arrays of numbers: {error}") from error
+        shape = self.points.shape
         if len(shape) != 2 or shape[1] != 2 or shape[0] < 1:
             raise ActionError(f"the points of a path must have the shape (n, 2) with n >= 1, got {shape}")
-        if np.shape(self.goal) != (2,):
-            raise ActionError(f"the goal of a path must have the shape (2,), got {np.shape(self.goal)}")
+        if self.goal.shape != (2,):
+            raise ActionError(f"the goal of a path must have the shape (2,), got {self.goal.shape}")
         numbers = (*self.goal, self.stop_distance, self.tolerance, 0.0 if self.until is None else self.until)
         if not (np.isfinite(self.points).all() and np.isfinite(numbers).all()):
             raise ActionError("points, goal, distances and times of a path must be finite numbers")

@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
-from experiments.blame import is_own_file
 from experiments.errors import UserCodeError
 from experiments.session.signals import SIGNALS
 from mjsim.files import remove_work
@@ -135,5 +134,7 @@ def _wait(child: int) -> int:
 
 def _where(dump: str) -> str:
     """File and line of the innermost frame of a user's own code, from what `faulthandler` wrote."""
+    from experiments.blame import is_own_file  # `mjsim doctor` starts without the packages that it loads
+
     frames = [(file, line) for file, line in _FRAME.findall(dump) if is_own_file(file)]
     return f" ({frames[0][0]}, line {frames[0][1]})" if frames else ""

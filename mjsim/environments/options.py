@@ -14,7 +14,7 @@ from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import CameraOptions, ObservationLayout
 from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
-from mjsim.episode import Episode
+from mjsim.episode import POINTS, Episode
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigableBuilder
@@ -25,6 +25,7 @@ T = TypeVar("T")
 
 SECONDS_PER_OBJECT = 60.0
 DEFAULT_CACHE_SIZE = 8  # compiled episodes
+MAX_SLOTS = 1000  # rows of arrays; more objects than any house holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +84,14 @@ class EnvironmentOptions:
         count = 1 if episodes is None else episodes if isinstance(episodes, int) else len(episodes)
         for is_valid, message in (
             (1 <= low <= high, f"objects must be at least 1, min before max; got {self.objects!r}"),
+            (
+                isinstance(episodes, Sequence) or high <= POINTS,
+                f"objects is {self.objects!r}; a house has {POINTS} points for objects",
+            ),
+            (
+                self.slots is None or self.slots <= MAX_SLOTS,
+                f"slots is {self.slots}; it must be at most {MAX_SLOTS}",
+            ),
             (
                 limit is None or (math.isfinite(limit) and limit > 0),
                 f"time_limit must be a positive number of seconds, got {limit}",

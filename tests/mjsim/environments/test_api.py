@@ -336,6 +336,8 @@ def test_a_navigable_floor_that_is_none_is_named():
         ({"navigable": "x"}, "navigable must be None or a function"),
         ({"episodes": ()}, "episodes"),
         ({"objects": 6, "slots": 4}, "slots"),
+        ({"objects": 10**9}, "a house has 40 points"),
+        ({"slots": 10**9}, "at most 1000"),
         ({"keep": 0}, "keep"),
         ({"physics_errors": "ignore"}, "physics_errors"),
         ({"render_mode": "ansi"}, "ansi"),

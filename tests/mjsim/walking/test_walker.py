@@ -147,3 +147,10 @@ def test_a_path_is_kept_until_the_person_leaves_it_or_is_blocked():
 def test_paths_of_another_shape_are_refused(shape):
     with pytest.raises(ActionError, match="points of a path must have the shape"):
         FollowPath(np.zeros(shape), np.zeros(2), 0.5)
+
+
+def test_lists_are_paths_and_words_are_none():
+    path = FollowPath([[0, 0], [1, 0]], (1, 0), 0.5)
+    assert path.points.dtype == path.goal.dtype == np.float64 and path.points.shape == (2, 2)
+    with pytest.raises(ActionError, match="must be arrays of numbers"):
+        FollowPath([["a", "b"]], (1, 0), 0.5)
