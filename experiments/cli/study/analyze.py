@@ -14,7 +14,7 @@ each in one cell of assistance x number of objects. Writes
   report.html             all of it in one file, with figures
   stats.json              every number
   people.parquet, .csv    a row per person
-  tests.csv               a row per F test
+  tests.csv               a row per test
 
 People who did not finish are left out, and so are those that --exclude selects by rules over columns or by id; the
 report lists them, the reasons, and how results change without each rule.
