@@ -10,6 +10,7 @@ from mjsim.importing.surface import Floats
 MAX_TRIANGLES = 20_000  # of what is worked on; finer surfaces are simplified first
 MAX_PIECES = 400  # pieces of a surface that are closed one by one
 SHEET = 0.001  # m, thickness that a flat sheet is given
+_GENTLE = 3  # of 1 to 10, how hard faces are collapsed; 7 is usual
 _FLAT = 1e-5  # m
 
 
@@ -40,8 +41,17 @@ def close(mesh: trimesh.Trimesh) -> Solid:
 
 
 def simplified(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """The mesh with about this many faces, if it has more; by quadric edge collapse (Garland and Heckbert 1997)."""
-    return mesh if len(mesh.faces) <= faces else mesh.simplify_quadric_decimation(face_count=faces)
+    """The mesh with about this many faces, if it has more; by quadric edge collapse (Garland and Heckbert 1997).
+
+    Thin wires are not collapsed, and to make up for it whole pieces would be: then it keeps more faces.
+    """
+    if len(mesh.faces) <= faces:
+        return mesh
+    coarse = mesh.simplify_quadric_decimation(face_count=faces)
+    if len(mesh.faces) > MAX_TRIANGLES or coarse.body_count == mesh.body_count:
+        return coarse
+    gentle = mesh.simplify_quadric_decimation(face_count=faces, aggression=_GENTLE)
+    return gentle if gentle.body_count == mesh.body_count else mesh
 
 
 def _as_it_is(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:

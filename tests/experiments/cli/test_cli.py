@@ -220,3 +220,12 @@ def test_a_command_outside_its_checkout_says_what_it_needs(monkeypatch, capsys):
     monkeypatch.delitem(sys.modules, "tools.gallery_command", raising=False)
     assert main(["gallery", "--out", "pictures"]) == 2
     assert "needs the source checkout" in capsys.readouterr().err
+
+
+def test_warnings_of_libraries_stay_off_the_terminal():
+    code = """import sys, numpy; sys.argv[1:] = ['plan', 'nowhere.json']
+from experiments.cli.main import main
+main()
+numpy.ones(1) / numpy.zeros(1)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "nowhere.json" in done.stderr and "Warning" not in done.stderr

@@ -288,6 +288,13 @@ def test_parts_cover_the_body(tmp_path):
     assert all(hull.find_simplex([0, 0, 0.04]) < 0 for hull in hulls)  # between the legs
 
 
+def test_a_ball_in_a_wire_ring_stays_and_collides(tmp_path):
+    pieces = [MAKE.torus(0.11, 0.004), MAKE.icosphere(2, 0.04)]
+    item = take(tmp_path, trimesh.util.concatenate(pieces))
+    assert np.ptp(item.look.vertices[:, 2]) == pytest.approx(0.08, abs=0.002)
+    assert item.size[2] > 0.078
+
+
 def test_one_colour_stays_a_colour_and_is_shown_as_gltf_means_it(tmp_path):
     item = take(tmp_path, plain(MAKE.box((0.1, 0.1, 0.1)), 0.2159, 0.0, 1.0), ".glb")
     assert item.look.picture is None
