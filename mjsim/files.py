@@ -98,7 +98,7 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
-        if error.filename is None:  # of a write: a full disk
+        if error.errno is not None and error.filename is None:  # of a write: a full disk
             error.filename = str(path)
         raise
     finally:
@@ -113,7 +113,7 @@ def work_folder(parent: Path) -> Iterator[Path]:
     try:
         yield folder
     except OSError as error:
-        if error.filename is None:  # of a write: a full disk
+        if error.errno is not None and error.filename is None:  # of a write: a full disk
             error.filename = str(parent)
         raise
     finally:

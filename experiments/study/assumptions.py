@@ -55,12 +55,14 @@ class Specification(NamedTuple):
     test: FTest
 
 
-def specification_curve(analysis: Analysis, name: str, label: str) -> Picture:
-    """Every effect on a measure by every reading and analysis, the choices below each estimate.
+def specification_curve(analysis: Analysis, name: str, label: str) -> Picture | None:
+    """Every effect on a measure by every reading and analysis, the choices below each estimate; None without any.
 
     Source: Simonsohn, Simmons and Nelson 2020, doi:10.1038/s41562-020-0912-z.
     """
     groups = _specifications(analysis, name)
+    if not groups:
+        return None
     choices = _choices(analysis, groups)
     width, height = sum(map(len, groups.values())) * COLUMN + 2.2, len(choices) * ROW
     figure = Figure(figsize=(max(width, 6.0), height + 3.0), layout="constrained")

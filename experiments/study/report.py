@@ -172,7 +172,8 @@ def _f_tests(results: Iterable[Result]) -> Iterator[tuple[str, FTest]]:
 
 def _curves(analysis: Analysis) -> Iterator[Block]:
     for name, label in _labels(analysis).items():
-        yield specification_curve(analysis, name, label)
+        if (curve := specification_curve(analysis, name, label)) is not None:
+            yield curve
 
 
 def _pairs(analysis: Analysis) -> tuple[Block, ...]:

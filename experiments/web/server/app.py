@@ -122,7 +122,9 @@ class PlayServer:
             request,
             "story",
             200,
-            wait=max(0.0, self._config.minimum.get(STORY, 0.0) - (time.monotonic() - opened / 1000.0)),
+            wait=max(
+                0.0, self._config.minimum.get(STORY, 0.0) - max(0.0, time.monotonic() - opened / 1000.0)
+            ),
             questions=self._config.questions,
             attempts=attempts,
             note=note,

@@ -8,6 +8,7 @@ for (const button of document.querySelectorAll("button[data-wait]")) {
     button.disabled = left > 0;
     button.textContent = left > 0 ? `${text} (in ${left} s)` : text;
     if (left > 0) setTimeout(show, 250);
+    else if (button.autofocus) button.focus(); // a disabled button had lost it
   };
-  show();
+  if (Number(button.dataset.wait) > 0) show();
 }
