@@ -211,7 +211,8 @@ def _fault(case: Case, code: int, said: str, before: Mapping[str, str], after: M
         return f"traceback (exit {code})"
     if lost := [name for name in before if after.get(name) != before[name] and name not in case.changes]:
         return f"lost {lost[0]}"
-    if half := [name for name in after if name not in before and _is_half(name, code, after)]:
+    new = [name for name in after if name not in before and name not in said]  # a refusal may show a picture
+    if half := [name for name in new if _is_half(name, code, after)]:
         return f"half-written {half[0]}"
     if code == 0:
         return "silent wrong" if case.must == REFUSED else ""
