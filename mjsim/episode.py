@@ -94,7 +94,7 @@ class Episode:
         """
         try:
             found = msgspec.json.decode(text, type=_Header).format
-            if found != FORMAT_VERSION:
+            if found is True or found != FORMAT_VERSION:  # True equals 1
                 raise EpisodeError(
                     f"episode format {found!r} is not {FORMAT_VERSION}; sample it again with this version"
                 )

@@ -228,7 +228,7 @@ IMPOSSIBLE = {
     "task_distance_m": [-5.0, 1e308],
     "completion_time_s": [1e308, "long"],
     "objects": [0, -6, 6.5, "6", None],
-    "assistance": [None, "", 5],
+    "assistance": [None, ""],
     "likert_useful": [0, 6, 2.5, "good"],
     "user": [None],
 }

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.episode import POINTS, Episode, PlacedObject, StartPose
-from mjsim.errors import SamplingError
+from mjsim.errors import SamplingError, brief
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigablePoints
@@ -25,6 +25,7 @@ START_CLEARANCE = 0.5  # m, from the start to every object
 DROP = (0.01, 0.02)  # m above the floor
 PACKINGS, DRAWS = 20, 4000  # a jammed packing is given up as a whole, to keep the points uniform
 DROPS = 8
+MAX_POINTS = 1000  # a metre apart
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
 
 
@@ -156,6 +157,8 @@ def _pack(
 def _check_arguments(objects: int, seed: int, points: int) -> None:
     if points < 1:
         raise SamplingError(f"points is {points}; the pool needs at least 1")
+    if points > MAX_POINTS:
+        raise SamplingError(f"points is {brief(str(points), 40)}; a house has room for {MAX_POINTS} at most")
     if not 1 <= objects <= points:
         raise SamplingError(f"objects is {objects}; it must be 1 to {points}, the number of points")
     if seed < 0:

@@ -111,6 +111,11 @@ def test_other_texts_are_refused(text):
         Episode.from_json(text)
 
 
+def test_true_is_no_number_of_a_format(small):
+    with pytest.raises(EpisodeError, match="format True"):
+        Episode.from_json(small.to_json().replace('"format": 1', '"format": true'))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -139,6 +139,7 @@ def test_smaller_pools_are_prefixes(small_catalogue):
         ({"objects": 41}, "objects is 41.*1 to 40"),
         ({"objects": 9, "points": 8}, "objects is 9.*1 to 8"),
         ({"points": 0}, "points is 0"),
+        ({"points": 10**300}, "points is 1000.* has room for 1000 at most"),
         ({"seed": -1}, "seed is -1"),
     ],
 )
