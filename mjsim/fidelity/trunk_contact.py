@@ -14,8 +14,8 @@ from mjsim.model.footprint import footprint
 
 _TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
 _MAX_STEP = 0.05  # m; a disc of 0.20 m cannot jump over a wall in steps of this length
-_CELL = 0.25  # m
-_MARGIN = 0.12  # m beyond the trunk that a cell of the grid covers
+CELL = 0.25  # m
+MARGIN = 0.12  # m beyond the trunk that a cell of the grid covers
 _MAX_ROUNDS = 12
 _TOUCHING = 1e-7  # m
 
@@ -43,14 +43,14 @@ class Floor(NamedTuple):
     @classmethod
     def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
         """Convex counter-clockwise polygons (k, 2), m, for a trunk of this radius, m."""
-        reach = radius + _MARGIN
+        reach = radius + MARGIN
         boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
         low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
         high = boxes[:, 2:].max(axis=0, initial=-np.inf) + reach if len(polygons) else np.ones(2)
-        rows, columns = (int(n) for n in np.ceil((high - low) / _CELL))
+        rows, columns = (int(n) for n in np.ceil((high - low) / CELL))
         i, j = (index.ravel() for index in np.mgrid[:rows, :columns])
-        x, y = low[0] + _CELL * i, low[1] + _CELL * j
-        cells = shapely.box(x, y, x + _CELL, y + _CELL)
+        x, y = low[0] + CELL * i, low[1] + CELL * j
+        cells = shapely.box(x, y, x + CELL, y + CELL)
         tree = shapely.STRtree([shapely.Polygon(polygon) for polygon in polygons])
         cell, near = tree.query(cells, predicate="dwithin", distance=reach)
         order = np.lexsort((near, cell))
@@ -80,7 +80,7 @@ def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 @kernel
 def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
     """Whether no outline comes within these distances along x and y."""
-    if max(reach_x, reach_y) > radius + _MARGIN:
+    if max(reach_x, reach_y) > radius + MARGIN:
         return False  # farther than a cell covers
     start, end = _near(x, y, floor)
     for entry in range(start, end):
@@ -93,7 +93,7 @@ def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, 
 @kernel
 def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
     """First and last entry of `Floor.near` for the cell of a point."""
-    i, j = math.floor((x - floor.origin_x) / _CELL), math.floor((y - floor.origin_y) / _CELL)
+    i, j = math.floor((x - floor.origin_x) / CELL), math.floor((y - floor.origin_y) / CELL)
     if not (0 <= i < floor.rows and 0 <= j < floor.columns):
         return 0, 0
     cell = i * floor.columns + j
