@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
-from benchmarks.support.hostile_cases import workshop
+from benchmarks.support.hostile_cases import case_factory
 from benchmarks.support.requirements import Requirement, requirement_lines
 from benchmarks.support.warm_commands import Outcome, run_cases
 
@@ -35,7 +35,7 @@ def measure(
         only: Run the case of this number alone, to look at a failure again.
     """
     numbers = range(count or (QUICK if quick else COUNT)) if only is None else range(only, only + 1)
-    outcomes = run_cases(workshop, numbers, workers or os.cpu_count() or 1)
+    outcomes = run_cases(case_factory, numbers, workers or os.cpu_count() or 1)
     return summarise(list(track(outcomes, "cases", total=len(numbers), console=Console(stderr=True))))
 
 
@@ -68,7 +68,7 @@ def summarise(outcomes: Sequence[Outcome]) -> dict[str, Any]:
                 "kind": o.kind,
                 "line": o.line,
                 "fault": o.fault,
-                "said": o.said,
+                "output": o.output,
             }
             for o in sorted(outcomes, key=lambda o: (o.fault, o.number))
             if o.fault
@@ -84,6 +84,6 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
     for failure in result["failures"]:
         yield f"{failure['fault']}: {failure['kind']}; `mjsim bench malformed --only {failure['number']}` runs it again"
         yield f"    mjsim {failure['line'][:300]}"
-        yield from (f"    {line[:300]}" for line in failure["said"].splitlines()[-6:])
+        yield from (f"    {line[:300]}" for line in failure["output"].splitlines()[-6:])
     yield f"{result['cases']} cases; the slowest took {result['slowest_s']:.1f} s"
     yield from requirement_lines(result, REQUIREMENTS)

@@ -33,7 +33,7 @@ REQUIREMENTS = {
     ),
     "hostile": (
         Requirement(
-            "states a second of another person, one machine being hostile", "states_per_s", ">=", 24.0
+            "states a second of another person, one machine being hostile", "states_per_s", ">=", 24.9
         ),
         Requirement("slowest new visit meanwhile, s", "slowest_visit_s", "<=", 2.0),
     ),

@@ -22,7 +22,7 @@ from benchmarks.support.hostile_files import (
     pick,
     rows_of,
 )
-from benchmarks.support.warm_commands import CLOSED, PIPE, REFUSED, USED, Case, Workshop
+from benchmarks.support.warm_commands import CLOSED, PIPE, REFUSED, USED, Case, CaseFactory
 
 ODD = """
 nan inf -1 0 1e308 -0.0 -- - ١٢ 0x10 1_000 1,2 a:b None [] ../.. / /dev/full /dev/zero /dev/null keep.txt keep
@@ -84,9 +84,9 @@ TARGETS = {  # what is written where something lies that must stay
 }
 
 
-def workshop() -> Workshop:
+def case_factory() -> CaseFactory:
     """Cases of all commands."""
-    return Workshop(prepare, make_case)
+    return CaseFactory(prepare, make_case)
 
 
 def make_case(number: int, folder: Path) -> Case:

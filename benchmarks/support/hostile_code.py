@@ -129,12 +129,12 @@ def code_case(folder: Path, rng: Rng) -> Case:
     statements = (RAISED + FAULTS[make]).strip().replace("\n\n", "\n").splitlines()
     statement, after = pick(statements, rng), pick([0, 0, 1, 30], rng)
     kind, text = f"{make.__name__}: {statement}", make(statement, after)
-    must, said = REFUSED, "own_code"
+    must, message = REFUSED, "own_code"
     if rng.uniform() < 0.15:
         text = pick(MODULES, rng)
         kind = f"{make.__name__} of the module {text!r}"
     elif HARMLESS.search(statement) or after:  # or comes too late
-        must, said = "", ""
+        must, message = "", ""
     (folder / "own_code.py").write_text(text)
     words = [*RUN.split(), "--call-limit", LIMIT]
     if make is participant and not rng.integers(8):  # in workers of its own
@@ -150,24 +150,24 @@ def code_case(folder: Path, rng: Rng) -> Case:
             "--out",
             "out",
         ]
-        return Case("batch", kind, words, "", said=said)
+        return Case("batch", kind, words, "", message=message)
     if make is participant:
         words += ["--user", "own_code:build", "--assistance", "none"]
     elif make is condition:
         words += ["--assistance", "own_code:hud_state"]
     elif rng.uniform() < 0.5:
-        if "sleep" in statement or "iter(" in statement:  # another tour is given, and said to be that
-            must = said = ""
+        if "sleep" in statement or "iter(" in statement:  # another tour is given, and the output says so
+            must = message = ""
         return Case(
             "plan",
             kind,
             ["plan", "problem.json", "--planner", "own_code:Own", "--time-limit", "2"],
             must,
-            said=said,
+            message=message,
         )
     else:
         words += ["--planner", "own_code:Own", "--assistance", "optimal"]
-    return Case("run", kind, words, must, said=said)
+    return Case("run", kind, words, must, message=message)
 
 
 OPTIONS: dict[str, tuple[Any, ...]] = {

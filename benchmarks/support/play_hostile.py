@@ -15,7 +15,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
-from websockets.asyncio.client import connect
+from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 
 from benchmarks.support.play_browser import SimulatedBrowser
@@ -90,12 +90,10 @@ async def _watch(server: PlayProcess, number: int, seconds: float) -> dict[str, 
     person = SimulatedBrowser(server.begin(), snapshots=True)
     await person.open(TASK)
     await person.run()
-    flooded, crowded = server.begin(), server.begin()
+    flooded, shared = server.begin(), server.begin()
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    hostile = context.Process(
-        target=_attack, args=(theirs, server.url, flooded, crowded, number), daemon=True
-    )
+    hostile = context.Process(target=_attack, args=(theirs, server.url, flooded, shared, number), daemon=True)
     hostile.start()
     theirs.close()
     await asyncio.to_thread(ours.recv)  # it begins
@@ -123,18 +121,18 @@ def _open_visit(url: str) -> float:
     return time.perf_counter() - began
 
 
-def _attack(told: Any, url: str, flooded: str, crowded: str, number: int) -> None:
+def _attack(results: Any, url: str, flooded: str, shared: str, number: int) -> None:
     """Do what a hostile machine does; runs in a process of its own, until it is killed."""
-    asyncio.run(_attack_at_once(told, url, flooded, crowded, number))
+    asyncio.run(_attack_at_once(results, url, flooded, shared, number))
 
 
-async def _attack_at_once(told: Any, url: str, flooded: str, crowded: str, number: int) -> None:
-    told.send("begins")
-    cut_off, served, begun, _ = await asyncio.gather(
-        _flood(flooded, number), _crowd(crowded, number), _spoof(url), _half_send(url, number)
+async def _attack_at_once(results: Any, url: str, flooded: str, shared: str, number: int) -> None:
+    results.send("begins")
+    cut_off, connections, begun, _writers = await asyncio.gather(
+        _flood(flooded, number), _open_sockets(shared, number), _spoof(url), _half_send(url, number)
     )
-    told.send({"flood_cut_off": cut_off, "sockets_served": served, "visits_begun": begun})
-    await asyncio.Event().wait()  # whatever is open stays open
+    results.send({"flood_cut_off": cut_off, "sockets_served": len(connections), "visits_begun": begun})
+    await asyncio.Event().wait()  # the connections stay open
 
 
 async def _flood(address: str, number: int) -> bool:
@@ -151,21 +149,21 @@ async def _flood(address: str, number: int) -> bool:
     return False
 
 
-async def _crowd(address: str, number: int) -> int:
-    """Sockets of one visit, which all say hello; how many of them were served."""
-    parts, served = urlsplit(address), []
+async def _open_sockets(address: str, number: int) -> list[ClientConnection]:
+    """Open sockets of one visit, which all say hello; those that were served."""
+    parts, served = urlsplit(address), list[ClientConnection]()
     view = {"type": "view", "width": 640, "height": 480, "codec": "none"}
     for i in range(number):
         with suppress(WebSocketException, OSError, TimeoutError):
-            opened = await connect(
+            connection = await connect(
                 f"ws://{parts.netloc}{parts.path}",
                 origin=f"http://{parts.netloc}",  # type: ignore[arg-type]
                 local_addr=(HOSTILE, 0),
             )
-            served.append(opened)
+            served.append(connection)
             hello = {"type": "hello", "tab": f"hostile-{i:05}", "trial": TASK, "view": view}
-            await opened.send(json.dumps(hello))
-    return len(served)
+            await connection.send(json.dumps(hello))
+    return served
 
 
 async def _spoof(url: str) -> int:
@@ -180,16 +178,13 @@ async def _spoof(url: str) -> int:
     return begun
 
 
-async def _half_send(url: str, number: int) -> None:
-    """Requests without an end of the head or of the body."""
-    parts, writers = urlsplit(url), []
+async def _half_send(url: str, number: int) -> list[asyncio.StreamWriter]:
+    """Begin requests without ending their head or body; their connections."""
+    parts, writers = urlsplit(url), list[asyncio.StreamWriter]()
     head = f"POST /visits HTTP/1.1\r\nHost: {parts.netloc}\r\nOrigin: http://{parts.netloc}\r\n"
     for i in range(number):
         with suppress(OSError):
             _, writer = await asyncio.open_connection(parts.hostname, parts.port, local_addr=(HOSTILE, 0))
             writer.write((head + ("", "Content-Length: 9\r\n\r\nopene")[i % 2]).encode())
             writers.append(writer)
-    _kept.extend(writers)
-
-
-_kept: list[asyncio.StreamWriter] = []  # connections that stay open
+    return writers

@@ -24,16 +24,17 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-HUNG = 10.0  # s of the processor
-WAITS = 40.0  # s that a command may wait for others
+CPU_LIMIT = 10.0  # s of the processor
+WALL_LIMIT = 40.0  # s that a command may wait for others
 MEMORY = 12 << 30  # bytes
 LONGEST = 3000  # characters that a refusal may have
 PIPE, CLOSED = "a pipe that never ends", "closed"
 REFUSED, USED = "refused", "used"
 BAD = re.compile(r"Traceback \(most recent|internal error|Fatal Python error|\w*Warning: ")
-LEAVE = os._exit  # which commands may replace
+EXIT = os._exit  # which commands may replace
 ENDS = (0, 1, 2)
-MOST = 10_000_000  # bytes of a file whose content is compared
+LARGEST_COMPARED = 10_000_000  # bytes of a file whose content is compared
+PREVIEW = "-preview.png"  # how pictures end that a refusal shows
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Case:
         must: `refused`, `used`, or empty where either is right.
         call: What is called instead of the command line; an error of the library's own is a refusal.
         stdin: What standard input holds, `PIPE` or `CLOSED`.
-        said: Part of the message with which it is refused.
+        message: Part of the message with which it is refused.
         changes: Files that it may replace.
     """
 
@@ -57,7 +58,7 @@ class Case:
     must: str = ""
     call: Callable[[], Any] | None = None
     stdin: bytes | str = b""
-    said: str = ""
+    message: str = ""
     changes: Sequence[str] = ()
 
 
@@ -72,11 +73,11 @@ class Outcome:
     seconds: float
     result: str
     fault: str = ""
-    said: str = ""
+    output: str = ""
 
 
 @dataclass
-class Workshop:
+class CaseFactory:
     """Makes cases in a process that has loaded what they need.
 
     Attributes:
@@ -97,21 +98,23 @@ class Workshop:
             before, began = _files(folder), time.perf_counter()
             code, hung = _run(case, folder, Path(scratch))
             seconds = time.perf_counter() - began
-            said = "".join(_text(Path(scratch) / name) for name in ("err", "out"))
-            fault = "hang" if hung else _fault(case, code, said, before, _files(folder))
+            output = "".join(_text(Path(scratch) / name) for name in ("err", "out"))
+            fault = "hang" if hung else _fault(case, code, output, before, _files(folder))
             result = "used" if code == 0 else "refused"
             line = " ".join(case.words)
-            return Outcome(number, case.command, case.kind, line, seconds, result, fault, said[-LONGEST:])
+            return Outcome(number, case.command, case.kind, line, seconds, result, fault, output[-LONGEST:])
 
 
-def run_cases(workshop: Callable[[], Workshop], numbers: Sequence[int], workers: int) -> Iterator[Outcome]:
+def run_cases(
+    case_factory: Callable[[], CaseFactory], numbers: Sequence[int], workers: int
+) -> Iterator[Outcome]:
     """Outcomes of the cases of these numbers, as they come."""
     context = multiprocessing.get_context("spawn")
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of the processes below: time of the processor is counted
     connections: dict[Connection, BaseProcess] = {}
     for k in range(min(workers, len(numbers))):
         ours, theirs = context.Pipe()
-        connections[ours] = context.Process(target=_work, args=(theirs, workshop, numbers[k::workers]))
+        connections[ours] = context.Process(target=_work, args=(theirs, case_factory, numbers[k::workers]))
         connections[ours].start()
         theirs.close()
     while connections:
@@ -125,10 +128,10 @@ def run_cases(workshop: Callable[[], Workshop], numbers: Sequence[int], workers:
                     raise RuntimeError("the cases end with an error of their own") from error
 
 
-def _work(connection: Connection, workshop: Callable[[], Workshop], numbers: Sequence[int]) -> None:
+def _work(connection: Connection, case_factory: Callable[[], CaseFactory], numbers: Sequence[int]) -> None:
     with tempfile.TemporaryDirectory(prefix="mjsim-state-") as state:
         os.environ["XDG_STATE_HOME"] = state
-        made = workshop()
+        made = case_factory()
         try:
             made.prepare(made.template)
             for number in numbers:
@@ -150,8 +153,8 @@ def _run(case: Case, folder: Path, scratch: Path) -> tuple[int, bool]:
             with contextlib.suppress(Exception):
                 sys.stdout.flush()
                 sys.stderr.flush()
-            LEAVE(code)
-    ends, found = time.monotonic() + WAITS, 0
+            EXIT(code)
+    ends, found = time.monotonic() + WALL_LIMIT, 0
     while not found and time.monotonic() < ends:
         time.sleep(0.002)
         found, status = os.waitpid(child, os.WNOHANG)
@@ -166,7 +169,7 @@ def _run(case: Case, folder: Path, scratch: Path) -> tuple[int, bool]:
 def _enter(case: Case, folder: Path, scratch: Path) -> None:
     os.setsid()
     os.chdir(folder)
-    resource.setrlimit(resource.RLIMIT_CPU, (int(HUNG), int(HUNG) + 5))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(CPU_LIMIT), int(CPU_LIMIT) + 5))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     for number, name in ((1, "out"), (2, "err")):
@@ -203,22 +206,22 @@ def _end(case: Case) -> int:
     return 0
 
 
-def _fault(case: Case, code: int, said: str, before: Mapping[str, str], after: Mapping[str, str]) -> str:
+def _fault(case: Case, code: int, output: str, before: Mapping[str, str], after: Mapping[str, str]) -> str:
     """What is wrong with how a case ended, empty for nothing."""
     if code < 0:
         return f"died of {signal.Signals(-code).name}"
-    if BAD.search(said) or code not in ENDS:
+    if BAD.search(output) or code not in ENDS:
         return f"traceback (exit {code})"
     if lost := [name for name in before if after.get(name) != before[name] and name not in case.changes]:
         return f"lost {lost[0]}"
-    new = [name for name in after if name not in before and name not in said]  # a refusal may show a picture
+    new = [name for name in after if name not in before and not (name.endswith(PREVIEW) and name in output)]
     if half := [name for name in new if _is_half(name, code, after)]:
         return f"half-written {half[0]}"
     if code == 0:
         return "silent wrong" if case.must == REFUSED else ""
-    if not said.strip() or (case.said and case.said not in said):
+    if not output.strip() or (case.message and case.message not in output):
         return "refused without its reason"
-    if len(said) > LONGEST and "mjsim: " in said[:LONGEST]:
+    if len(output) > LONGEST and "mjsim: " in output[:LONGEST]:
         return "refused at length"
     return "refused what is good" if case.must == USED else ""
 
@@ -236,7 +239,7 @@ def _files(folder: Path) -> dict[str, str]:
     """What every file of a folder holds."""
     found = {}
     for path in folder.rglob("*"):
-        if path.is_symlink() or path.is_fifo() or path.stat().st_size > MOST:
+        if path.is_symlink() or path.is_fifo() or path.stat().st_size > LARGEST_COMPARED:
             found[str(path.relative_to(folder))] = "special"
         elif path.is_file():
             found[str(path.relative_to(folder))] = hashlib.md5(path.read_bytes()).hexdigest()

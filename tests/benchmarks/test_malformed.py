@@ -9,7 +9,7 @@ import pytest
 from benchmarks import malformed
 from benchmarks._command import benchmark
 from benchmarks.support import warm_commands
-from benchmarks.support.warm_commands import REFUSED, USED, Case, Workshop
+from benchmarks.support.warm_commands import REFUSED, USED, Case, CaseFactory
 from experiments.errors import ConfigError
 from mjsim.files import WORK
 
@@ -25,7 +25,7 @@ def write(name):
 @pytest.fixture
 def attempt(tmp_path):
     (tmp_path / "there").write_text("old")
-    return lambda case: Workshop(lambda _: None, lambda *_: case, tmp_path).attempt(0)
+    return lambda case: CaseFactory(lambda _: None, lambda *_: case, tmp_path).attempt(0)
 
 
 @pytest.mark.parametrize(
@@ -49,13 +49,13 @@ def attempt(tmp_path):
     ],
 )
 def test_what_is_wrong_is_found(call, must, fault, attempt, monkeypatch):
-    monkeypatch.setattr(warm_commands, "HUNG", 1)
-    monkeypatch.setattr(warm_commands, "WAITS", 3)
+    monkeypatch.setattr(warm_commands, "CPU_LIMIT", 1)
+    monkeypatch.setattr(warm_commands, "WALL_LIMIT", 3)
     assert attempt(Case("any", "kind", must=must, call=call)).fault == fault
 
 
 def test_a_reason_is_asked_for(attempt):
-    assert attempt(Case("any", "kind", call=refuse, said="whose")).fault == "refused without its reason"
+    assert attempt(Case("any", "kind", call=refuse, message="whose")).fault == "refused without its reason"
 
 
 @pytest.mark.slow

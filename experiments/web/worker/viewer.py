@@ -95,7 +95,7 @@ class BrowserViewer(Viewer):
 
 
 def _snapshot(world: World, seen: Observation, state: HudState, step: int, number: int) -> Snapshot:
-    """What the person sees: objects that are out of view are nobody's business."""
+    """What the person sees; objects that are neither in view nor in hand are left out."""
     poses = zip(
         seen.object_names, seen.object_positions.tolist(), seen.object_quaternions.tolist(), strict=True
     )
