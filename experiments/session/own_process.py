@@ -6,7 +6,6 @@ which then raises an error in its name. Trials repeat bit for bit, so that this 
 
 import ctypes
 import faulthandler
-import mmap
 import os
 import re
 import signal
@@ -14,6 +13,7 @@ import struct
 import tempfile
 import threading
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
@@ -25,27 +25,33 @@ CRASHES = (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.
 _NAMES = ("user", "assistance", "training_assistance", "planner")
 _OWN = re.compile(r":[A-Za-z_]")  # package.module:attribute
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
-_CALLS, _CALLED, _ENDED = 0, 8, 16  # places in memory that both processes see
+_SHARED = "MJSIM_OWN_PROCESS"  # names the file that a child shares with its parent, and the child
+_CALLS, _CALLED, _ENDED, _FATAL, _HOW = 0, 8, 16, 24, 32  # places in that file
 
 
-class _Watched:
-    """What a child tells of its calls; `fatal` is the number of the call that must not be made, with what to say."""
+@dataclass(frozen=True)
+class SharedCalls:
+    """What a parent knows of its child's calls of a user's own code; what is written outlasts the child.
 
-    def __init__(self) -> None:
-        self._memory = mmap.mmap(-1, 24)
-        self.fatal: tuple[int, str] | None = None
+    Attributes:
+        file: Descriptor of a file that both processes have open.
+    """
+
+    file: int
 
     def read(self, place: int) -> int:
-        return int(struct.unpack_from("q", self._memory, place)[0])
+        """The number at a place of the file."""
+        return int(struct.unpack("q", os.pread(self.file, 8, place))[0])
 
     def write(self, place: int, value: int) -> None:
-        struct.pack_into("q", self._memory, place, value)
+        """Write a number at a place of the file."""
+        os.pwrite(self.file, struct.pack("q", value), place)
 
     def begin(self, what: str) -> None:
         """A call of a user's own code begins; raises a `UserCodeError` if it is the fatal one."""
         number = self.read(_CALLS) + 1
-        if self.fatal is not None and self.fatal[0] == number:
-            raise UserCodeError(f"{what} {self.fatal[1]}")
+        if number == self.read(_FATAL):
+            raise UserCodeError(f"{what} {os.pread(self.file, 4096, _HOW).decode(errors='replace')}")
         self.write(_CALLS, number)
         self.write(_CALLED, 1)
 
@@ -53,14 +59,21 @@ class _Watched:
         """The call came back."""
         self.write(_CALLED, 0)
 
+    def restart(self, fatal: int, how: str) -> None:
+        """Count again, for another child that must not make the call of the number `fatal`."""
+        os.pwrite(self.file, struct.pack("4q", 0, 0, 0, fatal) + how.encode(errors="replace")[:4096], 0)
 
-watched: _Watched | None = None  # in a child
+
+def shared_calls() -> SharedCalls | None:
+    """What this process shares with a parent that watches it; None where there is none."""
+    file, _, child = os.environ.get(_SHARED, "").partition(":")
+    return SharedCalls(int(file)) if child == str(os.getpid()) else None
 
 
 def tell_end() -> None:
     """Tell the parent, where there is one that watches, that the command came to its end."""
-    if watched is not None:
-        watched.write(_ENDED, 1)
+    if (shared := shared_calls()) is not None:
+        shared.write(_ENDED, 1)
 
 
 def in_own_child(arguments: Any) -> int | None:
@@ -73,29 +86,27 @@ def in_own_child(arguments: Any) -> int | None:
 
 
 def _in_child(folders: Iterable[Path]) -> int | None:
-    global watched  # noqa: PLW0603 - of the process
-    fatal = None
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # whoever started this may have ignored it
+    shared, fatal, how = SharedCalls(os.memfd_create("mjsim-calls")), 0, ""
     for _ in range(2):
-        told = _Watched()
-        told.fatal = fatal
+        shared.restart(fatal, how)
         with tempfile.TemporaryFile("w+", errors="replace") as dump:
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {*SIGNALS, signal.SIGCHLD})
             if (child := os.fork()) == 0:
-                watched = told
+                os.environ[_SHARED] = f"{shared.file}:{os.getpid()}"
                 _begin(dump, before)
                 return None
             code = _wait(child)
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            if told.read(_ENDED) or (code < 0 and -code not in CRASHES):
+            if shared.read(_ENDED) or (code < 0 and -code not in CRASHES):
                 return code if code >= 0 else 128 - code
             for folder in folders:
                 remove_work(folder, child)
             dump.seek(0)
             how = f"ended the process{f' by {signal.Signals(-code).name}' if code < 0 else ''}{_where(dump.read())}"
-        if not told.read(_CALLED):
+        if not shared.read(_CALLED):
             raise UserCodeError(f"code of your own {how}, outside of its calls")
-        fatal = (told.read(_CALLS), how)
+        fatal = shared.read(_CALLS)
     raise UserCodeError(
         f"code of your own {how}; it does so at different calls, so that nothing could be kept"
     )

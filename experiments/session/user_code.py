@@ -70,14 +70,14 @@ def _call_limit() -> float:
 @contextmanager
 def _watched(what: str) -> Iterator[None]:
     """Tell the parent, where there is one that watches, that a user's own code is called."""
-    if own_process.watched is None:
+    if (shared := own_process.shared_calls()) is None:
         yield
         return
-    own_process.watched.begin(what)
+    shared.begin(what)
     try:
         yield
     finally:
-        own_process.watched.end()
+        shared.end()
 
 
 @contextmanager
