@@ -2,8 +2,6 @@
 
 import asyncio
 import logging
-import re
-import time
 from collections import Counter
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
@@ -12,6 +10,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs
 
+from msgspec.structs import replace
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
@@ -30,13 +29,12 @@ from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.pages import STATIC, message_page, page
 from experiments.web.server.pool import WorkerPool
+from experiments.web.server.readings import Readings
 from experiments.web.server.sessions import Sessions
 from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, following, token_hash
 
 LOG = logging.getLogger("mjsim.play")
 MAX_QUEUE = 100  # visits that may wait for a place
-NUMBER = re.compile(r"[0-9]{1,15}")
-MAX_READING = 24 * 3600.0  # s; a page may stay open over night
 NEW_VISITS = 30, 60.0  # visits from one address, within this time, s
 SOCKETS_OF_A_VISIT, SOCKETS_OF_AN_ADDRESS = 2, 20  # open at a time
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
@@ -68,6 +66,7 @@ class PlayServer:
         self._pool, self._limit = pool, SessionLimit(config.sessions)
         self.sessions = Sessions(pool, self._limit, config.idle, config.minimum)
         self._new = Rate(*NEW_VISITS)
+        self._readings = Readings()
         self._sockets: Counter[str] = Counter()  # by visit and by address
 
     def app(self, host: str, public: str | None = None) -> Starlette:
@@ -111,22 +110,17 @@ class PlayServer:
             await self._pool.close()
 
     def _story(self, request: Request) -> Response:
-        return self._story_page(
-            request, round(1000.0 * time.monotonic()), request.query_params.get("after", "")
-        )
+        return self._story_page(request, self._readings.open(), request.query_params.get("after", ""))
 
-    def _story_page(
-        self, request: Request, opened: int, after: str, attempts: int = 0, note: str = ""
-    ) -> Response:
+    def _story_page(self, request: Request, opened: str, after: str, note: str = "") -> Response:
+        reading = self._readings.reading(opened)
+        read = reading.duration_s if reading else 0.0
         return page(
             request,
             "story",
             200,
-            wait=max(
-                0.0, self._config.minimum.get(STORY, 0.0) - max(0.0, time.monotonic() - opened / 1000.0)
-            ),
+            wait=max(0.0, self._config.minimum.get(STORY, 0.0) - read),
             questions=self._config.questions,
-            attempts=attempts,
             note=note,
             story=[text for text in self._config.story.split("\n\n") if text.strip()],
             condition=str(self._config.trials[TASK]["assistance"]).split("-")[0],
@@ -146,12 +140,15 @@ class PlayServer:
             name: values[0]
             for name, values in parse_qs((await request.body()).decode("utf-8", "replace")).items()
         }
-        after, reading = form.get("after", ""), self._reading(form)
-        if reading and (note := self._fault(reading[0], form)):
-            opened = round(1000.0 * (time.monotonic() - reading[0].duration_s))
-            return self._story_page(request, opened, after, reading[0].attempts or 0, note)
+        after, opened = form.get("after", ""), form.get("opened", "")
+        reading = self._readings.reading(opened)
+        if STORY in self._config.phases and (note := self._fault(reading, form)):
+            if reading:
+                self._readings.fail(opened)
+            return self._story_page(request, opened if reading else self._readings.open(), after, note)
+        ended = [self._ended(reading)] if STORY in self._config.phases else []
         trials = await run_in_threadpool(self._trials, after)
-        token = await run_in_threadpool(self._visits.create, phases, trials, reading)
+        token = await run_in_threadpool(self._visits.create, phases, trials, ended)
         LOG.info("session %s begins", token_hash(token)[:12])
         return RedirectResponse(f"/play/{token}", 303)
 
@@ -165,21 +162,16 @@ class PlayServer:
             for name, trial in self._config.trials.items()
         }
 
-    def _reading(self, form: Mapping[str, str]) -> list[Ended]:
-        """The phase of reading the story; its form tells when the page was made, and how often it was sent before."""
-        if STORY not in self._config.phases:
-            return []
-        opened, before = (
-            number if NUMBER.fullmatch(number := form.get(name, "")) else ""
-            for name in ("opened", "attempts")
-        )
-        seconds = time.monotonic() - int(opened) / 1000.0 if opened else 0.0
-        attempts = 1 + int(before or 0) if self._config.questions else None
-        return [Ended(STORY, round(min(max(0.0, seconds), MAX_READING), 3), attempts=attempts)]
+    def _ended(self, reading: Ended | None) -> Ended:
+        """The phase of reading the story as the log has it; no duration is known of a form that is not the server's."""
+        if reading is None:
+            return Ended(STORY, 0.0)
+        return reading if self._config.questions else replace(reading, attempts=None)
 
-    def _fault(self, reading: Ended, form: Mapping[str, str]) -> str:
+    def _fault(self, reading: Ended | None, form: Mapping[str, str]) -> str:
         """Why the story has to be read on; empty if it was read and understood."""
-        if reading.duration_s < self._config.minimum.get(STORY, 0.0):
+        minimum = self._config.minimum.get(STORY, 0.0)
+        if (reading.duration_s if reading else 0.0) < minimum or (reading is None and self._config.questions):
             return "Please take the time to read the text."
         answers = [form.get(f"answer{i}") for i in range(len(self._config.questions))]
         right = [question.answer for question in self._config.questions]

@@ -227,12 +227,14 @@ def test_the_first_page_says_the_same_under_all_conditions_but_what_they_show(tm
     assert (highlight[:1] + highlight[2:], optimal[:2] + optimal[3:]) == (none, highlight)
 
 
-def test_a_film_comes_first_where_there_is_one(tmp_path, pool):
+def test_a_film_comes_first_where_there_is_one(tmp_path, pool, monkeypatch):
     film = tmp_path / "film.mp4"
     film.write_bytes(b"0123456789")
     with serving(tmp_path / "visits", pool, film=film) as client:
-        opened = re.search(r'name="opened" value="(\d+)"', client.get("/").text)[1]
-        link = new_visit(client, opened=str(int(opened) - 90_000))
+        story, now = client.get("/"), time.monotonic()
+        with monkeypatch.context() as later:
+            later.setattr("experiments.web.server.readings.time.monotonic", lambda: now + 90.0)
+            link = send_story(client, story).headers["location"]
         assert "<video" in client.get(link).text
         assert client.get(f"{link}/film", headers={"Range": "bytes=2-4"}).content == b"234"
         assert client.post(f"{link}/film", headers={"Origin": ORIGIN}).status_code == 303
@@ -244,7 +246,7 @@ def test_a_film_comes_first_where_there_is_one(tmp_path, pool):
     assert trained == {"phase": "training", "duration_s": 125.0, "reason": "all delivered"}
 
 
-@pytest.mark.parametrize("opened", ["", "x", "-1", "9" * 15, "9" * 400])
+@pytest.mark.parametrize("opened", ["", "x", "-1", ".", "9" * 15, "9" * 400, "1.a.b", "é.é"])
 def test_a_form_that_was_tampered_with_only_spoils_its_own_reading_time(client, pool, opened):
     link = new_visit(client, opened=opened)
     go_through(client, link)
@@ -531,7 +533,7 @@ def test_a_story_is_read_for_its_time(tmp_path, pool, monkeypatch):
         early = send_story(client, page)
         assert early.status_code == 200 and "take the time" in early.text
         now = time.monotonic()
-        monkeypatch.setattr("experiments.web.server.app.time.monotonic", lambda: now + 31.0)
+        monkeypatch.setattr("experiments.web.server.readings.time.monotonic", lambda: now + 31.0)
         assert send_story(client, early).status_code == 303, "the time so far counts"
 
 
@@ -544,6 +546,27 @@ def test_questions_about_the_story_are_answered_before_the_visit_begins(tmp_path
         link = send_story(client, page, answer0="two", answer1="a").headers["location"]
         go_through(client, link)
     assert before_the_task(pool)[0]["attempts"] == 4
+
+
+@pytest.mark.parametrize("changed", ["", "1", "1.{}", "{}x", "1{}", "0.0000000000000000.{}"])
+@pytest.mark.parametrize("options", [{"minimum": {"story": 30.0}}, {"questions": QUESTIONS}])
+def test_a_form_made_by_hand_passes_neither_the_time_nor_the_questions(changed, options, tmp_path, pool):
+    with serving(tmp_path, pool, **options) as client:
+        opened = re.search(r'name="opened" value="([^"]+)"', client.get("/").text)[1]
+        form = {"opened": changed.format(opened), "attempts": "0", "answer0": "two", "answer1": "a"}
+        page = client.post("/visits", headers={"Origin": ORIGIN}, data=form)
+        assert page.status_code == 200 and "take the time" in page.text
+    assert not any(tmp_path.glob("*/visit.json"))
+
+
+def test_pages_sent_again_count_all_attempts(tmp_path, pool):
+    with serving(tmp_path, pool, questions=QUESTIONS) as client:
+        first = client.get("/")
+        for _ in range(2):
+            send_story(client, first, answer0="one")
+        link = send_story(client, first, answer0="two", answer1="a").headers["location"]
+        go_through(client, link)
+    assert before_the_task(pool)[0]["attempts"] == 3
 
 
 def test_film_and_training_last_their_time(tmp_path, pool, monkeypatch):
@@ -570,9 +593,9 @@ def test_film_and_training_last_their_time(tmp_path, pool, monkeypatch):
 
 def test_a_step_of_the_wall_clock_changes_no_duration(tmp_path, pool, monkeypatch):
     with serving(tmp_path, pool) as client:
-        opened = re.search(r'name="opened" value="(\d+)"', client.get("/").text)[1]
+        story = client.get("/")
         monkeypatch.setattr("time.time", lambda: 5e9)
-        go_through(client, new_visit(client, opened=opened))
+        go_through(client, send_story(client, story).headers["location"])
     assert before_the_task(pool)[0]["duration_s"] < 10.0
 
 
