@@ -26,7 +26,7 @@ HEADERS = {
 }
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; media-src 'self'; "
-    "connect-src 'self' {sockets}; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    "connect-src 'self' blob: {sockets}; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
 
 

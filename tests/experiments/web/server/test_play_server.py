@@ -359,7 +359,8 @@ def test_a_proxy_may_make_it_public(tmp_path, pool):
         assert client.post("/visits", headers={"Origin": public}).status_code == 303
         assert client.post("/visits", headers={"Origin": ORIGIN}).status_code == 403
         assert (
-            "connect-src 'self' wss://play.example.org;" in client.get("/").headers["content-security-policy"]
+            "connect-src 'self' blob: wss://play.example.org;"
+            in client.get("/").headers["content-security-policy"]
         )
         assert client.get("/", headers={"Host": "other.example.org"}).status_code == 400
 

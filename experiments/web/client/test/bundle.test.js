@@ -1,0 +1,25 @@
+// @ts-nocheck: types of node are not installed
+import { execFileSync } from "node:child_process";
+import { createHash } from "node:crypto";
+import { mkdtempSync, readFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { execPath } from "node:process";
+import { gzipSync } from "node:zlib";
+import { expect, test } from "vitest";
+
+const folder = join("static", "vendor");
+const bundle = readFileSync(join(folder, "three.js"));
+
+test("the bundle of three.js is what the packages of package-lock.json give", () => {
+  const fresh = mkdtempSync(join(tmpdir(), "bundle-"));
+  execFileSync(execPath, ["bundle.js", fresh]);
+  expect(readFileSync(join(fresh, "three.js")).equals(bundle)).toBe(true);
+});
+
+test("the bundle is small, has its licence in it and its hash beside it", () => {
+  expect(gzipSync(bundle).length).toBeLessThan(220_000);
+  expect(bundle.toString()).toContain("The MIT License");
+  const hash = createHash("sha256").update(bundle).digest("hex");
+  expect(readFileSync(join(folder, "three.js.sha256"), "utf8")).toBe(`${hash}  three.js\n`);
+});
