@@ -205,11 +205,16 @@ def trial_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def add_frame(
-    parser: argparse.ArgumentParser, *, size: tuple[int, int] = (640, 480), profile: str = FAST.name
+    parser: argparse.ArgumentParser,
+    *,
+    size: tuple[int, int] | None = (640, 480),
+    profile: str = FAST.name,
+    otherwise: str = "",
 ) -> None:
-    """Add `--size` and `--profile` with these defaults."""
+    """Add `--size` and `--profile` with these defaults; `otherwise` tells what no size means."""
+    default = f"{size[0]}x{size[1]}" if size else None
     parser.add_argument(
-        "--size", type=frame_size, default=f"{size[0]}x{size[1]}", metavar="WxH", help="frame size, px"
+        "--size", type=frame_size, default=default, metavar="WxH", help=f"frame size, px{otherwise}"
     )
     parser.add_argument(
         "--profile", default=profile, metavar="NAME", help=f"render profile: {', '.join(PROFILES)}"

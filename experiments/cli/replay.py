@@ -72,7 +72,11 @@ def add_parser(commands: Any) -> None:
         metavar="NAME",
         help=f"show the HUD of another assistance condition{NAMES['assistance']()} (default: as recorded)",
     )
-    add_frame(parser)
+    add_frame(
+        parser,
+        size=None,
+        otherwise=" (default: 640x480; of a session that a browser drew, the shape of its page)",
+    )
     add_force(parser, "replace a video that exists")
 
 
@@ -111,7 +115,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_file(arguments.video, replace=arguments.force)
         film = ReplayFilm(
             path=arguments.video,
-            config=film_config(arguments),
+            config=film_config(arguments) if arguments.size else None,
+            profile=arguments.profile,
             camera=arguments.camera,
             eye=arguments.eye,
             target=arguments.target,
@@ -123,7 +128,7 @@ def run(arguments: argparse.Namespace) -> int:
         with ExitStack() as stack, progress_bars(error_console(), "replay", *columns) as bars:
             bar = bars.add_task("replay", total=None)
             report = replay(
-                stack.enter_context(_run_of(arguments)),
+                stack.enter_context(run_of(arguments)),
                 start=arguments.start,
                 film=film,
                 assistance=arguments.assistance,
@@ -142,7 +147,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _run_of(arguments: argparse.Namespace) -> Iterator[Path]:
+def run_of(arguments: argparse.Namespace) -> Iterator[Path]:
     """The run directory; that of a session which is not over is made for as long as it is needed.
 
     Raises:

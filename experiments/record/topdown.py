@@ -19,6 +19,7 @@ from hud.theme import Face
 from mjsim.episode import Episode
 from mjsim.files import replacing
 from mjsim.kernels import cache_base
+from mjsim.observation import Observation
 from mjsim.sources import source_digest
 
 # Okabe-Ito colours, distinct for all common kinds of colour vision.
@@ -93,10 +94,15 @@ def _drawn_task(
     return drawing
 
 
-def planned_path(house: House, episode: Episode, plan: Event) -> _Points:
-    """Floor points of the tour of a `plan` event, m, shape (k, 2)."""
-    places = {o.name: np.array(o.position[:2]) for o in episode.objects}
-    here = house.navmesh.snap(np.array([episode.start.x, episode.start.y]))
+def planned_path(house: House, episode: Episode, plan: Event, seen: Observation | None = None) -> _Points:
+    """Floor points of the tour of a `plan` event made at `seen`, or else at the start; m, shape (k, 2)."""
+    if seen is None:
+        places = {o.name: np.array(o.position[:2]) for o in episode.objects}
+        here = np.array([episode.start.x, episode.start.y])
+    else:
+        places = dict(zip(seen.object_names, seen.object_positions[:, :2], strict=True))
+        here = seen.position
+    here = house.navmesh.snap(here)
     points = [here[None]]
     for kind, name in plan["visits"]:
         target = places[name] if kind == "pick" else house.receptacles[episode.targets[name]].approach

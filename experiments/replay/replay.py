@@ -24,6 +24,8 @@ from mjsim.errors import AssetError
 from mjsim.files import replacing
 from mjsim.person_parameters import PersonParameters
 
+MAX_WIDTH = 1280  # px of the picture in a film of what a page showed
+
 Point = tuple[float, float, float]
 
 
@@ -33,7 +35,8 @@ class ReplayFilm:
 
     Attributes:
         path: Video file to write.
-        config: Frame size and render profile.
+        config: Frame size and render profile; None for what the person's page showed, or else the usual one, with
+            `profile`.
         camera: `first-person` (with the HUD), `top-down`, or `free`.
         eye: Position of a free camera, m; None for one that circles the house.
         target: Point that a free camera looks at, m; None for the middle of the floor.
@@ -43,10 +46,11 @@ class ReplayFilm:
     """
 
     path: Path
-    config: FilmConfig
+    config: FilmConfig | None
     camera: str = FIRST_PERSON
     eye: Point | None = None
     target: Point | None = None
+    profile: str = "fast"
 
     def __post_init__(self) -> None:
         if self.camera not in CAMERAS:
@@ -87,6 +91,7 @@ def replay(
     *,
     start: float = 0.0,
     film: ReplayFilm | None = None,
+    watch: Callable[[Replayer], Viewer] | None = None,
     assistance: str | None = None,
     house: House | None = None,
     catalogue: str | None = None,
@@ -98,6 +103,7 @@ def replay(
         directory: Directory of a run, or of a failed run.
         start: Simulated time, s; the replay starts at the last checkpoint at or before it.
         film: How to film it, or None.
+        watch: Gives a viewer of the replay, instead of a film, or None.
         assistance: Assistance condition whose HUD is shown, or None for the recorded one. Actions and plans are the
             recorded ones in any case.
         house: The house of the run, if it is loaded already.
@@ -121,7 +127,7 @@ def replay(
     shown = assistance or str(record.start["assistance"])
     replayer = Replayer(directory, record, house, start=start, assistance=shown)
     with ExitStack() as stack:
-        viewer, video = _open_film(replayer, film, stack) if film else (None, None)
+        viewer, video = _open_film(replayer, film, stack) if film else (watch and watch(replayer), None)
         replayer.run(viewer, on_progress)
         mismatches = _mismatches(replayer)
         end = replayer.first + replayer.replayed().steps
@@ -178,13 +184,33 @@ def _house_of(directory: Path, record: Record, catalogue: str | None) -> House:
     return house
 
 
+def as_seen(record: Record, profile: str) -> FilmConfig:
+    """A film like the page on which the browser drew the session last: its shape, with the lists beside the picture.
+
+    Where no browser drew, the usual film.
+    """
+    views = [
+        event for event in record.events if event["event"] == "display" and event.get("draw") == "browser"
+    ]
+    if not views:
+        return FilmConfig(profile=profile)
+    width, height = views[-1]["width"], views[-1]["height"]
+    scale = min(1.0, MAX_WIDTH / width)
+    return FilmConfig(max(320, round(scale * width)), max(240, round(scale * height)), profile, beside=True)
+
+
 def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[Viewer, VideoWriter]:
     """A viewer that films to a file, which appears if the replay succeeds."""
     path = stack.enter_context(replacing(film.path))
-    config, scene, house = film.config, replayer.scene, replayer.house
+    config, scene, house = (
+        film.config or as_seen(replayer.record, film.profile),
+        replayer.scene,
+        replayer.house,
+    )
     if film.camera == FIRST_PERSON:
         renderer = stack.enter_context(FirstPersonRenderer(scene, house, config))
-        video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))
+        width, height = config.frame_size
+        video = stack.enter_context(VideoWriter(path, width=width, height=height))
         return Filming(renderer, video), video
     camera = camera_path(film.camera, house.bounds, config.width / config.height, film.eye, film.target)
     video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))

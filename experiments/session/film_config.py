@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from experiments.errors import ConfigError
+from hud.layout import margins
 from mjsim.render import PROFILES, RenderProfile
 
 FIRST_PERSON, TOP_DOWN, FREE = CAMERAS = ("first-person", "top-down", "free")  # of a film of a replay
@@ -10,7 +11,14 @@ FIRST_PERSON, TOP_DOWN, FREE = CAMERAS = ("first-person", "top-down", "free")  #
 
 @dataclass(frozen=True)
 class FilmConfig:
-    """How frames are made: size in px, and the render profile.
+    """How frames are made.
+
+    Attributes:
+        width: Of the picture, px.
+        height: Of the picture, px.
+        profile: Render profile.
+        beside: Whether the lists of the HUD lie beside the picture, as on the page of `mjsim play`: frames are then
+            larger than the picture.
 
     Raises:
         ConfigError: There is no such profile.
@@ -19,7 +27,22 @@ class FilmConfig:
     width: int = 640
     height: int = 480
     profile: str | RenderProfile = "fast"
+    beside: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.profile, str) and self.profile not in PROFILES:
             raise ConfigError(f"no render profile {self.profile!r}; there are {', '.join(PROFILES)}")
+
+    @property
+    def margins(self) -> tuple[int, int, int]:
+        """Room above, to the left and to the right of the picture, px; frames of films have even sizes."""
+        if not self.beside:
+            return 0, 0, 0
+        top, left, right = margins(self.width, self.height)
+        return top + (self.height + top) % 2, left, right + (self.width + left + right) % 2
+
+    @property
+    def frame_size(self) -> tuple[int, int]:
+        """Width and height of a frame, px."""
+        top, left, right = self.margins
+        return left + self.width + right, top + self.height

@@ -46,12 +46,12 @@ class FirstPersonRenderer:
         self._house = house
         self._pictures = render_pictures(house.catalogue) if pictures is None else pictures
         self._compositor = Compositor(self._pictures)
-        self._size = (film.width, film.height)
+        self._film = film
 
     def camera_view(self, data: Any) -> CameraView:
         """The eye camera as the next frame of `data` shows it; a condition needs it to point to a goal."""
         pose = self._renderer.camera_pose(data)
-        width, height = self._size
+        width, height = self._film.width, self._film.height
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
 
     def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
@@ -62,7 +62,7 @@ class FirstPersonRenderer:
             state: What the HUD shows; its markers are drawn into the scene.
 
         Returns:
-            RGB, uint8, shape (height, width, 3).
+            RGB, uint8, shape (height, width, 3); larger where the lists lie beside the picture.
 
         Raises:
             RenderError: A marker cannot be drawn, or the renderer is closed.
@@ -70,7 +70,11 @@ class FirstPersonRenderer:
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
             self._compositor = Compositor(self._pictures)
-        return self._compositor.compose(self._renderer.rgb(data, markers=state.markers), state)
+        picture = self._renderer.rgb(data, markers=state.markers)
+        if self._film.beside:
+            top, left, right = self._film.margins
+            picture = np.pad(picture, ((top, 0), (left, right), (0, 0)))
+        return self._compositor.compose(picture, state)
 
     def close(self) -> None:
         """Free the GL context."""

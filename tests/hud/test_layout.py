@@ -15,7 +15,7 @@ from hud.canvas import Rect
 from hud.compose import Compositor
 from hud.conditions import condition
 from hud.errors import FrameError
-from hud.layout import scrolled, unit_of, visible_rows
+from hud.layout import margins, scrolled, unit_of, visible_rows
 from hud.messages import TEXTS, message
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, MiniMap, Pointer
 from hud.task import Alternative
@@ -107,6 +107,18 @@ def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(state, siz
         assert panels["checklist"].width <= 0.3 * size[0]
     centre = Rect(size[0] // 2 - 1, size[1] // 2 - 1, 2, 2)
     assert not any(overlap(centre, rect) for name, rect in panels.items()), "what the person looks at is free"
+
+
+@settings(max_examples=40, deadline=None)
+@given(states(), st.integers(240, 1200), st.floats(1.0, 2.4))
+def test_lists_lie_beside_a_picture_with_margins(state, height, aspect):
+    width = round(height * aspect)
+    top, left, right = margins(width, height)
+    found = layout(state, (left + width + right, top + height))
+    picture = Rect(left, top, width, height)
+    beside = {"checklist", "bins", "progress", "clock", "minimap"}
+    for name in beside & found.panels.keys():
+        assert not overlap(found.panels[name], picture), name
 
 
 @pytest.mark.parametrize("base", ["highlight", "optimal"])

@@ -1,5 +1,6 @@
 """Replays: bit for bit what was recorded, from anywhere, and whatever is not as recorded is named with its step."""
 
+import dataclasses
 import hashlib
 import json
 import re
@@ -23,7 +24,7 @@ from experiments.record.columns import TRAJECTORY_COLUMNS
 from experiments.record.files import read_arrays, read_json
 from experiments.record.reader import read_run
 from experiments.record.records import read_events
-from experiments.replay.replay import ReplayFilm, replay
+from experiments.replay.replay import ReplayFilm, as_seen, replay
 from experiments.session.film_config import FilmConfig
 from experiments.session.session import Session
 from experiments.trials.trial import run_trial
@@ -406,6 +407,26 @@ def test_another_view_of_the_same_run(film, house, tmp_path, options):
     report = frames_of(film, house, tmp_path, start=4.0, **options)
     assert report.first + report.steps == 126
     assert report.as_filmed is False
+
+
+@pytest.mark.parametrize(
+    ("draw", "view", "frame"),
+    [
+        ("browser", (1500, 750), (1280, 640)),
+        ("browser", (200, 100), (320, 240)),
+        ("server", (1500, 750), None),
+    ],
+)
+def test_a_film_has_the_shape_of_the_page(run, draw, view, frame):
+    display = {"event": "display", "draw": draw, "width": view[0], "height": view[1]}
+    log = json.dumps(display).encode() + b"\n"
+    config = as_seen(dataclasses.replace(read_run(run), log=log), "draft")
+    assert (config.beside, config.profile) == (frame is not None, "draft")
+    if frame is None:
+        assert config.frame_size == (640, 480)
+        return
+    assert (config.width, config.height) == frame
+    assert config.frame_size > frame and all(side % 2 == 0 for side in config.frame_size)
 
 
 def test_a_replay_that_fails_leaves_no_film(film, house, tmp_path):
