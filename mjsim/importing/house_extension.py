@@ -21,6 +21,7 @@ from mjsim.model.catalogue_files import CATALOGUE, house_name
 from mjsim.model.house import compiled_house
 
 HELD = 4  # objects of a kind that a bin has room for, by their boxes
+_SLOTS = 2  # places along each side of a bin where a hand puts things beside each other (mjsim.person.slots)
 MAX_LABEL = 40
 _UNNAMED = ".unnamed"  # file in the folder of an object that the catalogue does not name yet
 _WALL_GAP = 0.02  # m, between an object and the walls of its bin
@@ -108,12 +109,11 @@ class HouseExtension:
         room = 2 * compiled_house(self.catalogue).receptacles[receptacle.key].half_size
         sides = " x ".join(f"{side:.2f}" for side in size)
         inside = " x ".join(f"{side:.2f}" for side in room)
-        across, free = np.sort(size[:2]), np.sort(room[:2]) - 2 * _WALL_GAP
-        factor = min(float((free / across).min()), (float(np.prod(room) / np.prod(size)) / HELD) ** (1 / 3))
-        if factor < 1:
+        if held_in(room, size) < HELD:
+            factor = next(f for f in np.arange(0.99, 0.0, -0.01) if held_in(room, f * size) >= HELD)
             raise AssetError(
                 f"it measures {sides} m, and {HELD} of that do not fit into {receptacle.label!r} ({inside} m); "
-                f"use --scale {0.99 * factor:.2g} on top of the present one, or choose another category"
+                f"use --scale {factor:.2f} on top of the present one, or choose another category"
             )
         return ImportDecision("size", f"{sides} m", f"{receptacle.label} has {inside} m")
 
@@ -164,6 +164,17 @@ class HouseExtension:
         table = rf"^\[objects\.{entry.key}\][^\n]*\n(?:(?!\[).*\n?)*"
         kept = re.sub(table, "", self._text, flags=re.MULTILINE)
         return kept.rstrip("\n") + "\n" + block
+
+
+def held_in(room: Floats, size: Floats) -> int:
+    """How many objects with extents (3,), m, a bin with a room of (3,), m, holds at least, from whichever side.
+
+    They stand upright, side by side where people put them, in layers; the centre of each is inside.
+    """
+    layers = int(room[2] / size[2] + 0.5)
+    turned = (size[:2], size[1::-1])  # a person holds an object along the direction from which they come
+    beside = [np.minimum((room[:2] - 2 * _WALL_GAP) // across, _SLOTS).prod() for across in turned]
+    return int(min(beside)) * layers
 
 
 def _reference(house: str, folder: Path) -> str:

@@ -22,7 +22,7 @@ from mjsim.errors import AssetError, RenderError
 from mjsim.files import remove_leftovers
 from mjsim.importing import house_extension
 from mjsim.importing.atlas import SIDE, Atlas
-from mjsim.importing.house_extension import Entry, HouseExtension
+from mjsim.importing.house_extension import Entry, HouseExtension, held_in
 from mjsim.importing.mesh_import import add_mesh
 from mjsim.importing.object_import import import_object
 from mjsim.importing.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, width
@@ -30,6 +30,7 @@ from mjsim.importing.resting import STEADY, resting_pose
 from mjsim.importing.values import ImportOptions
 from mjsim.importing.weight import weigh
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.house import compiled_house
 from mjsim.model.validation.object_rules import check_object
 from mjsim.options import WorldOptions
 
@@ -249,7 +250,7 @@ def test_grips_are_on_something_at_the_top(tmp_path, name):
 
 
 def test_a_shape_that_no_hand_can_hold_is_refused_with_a_picture(tmp_path, capsys):
-    path = MeshFile(".stl", lambda: tetrahedron(-0.1, -0.1, 0.16)).write(tmp_path, "horn")
+    path = MeshFile(".stl", lambda: tetrahedron(-0.1, -0.1, 0.1)).write(tmp_path, "horn")
     own = tmp_path / "own"
     assert run(path, "--category", "toys", "--out", own) == 2
     said = capsys.readouterr().err
@@ -403,6 +404,32 @@ def test_bad_options_are_one_line_and_leave_nothing(tmp_path, capsys, words, mes
         assert stop.code == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "own").exists()
+
+
+def test_four_that_fit_by_volume_but_not_beside_each_other_are_refused(tmp_path, capsys):
+    """A third of these fails in the office box, whose room is that of eight."""
+    MAKE.box((0.15, 0.13, 0.13)).export(tmp_path / "long.stl")
+    words = (tmp_path / "long.stl", "--category", "office", "--out", tmp_path / "own")
+    assert run(*words) == 2
+    line = capsys.readouterr().err
+    assert "4 of that do not fit into 'Office supply box'" in line
+    assert run(*words, "--scale", re.search(r"--scale ([\d.]+)", line)[1]) == 0
+
+
+@pytest.mark.parametrize(
+    "size", [(0.26, 0.1, 0.1), (0.25, 0.13, 0.11), (0.12, 0.12, 0.17), (0.26, 0.2, 0.04)]
+)
+def test_a_bin_holds_as_many_as_were_counted(size, tmp_path):
+    MAKE.box(size).export(tmp_path / "box.stl")
+    catalogue, own = Catalogue.load("apartment"), tmp_path / "own"
+    room = 2 * compiled_house(catalogue).receptacles["office_box"].half_size
+    count = held_in(room, np.array(size))
+    assert count >= 4
+    add_mesh(tmp_path / "box.stl", HouseExtension(own), Entry.named("box", "office"), ImportOptions(mass=0.3))
+    house = House.load(str(own / "catalogue.toml"))
+    episode = arrange(house, 0, house.catalogue.categories["office"], ["box"] * 6, np.random.default_rng(0))
+    placements = run_episode(house, episode, WorldOptions(fidelity="event"))
+    assert [placement.outcome for placement in placements[:count]] == ["placed"] * count
 
 
 @pytest.mark.parametrize("force", [False, True])
