@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mjsim.actions import (
     IDLE,
@@ -136,6 +136,16 @@ class World:
     def busy(self) -> bool:
         """Whether a pick or place is under way."""
         return self._tier.busy
+
+    @property
+    def body(self) -> NDArray[np.float64]:
+        """The person's body as `mjsim.fidelity.body_state` lays it out, a copy of shape (BODY_SIZE,)."""
+        return self._tier.body
+
+    @property
+    def hands(self) -> NDArray[np.float64]:
+        """Where the left and the right hand are in the body's frame, m, a copy of shape (2, 3)."""
+        return self._tier.hands
 
     @property
     def blocked(self) -> bool:

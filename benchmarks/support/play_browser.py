@@ -60,8 +60,7 @@ class SimulatedBrowser:
 
     Args:
         address: Of the visit.
-        codec: `jpeg`, `h264` or `none`.
-        snapshots: Whether to ask for snapshots.
+        codec: `jpeg`, `h264`, or `none` for snapshots.
         link: What the network does.
         size: Of the view, px.
         seed: Of the network's chance.
@@ -79,20 +78,13 @@ class SimulatedBrowser:
         address: str,
         *,
         codec: str = "none",
-        snapshots: bool = False,
         link: Link | None = None,
         size: tuple[int, int] = (640, 480),
         seed: int = 0,
     ) -> None:
         self.address = address
         self._tab = secrets.token_hex(8)
-        self._view = {
-            "type": "view",
-            "width": size[0],
-            "height": size[1],
-            "codec": codec,
-            "snapshots": snapshots,
-        }
+        self._view = {"type": "view", "width": size[0], "height": size[1], "codec": codec}
         self._link, self._rng = link or Link(), np.random.default_rng(seed)
         self._changed = asyncio.Condition()
         self._tasks: list[asyncio.Task[None]] = []
@@ -113,7 +105,7 @@ class SimulatedBrowser:
             f"ws://{parts.netloc}{parts.path}",
             origin=f"http://{parts.netloc}",  # type: ignore[arg-type]
             max_size=None,
-            compression=None,
+            compression="deflate",
             open_timeout=PATIENCE,
         )
         self.say(type="hello", tab=self._tab, trial=trial, view=self._view)

@@ -87,7 +87,7 @@ def _free_ports(number: int) -> list[int]:
 
 async def _watch(server: PlayProcess, number: int, seconds: float) -> dict[str, Any]:
     """Watch another person and new visits while a process attacks; what came of both."""
-    person = SimulatedBrowser(server.begin(), snapshots=True)
+    person = SimulatedBrowser(server.begin())
     await person.open(TASK)
     await person.run()
     flooded, shared = server.begin(), server.begin()

@@ -19,12 +19,12 @@ MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
 SETTLING = 2.0  # s before a session is measured
 SETTLING_TOGETHER = 8.0  # s in which sessions find the size of their frames that leaves room for the others
 MIN_FPS, MAX_MS = 15.0, 150.0  # what a session that holds has: frames a second, 95 % from input to frame
-CASES = {  # codec, snapshots, link
-    "jpeg": ("jpeg", False, Link()),
-    "h264": ("h264", False, Link()),
-    "snapshots": ("none", True, Link()),
-    "jpeg, slow link": ("jpeg", False, MOBILE),
-    "h264, slow link": ("h264", False, MOBILE),
+CASES = {  # codec, link
+    "jpeg": ("jpeg", Link()),
+    "h264": ("h264", Link()),
+    "snapshots": ("none", Link()),
+    "jpeg, slow link": ("jpeg", MOBILE),
+    "h264, slow link": ("h264", MOBILE),
 }
 
 
@@ -39,9 +39,9 @@ def measure_latency(folder: Path, seconds: float, report: Report, *words: str) -
     """
     found = {}
     with PlayProcess(folder, *TASK_ALONE, "--sessions", "2", *words) as server:
-        for name, (codec, snapshots, link) in CASES.items():
+        for name, (codec, link) in CASES.items():
             report(f"{name}, {seconds:.0f} s")
-            browser = SimulatedBrowser(server.begin(), codec=codec, snapshots=snapshots, link=link)
+            browser = SimulatedBrowser(server.begin(), codec=codec, link=link)
             found[name] = asyncio.run(_sessions_at_once(server, [browser], seconds, SETTLING))
     return found
 
@@ -64,9 +64,7 @@ def measure_capacity(
         report(f"{count} sessions at once, {codec}, {seconds:.0f} s")
         visits = folder / f"{codec}-{count}"
         with PlayProcess(visits, *TASK_ALONE, "--sessions", str(count), *words) as server:
-            browsers = [
-                SimulatedBrowser(server.begin(), codec=codec, snapshots=codec == "none") for _ in range(count)
-            ]
+            browsers = [SimulatedBrowser(server.begin(), codec=codec) for _ in range(count)]
             tried.append(asyncio.run(_sessions_at_once(server, browsers, seconds, SETTLING_TOGETHER)))
         if tried[-1]["holds"]:
             break

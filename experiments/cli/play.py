@@ -215,7 +215,7 @@ def _serve(
             ws_max_size=MAX_TEXT,
             ws_ping_interval=5.0,
             ws_ping_timeout=10.0,
-            ws_per_message_deflate=False,
+            ws_per_message_deflate=True,
             timeout_graceful_shutdown=3,
             limit_concurrency=4000,
         )

@@ -29,6 +29,8 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     # 1 for the first input of a session, then one more each
     number: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
+    # the control step at which it counts, or the next one if that is over; None for the next one
+    step: Annotated[int, msgspec.Meta(ge=0, le=2**53)] | None = None
     forward: Share = 0.0  # walking from now on: share of the speed, negative to walk back
     left: Share = 0.0  # stepping to the left from now on
     turn: Share = 0.0  # turning to the left from now on

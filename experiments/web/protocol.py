@@ -11,7 +11,7 @@ import msgspec
 
 from experiments.web.controls import Input
 from experiments.web.state import LOADING, TRANSITIONS, SessionPhase, Trigger
-from hud.state import HudState, MiniMap, Pointer
+from hud.state import HudState, Marker, MiniMap, Pointer
 
 VERSION = 1  # of the head of a frame
 MAX_TEXT = 64 * 1024  # bytes of a message from the browser
@@ -37,12 +37,11 @@ class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 
 
 class View(WireMessage, frozen=True):
-    """How a page wants to see the session: size in px, how frames are compressed, whether snapshots are sent."""
+    """How a page wants to see the session: size in px, and how frames are compressed; `none` where it draws itself."""
 
     width: Length
     height: Length
     codec: Codec = "jpeg"
-    snapshots: bool = False
 
 
 class Hello(WireMessage, frozen=True):
@@ -62,9 +61,14 @@ class Run(WireMessage, frozen=True):
 
 
 class Inputs(WireMessage, frozen=True):
-    """What the person pressed, in order, each once."""
+    """What the person pressed, in order, each once.
+
+    `until` promises that all inputs for the control steps before it have been sent; the clock then waits for such
+    promises, for 0.5 s at most.
+    """
 
     inputs: Annotated[list[Input], msgspec.Meta(max_length=MAX_INPUTS)]
+    until: Count | None = None
 
 
 class Seen(WireMessage, frozen=True):
@@ -174,19 +178,91 @@ class Frame(WireMessage, frozen=True):
         return FRAME_HEAD.pack(*head, self.milliseconds) + self.data
 
 
-class Snapshot(WireMessage, frozen=True):
-    """Poses of what is in view or in hand, and HUD, at the start of a control step, for clients that draw themselves.
+class Gait(msgspec.Struct, frozen=True):
+    """Limits and servos of walking, as the field of `mjsim.fidelity.kinematics.Gait`; SI units."""
 
-    `eye` has the position, m, then heading and pitch, rad; `objects` the position (3), m, and orientation wxyz (4) by
-    instance name.
+    max_speed: float
+    max_turn: float
+    max_look: float
+    acceleration: float
+    turn_acceleration: float
+    dt: float
+    substeps: int
+    mass: float
+    walk_gain: float
+    walk_force: float
+    inertia: float
+    turn_gain: float
+    turn_force: float
+    head_inertia: float
+    head_stiffness: float
+    head_damping: float
+    head_force: float
+    lowest: float
+    highest: float
+    radius: float
+    eye_height: float
+    eye_forward: float
+
+
+class Speeds(msgspec.Struct, frozen=True):
+    """Speeds of the person at full deflection of the controls, m/s and rad/s."""
+
+    walking_speed: float
+    turning_speed: float
+    looking_speed: float
+
+
+class Scene(WireMessage, frozen=True):
+    """What a client that draws needs once: where the files of the scene are, and how the person moves.
+
+    `path` is the folder of the scene's files on this server, and `floor` the file of the obstacles for `gait`, or None
+    where walking cannot be predicted. `field_of_view` is horizontal, rad, whatever the shape of the view;
+    `step_duration` is that of a control step, s.
+    """
+
+    path: str
+    floor: str | None
+    gait: Gait
+    speeds: Speeds
+    field_of_view: float
+    step_duration: float
+
+
+class Snapshot(WireMessage, frozen=True):
+    """The state at the start of a control step, for clients that draw; once a step.
+
+    Attributes:
+        step: The control step that begins with this state.
+        input: Number of the last input that counts in it.
+        time: Simulated time, s.
+        busy: Whether a pick or place is under way.
+        body: Position, speeds, commands and servos of the body (docs/protocol.md).
+        eye: Position, m, heading and pitch, rad.
+        hands: Positions of the left and the right hand in the body's frame, m.
+        held: What they hold, by instance name.
+        objects: Position (3), m, and orientation wxyz (4) by instance name, where they changed since the last snapshot.
+        models: Model by instance name, of objects that the client has not seen, or not since they were `gone`.
+        gone: Instance names of objects about which the client is told nothing any more.
     """
 
     step: int
     input: int
     time: float
+    busy: bool
+    body: list[float]
     eye: list[float]
+    hands: list[list[float]]
+    held: tuple[str | None, str | None]
     objects: dict[str, list[float]]
-    hud: HudState
+    models: dict[str, str]
+    gone: list[str]
+
+
+class Markers(WireMessage, frozen=True):
+    """The markers of the HUD, for clients that draw; when they change."""
+
+    markers: tuple[Marker, ...]
 
 
 class Pictures(WireMessage, frozen=True):
@@ -202,14 +278,17 @@ class Hud(WireMessage, frozen=True):
 
 
 class Reach(msgspec.Struct, frozen=True):
-    """What the action key would do: the object, the receptacle if it is put there, where it is in the frame.
+    """What the action key would do: the object, the receptacle if it is put there, and where that is.
 
-    `at` is in shares of the frame's width and height, or None where it is out of view.
+    `instance` is the object's instance name, `place` the position of the object or the receptacle, m, and `at` where
+    that is in the view, in shares of its width and height, or None where it is out of view.
     """
 
     object: str
     receptacle: str | None
     at: tuple[float, float] | None
+    instance: str
+    place: tuple[float, float, float]
 
 
 class Moment(WireMessage, frozen=True):
@@ -224,7 +303,7 @@ class Moment(WireMessage, frozen=True):
 
 
 class Busy(WireMessage, frozen=True):
-    """Whether a pick or place is under way; keys pressed then are handled afterwards."""
+    """Whether a pick or place is under way, for clients that show frames; keys pressed then are handled afterwards."""
 
     busy: bool
 
@@ -258,7 +337,9 @@ FromBrowser = Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | P
 ToBrowser = (
     State
     | Taken
+    | Scene
     | Snapshot
+    | Markers
     | Pictures
     | Hud
     | Moment
@@ -271,7 +352,7 @@ ToBrowser = (
     | Error
 )
 ToWorker = Open | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave
-FromWorker = State | Taken | Frame | Snapshot | Pictures | Hud | Moment | Busy | Saved
+FromWorker = State | Taken | Frame | Scene | Snapshot | Markers | Pictures | Hud | Moment | Busy | Saved
 
 decode_from_browser: Any = msgspec.json.Decoder(FromBrowser).decode
 encode_to_browser = msgspec.json.Encoder().encode

@@ -77,6 +77,16 @@ class Event(Tier):
         return self._motion is not None
 
     @property
+    def body(self) -> NDArray[np.float64]:
+        """A copy of the body."""
+        return self._kinematic.body.copy()
+
+    @property
+    def hands(self) -> NDArray[np.float64]:
+        """Where the hands are in the body's frame, m, shape (2, 3)."""
+        return self._kinematic.hands.copy()
+
+    @property
     def health(self) -> Health:
         """Extremes of the physics since the last reset."""
         return self._full.health

@@ -69,6 +69,16 @@ class Full(Tier):
         return self._motion is not None
 
     @property
+    def body(self) -> NDArray[np.float64]:
+        """A copy of the body."""
+        return self.person.rig.body_state
+
+    @property
+    def hands(self) -> NDArray[np.float64]:
+        """Where the hands are in the body's frame, m, shape (2, 3)."""
+        return self.person.rig.pose[4:].reshape(2, 3).copy()
+
+    @property
     def health(self) -> Health:
         """Extremes of the physics since the last reset."""
         return self.monitor.snapshot()

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.errors import StateError
-from mjsim.fidelity.body_state import FORWARD, LOOK, SERVO
+from mjsim.fidelity.body_state import LOOK
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import (
     BODY,
@@ -84,6 +84,11 @@ class KinematicWorld:
         return self._body
 
     @property
+    def hands(self) -> NDArray[np.float64]:
+        """Where the hands are in the body's frame, m; a view of the state, shape (2, 3)."""
+        return self.state.vector[HANDS:HAND_SPEEDS].reshape(2, 3)
+
+    @property
     def pitch_target(self) -> float:
         """Commanded pitch of the head, rad."""
         return float(self._body[LOOK])
@@ -111,10 +116,9 @@ class KinematicWorld:
 
     def reset(self, data: mujoco.MjData) -> None:
         """Start from physics that was just reset and brought up to date (`mj_forward`)."""
-        rig, body, vector = self._rig, self._body, self.state.vector
+        rig, vector = self._rig, self.state.vector
         vector[TIME] = data.time
-        body[:4], body[4:FORWARD] = rig.pose[:4], rig.rates[:4]
-        body[FORWARD:SERVO], body[SERVO:] = rig.motion, rig.get_state().command[:4]
+        self._body[:] = rig.body_state
         vector[HANDS:HAND_SPEEDS] = rig.hand_targets.ravel()
         vector[HAND_SPEEDS:GRASPS], vector[GRASPS:] = 0.0, -1.0
         self.state.poses[:] = data.qpos[self._qpos].reshape(-1, 7)

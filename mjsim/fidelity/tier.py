@@ -28,6 +28,16 @@ class Tier(ABC):
 
     @property
     @abstractmethod
+    def body(self) -> NDArray[np.float64]:
+        """A copy of the body as `mjsim.fidelity.body_state` lays it out, shape (BODY_SIZE,)."""
+
+    @property
+    @abstractmethod
+    def hands(self) -> NDArray[np.float64]:
+        """Where the left and the right hand are in the body's frame, m, a copy of shape (2, 3)."""
+
+    @property
+    @abstractmethod
     def health_sample(self) -> HealthSample:
         """Health of the physics in the latest control step."""
 

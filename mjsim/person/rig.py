@@ -72,6 +72,11 @@ class Rig:
         self._activations[:] = self._last_command
         self._controls[:] = 0.0
 
+    @property
+    def body_state(self) -> Vector:
+        """Poses, rates, commands and servos as `mjsim.fidelity.body_state` lays them out, shape (BODY_SIZE,)."""
+        return np.concatenate((self.pose[:4], self.rates[:4], self.motion, self._last_command[:4]))
+
     def get_state(self) -> RigState:
         """The commands as a value."""
         arrays = (self.motion, self.hand_targets, self._last_hand_targets, self._last_command)

@@ -100,7 +100,10 @@ class PlayedSession:
 
     def take(self, message: Any) -> Error | None:
         """Take a message from the browser; why it was refused, or None."""
-        if not isinstance(message, Seen | Beat | Display):  # which a page sends by itself
+        by_itself = isinstance(message, Seen | Beat | Display) or (
+            isinstance(message, Inputs) and not message.inputs
+        )
+        if not by_itself:
             self.heard = time.monotonic()
         match message:
             case View():

@@ -58,7 +58,7 @@ class Clock:
             session.note("overrun", seconds=round(late, 3), skipped=late > MAX_LAG)
             due += late if late > MAX_LAG else 0.0
         self._acknowledger.check()
-        self._live.step(self._control.take_inputs())
+        self._live.step(self._control.take_inputs(session.record.step))
         session.show()  # now rather than in the next step: the browser sees it 40 ms earlier
         self._acknowledger.request(self._live.input, session.record.step)
         return due + self._live.world.control_timestep

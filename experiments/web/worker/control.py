@@ -22,6 +22,9 @@ class SessionControl:
         self.state = State()
         self._announce = announce
         self._inputs: list[Input] = []
+        self._until: int | None = (
+            None  # all inputs for the control steps before it have come; None if none is promised
+        )
         self._notes: list[Note] = []
         self._changed = threading.Condition()
         self._ready = 0.0  # when the session could first be started, monotonic
@@ -38,6 +41,7 @@ class SessionControl:
             if after.phase is PAUSED:
                 self._note("pause", reason=reason)
                 self._inputs = [new.at_rest() for new in self._inputs]
+                self._until = None
             elif (before.phase, after.phase) == (PAUSED, RUNNING):
                 self._note("resume")
             elif after.phase is READY:
@@ -47,13 +51,20 @@ class SessionControl:
             self._announce(after)
             self._changed.notify_all()
 
-    def add(self, inputs: list[Input]) -> None:
-        """Queue the inputs that are new; a browser that reconnects repeats those that were not acknowledged."""
+    def add(self, inputs: list[Input], until: int | None = None) -> None:
+        """Queue the inputs that are new; a browser that reconnects repeats those that were not acknowledged.
+
+        `until` promises that all inputs for the control steps before it have come.
+        """
         with self._changed:
+            running = self.state.phase is RUNNING
             for new in inputs:
                 if new.number > self.state.input:
-                    self._inputs.append(new if self.state.phase is RUNNING else new.at_rest())
+                    self._inputs.append(new if running else new.at_rest())
                     self.state = msgspec.structs.replace(self.state, input=new.number)
+            if until is not None and running:
+                self._until = max(until, self._until or 0)
+                self._changed.notify_all()
 
     def hear(self) -> None:
         """The page gave a sign of life."""
@@ -73,11 +84,23 @@ class SessionControl:
             if len(self._notes) < MAX_NOTES:
                 self._note(event, **fields)
 
-    def take_inputs(self) -> tuple[Input, ...]:
-        """All inputs since the last call."""
+    def take_inputs(self, step: int) -> tuple[Input, ...]:
+        """The inputs that count at a control step, in order: those for it, for earlier ones, and for none."""
         with self._changed:
-            taken, self._inputs = tuple(self._inputs), []
+            later = (i for i, new in enumerate(self._inputs) if new.step is not None and new.step > step)
+            count = next(later, len(self._inputs))
+            taken, self._inputs = tuple(self._inputs[:count]), self._inputs[count:]
         return taken
+
+    def wait_for_inputs(self, step: int, seconds: float) -> bool:
+        """Wait until all inputs for a control step have come, or the session stops, but no longer than `seconds`.
+
+        Returns whether they have come; a page that promises nothing is not waited for.
+        """
+        with self._changed:
+            return self._changed.wait_for(
+                lambda: self.state.phase is not RUNNING or self._until is None or self._until > step, seconds
+            )
 
     def take_notes(self) -> list[Note]:
         """All that is to be logged since the last call."""

@@ -12,16 +12,12 @@ from experiments.web.state import RUNNING, Trigger
 from experiments.web.worker.clock import Send
 from experiments.web.worker.control import SessionControl
 from experiments.web.worker.encoders import Encoder, H264Encoder, JpegEncoder
-from experiments.web.worker.frame_size import FIRST_SIZE, SIZES, FrameSize, pause_after
-from hud.projection import CameraView
+from experiments.web.worker.frame_size import SIZES, FrameSize, pause_after
 from hud.state import HudState, Marker
-from mjsim.model.avatar import EYE
 from mjsim.model.scene import Scene
 from mjsim.render import FAST, Renderer
-from mjsim.render.cameras import camera_pose
 from mjsim.world import World
 
-ASPECT = 4 / 3  # of all sizes
 COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # of the smallest size
 MAX_IN_FLIGHT = 3  # frames sent that the browser has not yet shown
 
@@ -81,11 +77,6 @@ class Drawer:
                 self._moment = None
             self._sent = self._seen = 0
             self._changed.notify()
-
-    def camera_view(self, data: Any) -> CameraView:
-        """The eye camera, in the shape of the frames."""
-        pose = camera_pose(self._scene.model, data, EYE, ASPECT)
-        return CameraView(pose.position, pose.rotation, pose.fovy, *SIZES[FIRST_SIZE])
 
     def note_seen(self, frame: int) -> None:
         """The browser has shown a frame."""

@@ -37,6 +37,12 @@ def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
     return {key: data_url(picture) for key, picture in found.items()}
 
 
+def scene_files(house: House) -> tuple[str, str]:
+    """Folder of the files of a house's scene on the server, and path of its floor for the house's person."""
+    folder = "/scene/0000000000000000/"
+    return folder, f"{folder}floor-{house.person.body_radius:g}.json"
+
+
 def preload(name: str) -> None:
     """Load a house, its pictures and the kernels before workers are forked; they retry and report what fails here.
 

@@ -117,9 +117,10 @@ class LiveSession:
         before: Sequence[dict[str, Any]] = (),
     ) -> None:
         self._journal = journal
-        self.config = config = _config_in(journal) or config
+        config = _config_in(journal) or config
         if config is None or is_over(journal):
             raise RecordError("the journal is empty" if config is None else "this session is over")
+        self.config: TrialConfig = config
         person = draw_person(config)
         self.house = house.for_person(person)
         self.scene = compose(trial_episode(config, self.house), self.house.catalogue, person=person)

@@ -77,8 +77,8 @@ class Worker:
             case Open():
                 self._control = SessionControl(self._send)
                 self._opened.put((message, self._control))
-            case Inputs(inputs):
-                self._control.add(inputs)
+            case Inputs(inputs, until):
+                self._control.add(inputs, until)
             case Run():
                 self._control.apply(Trigger.RUN)
             case Pause(reason):

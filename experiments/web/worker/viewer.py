@@ -1,22 +1,31 @@
-"""Watches a session for the browser: frames, snapshots, and the HUD beside the frames."""
+"""Watches a session for the browser: frames, or states for a client that draws, and the HUD beside the picture."""
 
 import dataclasses
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import msgspec
+import numpy as np
 
 from experiments.session.viewer import Viewer
 from experiments.web.controls import act
-from experiments.web.protocol import Busy, Hud, Moment, Reach, Snapshot, View, WireMessage
+from experiments.web.protocol import Busy, Hud, Markers, Moment, Pictures, Reach, View, WireMessage
+from experiments.web.worker import houses
 from experiments.web.worker.clock import Send
 from experiments.web.worker.drawing import Drawer
 from experiments.web.worker.live_session import LiveSession
+from experiments.web.worker.snapshots import SnapshotStream, scene_of
 from hud.projection import CameraView, project
 from hud.state import HudState
 from mjsim.actions import Pick
-from mjsim.model.sight import visible_objects
+from mjsim.model.avatar import EYE
 from mjsim.observation import Observation
+from mjsim.person_parameters import PICTURE_ASPECT
+from mjsim.render.cameras import camera_pose
 from mjsim.world import World
+
+HEIGHT = 480  # px of the picture for which things are projected; any will do
 
 
 class BrowserViewer(Viewer):
@@ -28,8 +37,10 @@ class BrowserViewer(Viewer):
         self.drawer: Drawer | None = None
         self.view: View | None = None
         self._shown: tuple[HudState, bool] | None = None
-        self._shown_to: View | None = None
+        self._shown_to: tuple[View, LiveSession] | None = None
         self._sent: dict[type[WireMessage], WireMessage] = {}
+        self._snapshots: SnapshotStream | None = None
+        self._step = -1  # of the last snapshot
 
     def set_view(self, view: View | None) -> None:
         """Show everything anew, to a browser that has just connected; None repeats the view before."""
@@ -38,36 +49,56 @@ class BrowserViewer(Viewer):
             self.drawer.set_view(self.view)
 
     def camera(self, world: World) -> CameraView | None:
-        """The eye camera, for a pointer to targets out of view."""
-        return None if self.drawer is None else self.drawer.camera_view(world.data)
+        """The eye camera, for a pointer to targets out of view: as wide as the person sees, in the view's shape."""
+        view = self.view
+        if view is None:
+            return None
+        aspect = view.width / view.height if view.codec == "none" else PICTURE_ASPECT
+        pose = camera_pose(world.model, world.data, EYE, aspect)
+        fovy = 2.0 * math.atan(math.tan(world.scene.person.field_of_view / 2.0) / aspect)
+        return CameraView(pose.position, pose.rotation, fovy, max(1, round(HEIGHT * aspect)), HEIGHT)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
         """Send what changed; a session shows every state twice, before a control step and after the one before."""
-        view = self.view
-        if self.live is None or self.drawer is None or view is None:
+        view, live = self.view, self.live
+        if live is None or self.drawer is None or view is None:
             return
-        if view is not self._shown_to:
-            self._shown_to, self._shown = view, None
-            self._sent.clear()
+        if self._shown_to is None or self._shown_to[0] is not view or self._shown_to[1] is not live:
+            self._begin(view, live)
         hidden = self.drawer.hidden
         if self._shown is not None and self._shown[0] is hud_state and self._shown[1] is hidden:
             return
         self._shown = hud_state, hidden
-        step, number = self.live.session.record.step, self.live.input
-        self.drawer.draw(world, hud_state, step, number, hidden)
+        step = live.session.record.step
+        self.drawer.draw(world, hud_state, step, live.input, hidden)
         if hidden:
             return
-        if view.snapshots:
-            self._send(_snapshot(world, observation, hud_state, step, number))
-        for message in (
-            _hud(hud_state),
-            self._moment(self.live, observation, hud_state, step),
-            Busy(observation.busy),
-        ):
+        if self._snapshots is not None and step != self._step:
+            self._step = step
+            self._send(self._snapshots.next(observation, step))
+        for message in self._beside(live, observation, hud_state, step):
             content = msgspec.structs.replace(message, step=0) if isinstance(message, Moment) else message
             if self._sent.get(type(message)) != content:
                 self._sent[type(message)] = content
                 self._send(message)
+
+    def _begin(self, view: View, live: LiveSession) -> None:
+        """Begin to show a session in a view."""
+        self._shown_to, self._shown, self._step, self._snapshots = (view, live), None, -1, None
+        self._sent.clear()
+        if view.codec == "none":
+            self._snapshots = SnapshotStream(live)
+            self._send(scene_of(live))
+            floor_plan = "minimap" in live.config.assistance
+            self._send(Pictures(houses.encoded_pictures(live.config.house, floor_plan)))
+
+    def _beside(
+        self, live: LiveSession, seen: Observation, state: HudState, step: int
+    ) -> Iterator[WireMessage]:
+        """What is shown beside and in the picture."""
+        yield _hud(state)
+        yield self._moment(live, seen, state, step)
+        yield Busy(seen.busy) if self._snapshots is None else Markers(state.markers)
 
     def _moment(self, live: LiveSession, seen: Observation, state: HudState, step: int) -> Moment:
         rooms = live.house.rooms
@@ -83,6 +114,7 @@ class BrowserViewer(Viewer):
             return None
         catalogue, episode = live.house.catalogue, live.scene.episode
         model = next(item.model for item in episode.objects if item.name == result.object)
+        place: Any
         if isinstance(result.action, Pick):
             receptacle, place = None, seen.object_positions[seen.object_names.index(result.object)]
         else:
@@ -91,24 +123,8 @@ class BrowserViewer(Viewer):
         ((x, y),), (depth,) = project(camera, [place])
         at = (round(float(x) / camera.width, 4), round(float(y) / camera.height, 4))
         in_view = depth > 0.0 and all(0.0 <= share <= 1.0 for share in at)
-        return Reach(catalogue.objects[model].label, receptacle, at if in_view else None)
-
-
-def _snapshot(world: World, seen: Observation, state: HudState, step: int, number: int) -> Snapshot:
-    """What the person sees; objects that are neither in view nor in hand are left out."""
-    poses = zip(
-        seen.object_names, seen.object_positions.tolist(), seen.object_quaternions.tolist(), strict=True
-    )
-    in_view = visible_objects(world.scene, world.data, seen.eye, seen.heading, seen.pitch)
-    shown = {*in_view, *seen.carried}
-    return Snapshot(
-        step,
-        number,
-        seen.time,
-        [*map(float, seen.eye), seen.heading, seen.pitch],
-        {name: [*position, *quaternion] for name, position, quaternion in poses if name in shown},
-        state,
-    )
+        label, (px, py, pz) = catalogue.objects[model].label, np.round(place, 4).tolist()
+        return Reach(label, receptacle, at if in_view else None, result.object, (px, py, pz))
 
 
 def _hud(state: HudState) -> Hud:

@@ -152,7 +152,7 @@ async def _press_at_random(folder, seconds):
     rng = np.random.default_rng(13)
     words = ("--phases", TASK, "--time-limit", "86400", "--sessions", "2", *FAST)
     with PlayProcess(folder, *words) as server:
-        browser = SimulatedBrowser(server.begin(), codec="jpeg", snapshots=True, size=(320, 240))
+        browser = SimulatedBrowser(server.begin(), codec="jpeg", size=(320, 240))
         await browser.open(TASK)
         await browser.run()
         processes = (worker_of(server.journal(browser.address, TASK)), server.process.pid)

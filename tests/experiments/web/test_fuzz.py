@@ -23,7 +23,7 @@ HELLO = {
     "type": "hello",
     "tab": "fuzzer-0000",
     "trial": "training",
-    "view": {"type": "view", "width": 640, "height": 480, "codec": "none", "snapshots": False},
+    "view": {"type": "view", "width": 640, "height": 480, "codec": "none"},
 }
 VALUES = [None, -1, 1e308, float("nan"), "x", [], {}, True, 2**70, "\x00", "ä" * 50]
 SMALL = ['{"type":"run"}', '{"type":"takeover"}', '{"type":"leave","x":1}', "{}", "", "null"]

@@ -61,7 +61,7 @@ const screen = new Screen(
   },
 );
 /** @returns {View} */
-const view = () => ({ type: "view", ...screen.size, codec, snapshots: false });
+const view = () => ({ type: "view", ...screen.size, codec });
 const connection = new Connection(() => ({ type: "hello", tab, trial, view: view() }), take);
 const inputs = new Inputs((input) => meter.sent(connection.input(input)));
 const bindings = new Bindings();

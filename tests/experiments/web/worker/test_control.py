@@ -55,8 +55,8 @@ def test_what_is_sent_again_counts_once():
     control.apply(Trigger.RESTORED, "disconnected", last=7)
     for numbers in ((7, 8), (8, 9, 10), (10,), (11,)):
         control.add([Input(number=number) for number in numbers])
-    assert [new.number for new in control.take_inputs()] == [8, 9, 10, 11]
-    assert control.take_inputs() == () and control.state.input == 11
+    assert [new.number for new in control.take_inputs(0)] == [8, 9, 10, 11]
+    assert control.take_inputs(0) == () and control.state.input == 11
     assert control.state.reason == "disconnected"
 
 
@@ -65,7 +65,7 @@ def test_what_comes_while_the_clock_stands_holds_and_presses_nothing():
     control.add([Input(number=1, forward=1.0, press="act", scroll=2)])
     control.apply(Trigger.PAUSE, "silent")
     control.add([Input(number=2, yaw=1.0, press="act", scroll=3)])
-    assert control.take_inputs() == (Input(number=1, scroll=2), Input(number=2, scroll=3))
+    assert control.take_inputs(0) == (Input(number=1, scroll=2), Input(number=2, scroll=3))
 
 
 def test_a_silent_page_stops_the_clock(monkeypatch):
@@ -100,3 +100,21 @@ def test_start_pauses_and_blurs_are_noted_in_order_with_their_time():
     notes = control.take_notes()
     assert [event for event, _ in notes] == ["started", "pause", "blur", "resume"]
     assert all(fields["wall"] > 0.0 for _, fields in notes) and control.take_notes() == []
+
+
+def test_inputs_count_at_their_step_or_at_the_next_one_in_order():
+    _, control = after(Trigger.OPENED, Trigger.RUN)
+    stamps = {1: 3, 2: None, 3: 5, 4: 4, 5: 6}  # number -> step; one without a step waits for those before it
+    control.add([Input(number=number, step=step) for number, step in stamps.items()], until=7)
+    taken = [[new.number for new in control.take_inputs(step)] for step in range(2, 8)]
+    assert taken == [[], [1, 2], [], [3, 4], [5], []]
+
+
+def test_the_clock_waits_for_what_was_promised_only():
+    _, control = after(Trigger.OPENED, Trigger.RUN)
+    assert control.wait_for_inputs(0, 0.0), "a page that promises nothing is not waited for"
+    control.add([], until=3)
+    assert control.wait_for_inputs(2, 0.0) and not control.wait_for_inputs(3, 0.01)
+    control.apply(Trigger.PAUSE, "asked")
+    control.apply(Trigger.RUN)
+    assert control.wait_for_inputs(3, 0.0), "a pause forgets promises"

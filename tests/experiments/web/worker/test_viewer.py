@@ -3,16 +3,20 @@
 from types import SimpleNamespace
 
 import msgspec
+import numpy as np
 import pytest
 
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
-from experiments.web.protocol import Hud, Moment, Snapshot, View
-from experiments.web.worker.drawing import Drawer
+from experiments.web.controls import Input
+from experiments.web.protocol import Hud, Markers, Moment, Scene, Snapshot, View
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.viewer import BrowserViewer
+from mjsim.fidelity import kinematics
 
 CONFIG = TrialConfig(objects=3, assistance="guided", seed=3, user="human", live=True, fidelity="event")
+DRAWS = View(1920, 1080, "none")
+BESIDE = {"Hud", "Moment"}
 
 
 @pytest.fixture
@@ -24,37 +28,78 @@ def shown(tmp_path, house):
     drawer = SimpleNamespace(hidden=True, drawn=[], scene=live.scene)
     drawer.draw = lambda *moment: drawer.drawn.append(moment[-1])
     drawer.set_view = lambda _: None
-    drawer.camera_view = lambda data: Drawer.camera_view(SimpleNamespace(_scene=live.scene), data)
     viewer.live, viewer.drawer = live, drawer
-    viewer.set_view(View(640, 480, snapshots=True))
+    viewer.set_view(DRAWS)
     return SimpleNamespace(viewer=viewer, sent=sent, live=live, drawer=drawer)
+
+
+def kinds(shown):
+    return {type(message).__name__ for message in shown.sent}
+
+
+def of_kind(shown, kind):
+    return [message for message in shown.sent if isinstance(message, kind)]
 
 
 def test_nothing_of_the_task_is_sent_while_the_clock_stands(shown):
     shown.live.session.show()
-    assert shown.sent == [] and shown.drawer.drawn == [True]
+    assert kinds(shown) == {"Scene", "Pictures"} and shown.drawer.drawn == [True]
     shown.drawer.hidden = False
     shown.live.session.show()
-    assert {type(message).__name__ for message in shown.sent} == {"Snapshot", "Hud", "Moment", "Busy"}
+    assert kinds(shown) == {"Scene", "Pictures", "Snapshot", "Markers", *BESIDE}
     assert shown.drawer.drawn == [True, False]
 
 
-def test_a_snapshot_has_only_what_is_in_view(shown, monkeypatch):
+def test_a_client_that_shows_frames_gets_no_states(shown):
     shown.drawer.hidden = False
-    names = shown.live.world.observation().object_names
-    for in_view in ((), names[1:2]):
-        monkeypatch.setattr("experiments.web.worker.viewer.visible_objects", lambda *_, seen=in_view: seen)
-        shown.viewer.set_view(View(640, 480, snapshots=True))
+    shown.viewer.set_view(View(640, 480))
+    shown.live.session.show()
+    assert kinds(shown) == {"Busy", *BESIDE}
+
+
+def test_the_scene_has_what_a_prediction_needs(shown):
+    shown.live.session.show()
+    (scene,) = of_kind(shown, Scene)
+    assert scene.gait == protocol.Gait(*kinematics.Gait.of(shown.live.scene, shown.live.world.options))
+    assert msgspec.structs.asdict(scene.gait).keys() == set(kinematics.Gait._fields)
+    assert scene.field_of_view == shown.live.scene.person.field_of_view and scene.step_duration == 0.04
+
+
+def test_snapshots_have_the_body_and_what_changed(shown, monkeypatch):
+    shown.drawer.hidden = False
+    names, seen = shown.live.world.observation().object_names, []
+    monkeypatch.setattr("experiments.web.worker.snapshots.visible_objects", lambda *_: tuple(seen))
+    for now in (names[:2], names[:2], names[1:]):
+        seen[:] = now
+        shown.live.step([Input(number=shown.live.input + 1, forward=1.0)])
         shown.live.session.show()
-        snapshot = [message for message in shown.sent if isinstance(message, Snapshot)][-1]
-        assert tuple(snapshot.objects) == in_view
+    snapshots = of_kind(shown, Snapshot)
+    assert [snapshot.step for snapshot in snapshots] == [0, 1, 2, 3]
+    assert [snapshot.input for snapshot in snapshots] == [0, 1, 2, 3]
+    assert [list(snapshot.objects) for snapshot in snapshots] == [list(names[:2]), [], [], [names[2]]]
+    assert [snapshot.gone for snapshot in snapshots] == [[], [], [], [names[0]]]
+    models = {item.name: item.model for item in shown.live.scene.episode.objects}
+    assert snapshots[0].models == {name: models[name] for name in names[:2]}
+    assert np.array_equal(snapshots[-1].body, shown.live.world.body)
+    assert np.shape(snapshots[-1].hands) == (2, 3) and snapshots[-1].held == (None, None)
+
+
+def test_a_view_that_is_opened_anew_gets_everything(shown):
+    shown.drawer.hidden = False
+    shown.live.session.show()
+    before = kinds(shown)
+    shown.sent.clear()
+    shown.viewer.set_view(View(1280, 720, "none"))
+    shown.live.session.show()
+    assert kinds(shown) == before
 
 
 def test_the_display_has_no_markers_and_survives_the_way_to_the_page(shown):
     shown.drawer.hidden = False
     shown.live.session.show()
-    hud = next(message for message in shown.sent if isinstance(message, Hud))
+    (hud,) = of_kind(shown, Hud)
     assert hud.state.markers == () and hud.state.checklist and hud.state.clock is None
+    assert of_kind(shown, Markers)[0].markers
     for message in shown.sent:
         assert protocol.decode_from_worker(protocol.encode(message)) == message
         assert msgspec.json.decode(protocol.encode_to_browser(message))["type"]
@@ -64,16 +109,23 @@ def test_a_moment_names_the_room_and_what_the_action_key_would_take(shown):
     shown.drawer.hidden = False
     world, live = shown.live.world, shown.live
     shown.live.session.show()
-    before = [message for message in shown.sent if isinstance(message, Moment)]
+    before = of_kind(shown, Moment)
     assert before[-1].room in live.house.rooms.labels.values() and before[-1].reach is None
     seen = world.observation()
     item = live.scene.episode.objects[0]
-    at = seen.object_positions[seen.object_names.index(item.name)]
-    person = seen.position
     world.answer = lambda action: SimpleNamespace(
         applied=type(action).__name__ == "Pick", action=action, object=item.name, refusal=None
     )
     reach = shown.viewer._reach(live, seen)
     assert reach.object == live.house.catalogue.objects[item.model].label and reach.receptacle is None
     assert reach.at is None or all(0.0 <= share <= 1.0 for share in reach.at)
-    assert at.shape == (3,) and person.shape == (2,)
+    assert reach.instance == item.name
+    assert np.allclose(reach.place, seen.object_positions[seen.object_names.index(item.name)], atol=1e-4)
+
+
+@pytest.mark.parametrize(("view", "aspect"), [(DRAWS, 16 / 9), (View(640, 360), 4 / 3)])
+def test_a_camera_is_as_wide_as_the_person_sees_whatever_the_shape_of_the_view(shown, view, aspect):
+    shown.viewer.set_view(view)
+    camera, person = shown.viewer.camera(shown.live.world), shown.live.scene.person
+    assert camera.width / camera.height == pytest.approx(aspect, abs=0.01)
+    assert 2.0 * np.arctan(aspect * np.tan(camera.fovy / 2.0)) == pytest.approx(person.field_of_view)

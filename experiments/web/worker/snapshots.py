@@ -1,0 +1,78 @@
+"""The states of a session for a client that draws: what it may know, and of that what has changed."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from experiments.web.protocol import Gait, Scene, Snapshot, Speeds
+from experiments.web.worker.houses import scene_files
+from experiments.web.worker.live_session import LiveSession
+from mjsim.fidelity import kinematics
+from mjsim.model.sight import visible_objects
+from mjsim.observation import Observation
+
+METRES, QUATERNIONS = 4, 4  # decimals of positions and orientations
+
+
+def scene_of(live: LiveSession) -> Scene:
+    """Where the files of a session's scene are, and how its person moves."""
+    person, options = live.scene.person, live.world.options
+    path, floor = scene_files(live.house)
+    return Scene(
+        path,
+        floor if live.config.fidelity == "event" else None,
+        Gait(**kinematics.Gait.of(live.scene, options)._asdict()),
+        Speeds(person.walking_speed, person.turning_speed, person.looking_speed),
+        person.field_of_view,
+        options.control_timestep,
+    )
+
+
+class SnapshotStream:
+    """Snapshots of a session for a client that has seen none yet."""
+
+    def __init__(self, live: LiveSession) -> None:
+        self._live = live
+        self._models = {item.name: item.model for item in live.scene.episode.objects}
+        self._sent: dict[str, list[float]] = {}
+
+    def next(self, seen: Observation, step: int) -> Snapshot:
+        """The snapshot of the state before a control step."""
+        world = self._live.world
+        poses, known = _poses(seen), self._known(seen)
+        entered = [name for name in known if name not in self._sent]
+        gone = [name for name in self._sent if name not in known]
+        changed = {name: poses[name] for name in known if self._sent.get(name) != poses[name]}
+        self._sent = {name: poses[name] for name in known}
+        left, right = seen.hands
+        return Snapshot(
+            step=step,
+            input=self._live.input,
+            time=round(seen.time, 6),
+            busy=seen.busy,
+            body=world.body.tolist(),
+            eye=_rounded([*seen.eye, seen.heading, seen.pitch]),
+            hands=np.round(world.hands, METRES).tolist(),
+            held=(left, right),
+            objects=changed,
+            models={name: self._models[name] for name in entered},
+            gone=gone,
+        )
+
+    def _known(self, seen: Observation) -> tuple[str, ...]:
+        """Names of the objects that the client may know, in the episode's order."""
+        world = self._live.world
+        shown = {*visible_objects(world.scene, world.data, seen.eye, seen.heading, seen.pitch), *seen.carried}
+        return tuple(name for name in seen.object_names if name in shown)
+
+
+def _poses(seen: Observation) -> dict[str, list[float]]:
+    """Rounded poses of all objects by name."""
+    poses = np.hstack(
+        (np.round(seen.object_positions, METRES), np.round(seen.object_quaternions, QUATERNIONS))
+    )
+    return dict(zip(seen.object_names, poses.tolist(), strict=True))
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    return [round(float(value), METRES) for value in values]
