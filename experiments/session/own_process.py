@@ -26,7 +26,7 @@ _NAMES = ("user", "assistance", "training_assistance", "planner")
 _OWN = re.compile(r":[A-Za-z_]")  # package.module:attribute
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
 _SHARED = "MJSIM_OWN_PROCESS"  # names the file that a child shares with its parent, and the child
-_CALLS, _CALLED, _ENDED, _FATAL, _HOW = 0, 8, 16, 24, 32  # places in that file
+_CALLS, _CALLED, _ENDED, _FATAL, _HOW, _WHAT = 0, 8, 16, 24, 32, 4128  # places in that file
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,23 @@ class SharedCalls:
         """Write a number at a place of the file."""
         os.pwrite(self.file, struct.pack("q", value), place)
 
+    def read_text(self, place: int) -> str:
+        """The text at a place of the file."""
+        return os.pread(self.file, _WHAT - _HOW, place).decode(errors="replace").rstrip("\0")
+
+    def write_text(self, place: int, text: str) -> None:
+        """Write a text at a place of the file."""
+        size = _WHAT - _HOW
+        os.pwrite(self.file, text.encode(errors="replace")[:size].ljust(size, b"\0"), place)
+
     def begin(self, what: str) -> None:
         """A call of a user's own code begins; raises a `UserCodeError` if it is the fatal one."""
         number = self.read(_CALLS) + 1
         if number == self.read(_FATAL):
-            raise UserCodeError(f"{what} {os.pread(self.file, 4096, _HOW).decode(errors='replace')}")
+            raise UserCodeError(f"{what} {self.read_text(_HOW)}")
         self.write(_CALLS, number)
         self.write(_CALLED, 1)
+        self.write_text(_WHAT, what)
 
     def end(self) -> None:
         """The call came back."""
@@ -61,7 +71,9 @@ class SharedCalls:
 
     def restart(self, fatal: int, how: str) -> None:
         """Count again, for another child that must not make the call of the number `fatal`."""
-        os.pwrite(self.file, struct.pack("4q", 0, 0, 0, fatal) + how.encode(errors="replace")[:4096], 0)
+        os.pwrite(self.file, struct.pack("4q", 0, 0, 0, fatal), 0)
+        self.write_text(_HOW, how)
+        self.write_text(_WHAT, "")
 
 
 def shared_calls() -> SharedCalls | None:
@@ -105,7 +117,8 @@ def _in_child(folders: Iterable[Path]) -> int | None:
             dump.seek(0)
             how = f"ended the process{f' by {signal.Signals(-code).name}' if code < 0 else ''}{_where(dump.read())}"
         if not shared.read(_CALLED):
-            raise UserCodeError(f"code of your own {how}, outside of its calls")
+            last = f"; the last was of {what}" if (what := shared.read_text(_WHAT)) else ""
+            raise UserCodeError(f"code of your own {how}, outside of its calls{last}")
         fatal = shared.read(_CALLS)
     raise UserCodeError(
         f"code of your own {how}; it does so at different calls, so that nothing could be kept"

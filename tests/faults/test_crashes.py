@@ -36,6 +36,7 @@ def test_a_run_whose_participant_crashes_is_kept(statement, how, house, tmp_path
     [
         (planner("os.abort()"), "planner 'own_code:Own' ended the process by SIGABRT"),
         ("import os; os.abort()", "code of your own ended the process by SIGABRT"),
+        (planner("signal.raise_signal(11)"), "planner 'own_code:Own' ended the process by SIGSEGV"),
         ("import os; os._exit(0)", "cannot make the planner 'own_code:Own': SystemExit"),
     ],
 )
@@ -45,6 +46,14 @@ def test_a_planner_that_crashes_says_where(text, said, tmp_path, mjsim, own_modu
     done = mjsim("plan", "problem.json", "--planner", "own_code:Own")
     assert (done.returncode, done.stdout) == (1, "")
     assert said in one_line(done.stderr) and "own_code.py, line" in done.stderr
+
+
+def test_a_signal_that_another_thread_gets_names_the_planner(tmp_path, mjsim, own_module):
+    """A process that sends itself a signal gets it in its main thread, where the call may be over."""
+    own_module(planner("os.kill(os.getpid(), 11)"))
+    (tmp_path / "problem.json").write_text(json.dumps(PROBLEM))
+    line = one_line(mjsim("plan", "problem.json", "--planner", "own_code:Own").stderr)
+    assert "ended the process by SIGSEGV" in line and "planner 'own_code:Own'" in line
 
 
 def test_a_signal_to_the_command_reaches_its_child(tmp_path, own_module):
