@@ -1,6 +1,7 @@
 // Draws the house, its objects and the person with WebGL 2. Everything is in the house frame: metres, z up.
 
-import { Group, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "../vendor/three.js";
+import { Group, Scene, WebGLRenderer } from "../vendor/three.js";
+import { HouseCamera } from "./camera.js";
 import { OUTPUT } from "./house_material.js";
 import { Markers } from "./markers.js";
 import { Outline } from "./outline.js";
@@ -11,20 +12,14 @@ import { Things } from "./things.js";
 
 /** @import { Object3D } from "../vendor/three.js" */
 /** @import { Marker } from "../protocol.js" */
+/** @import { Eye, FreeCamera, Place, Point } from "./camera.js" */
 /** @import { Resolve, SceneFile } from "./scene_files.js" */
 /** @import { Pose, Thing } from "./things.js" */
 /**
- * @typedef {number[]} Point x, y and z, m
- * @typedef {{ position: Point; heading: number; pitch: number }} Eye heading from +x to +y, pitch up, rad
- * @typedef {{ x: number; y: number; heading: number; hands: Point[] }} Person left and right hand in the body's frame
- * @typedef {{ position: Point; target: Point; fovy: number }} FreeCamera vertical field of view, rad
- * @typedef {{ x: number; y: number; ahead: boolean; inView: boolean }} Place in the view, 0 to 1 from its left and top
+ * @typedef {{ x: number; y: number; heading: number; hands: number[][] }} Person left and right hand in the body's frame
  * @typedef {{ calls: number; triangles: number; textures: number; milliseconds: number; renderer: string }} Info of the
  *   last frame: draw calls, triangles, textures in use, time of the main thread; and what draws
  */
-
-const NEAR = 0.04; // m, as mjsim draws
-const FAR = 100;
 
 /** There is no WebGL 2: the page has to show streamed frames. */
 export class NoWebGL extends Error {}
@@ -37,14 +32,9 @@ export class World3D {
   #renderer;
   #scene = new Scene();
   #house = new Group();
-  #camera = new PerspectiveCamera(60, 4 / 3, NEAR, FAR);
+  #camera = new HouseCamera();
   #outline = new Outline();
-  #horizontal = 1.5; // field of view, rad
-  #vertical = 0; // field of view of a free camera, rad
   #milliseconds = 0;
-  #point = new Vector3();
-  /** @type {Place} */
-  #place = { x: 0, y: 0, ahead: false, inView: false };
   /** @type {Object3D[]} */
   #ceilings = [];
   #person = new Group();
@@ -69,7 +59,6 @@ export class World3D {
     this.#house.rotation.x = -Math.PI / 2; // three.js has y up
     this.#house.updateMatrix();
     for (const group of [this.#scene, this.#house, this.#person]) group.matrixAutoUpdate = false;
-    this.#camera.rotation.order = "YXZ";
     this.#scene.add(this.#house);
     this.#house.add(this.#outline, this.#person);
     canvas.addEventListener("webglcontextlost", () => this.onLost());
@@ -119,64 +108,32 @@ export class World3D {
     this.#renderer.setPixelRatio(scale * (window.devicePixelRatio || 1));
     this.#renderer.setSize(Math.max(1, width), Math.max(1, height), false);
     this.#outline.resize(Math.max(1, width), Math.max(1, height));
-    this.#project();
+    this.#camera.resize(this.#canvas.width / this.#canvas.height);
   }
 
   /** @param {number} angle how wide the eye sees, rad, whatever the shape of the view */
   setFieldOfView(angle) {
-    this.#horizontal = angle;
-    this.#project();
-  }
-
-  #project() {
-    const aspect = this.#canvas.width / this.#canvas.height;
-    const vertical = this.#vertical || 2 * Math.atan(Math.tan(this.#horizontal / 2) / aspect);
-    this.#camera.fov = (vertical * 180) / Math.PI;
-    this.#camera.aspect = aspect;
-    this.#camera.updateProjectionMatrix();
+    this.#camera.horizontal = angle;
+    this.#camera.resize(this.#camera.aspect);
   }
 
   /** Looks through the person's eyes. @param {Eye} eye */
-  setEye({ position: [x = 0, y = 0, z = 0], heading, pitch }) {
-    if (this.#vertical) {
-      this.#vertical = 0;
-      this.#project();
-    }
-    this.#camera.position.set(x, z, -y);
-    this.#camera.rotation.set(pitch, heading - Math.PI / 2, 0);
-    this.#camera.updateMatrixWorld();
+  setEye(eye) {
+    this.#camera.setEye(eye);
   }
 
   /** Looks from anywhere. @param {FreeCamera} camera */
-  setCamera({ position: [x = 0, y = 0, z = 0], target, fovy }) {
-    if (this.#vertical !== fovy) {
-      this.#vertical = fovy;
-      this.#project();
-    }
-    this.#camera.position.set(x, z, -y);
-    this.#camera.lookAt(this.#upright(target));
-    this.#camera.updateMatrixWorld();
-  }
-
-  /** The house frame has z up, three.js has y up. @param {ArrayLike<number>} point */
-  #upright(point) {
-    return this.#point.set(point[0] ?? 0, point[2] ?? 0, -(point[1] ?? 0));
+  setCamera(camera) {
+    this.#camera.setFree(camera);
   }
 
   /**
    * Where a point appears.
-   * @param {ArrayLike<number>} point
+   * @param {Point} point
    * @returns {Readonly<Place>} the same value at every call
    */
   project(point) {
-    const place = this.#place;
-    const seen = this.#upright(point).applyMatrix4(this.#camera.matrixWorldInverse);
-    place.ahead = seen.z < -NEAR;
-    seen.applyMatrix4(this.#camera.projectionMatrix);
-    place.x = (1 + seen.x) / 2;
-    place.y = (1 - seen.y) / 2;
-    place.inView = place.ahead && Math.max(Math.abs(seen.x), Math.abs(seen.y)) <= 1;
-    return place;
+    return this.#camera.locate(point);
   }
 
   /** @param {boolean} shown what hangs above the rooms, as a view from above must not */
@@ -210,8 +167,8 @@ export class World3D {
     this.#person.matrixWorldNeedsUpdate = true;
     for (let side = 0; side < 2; side++) {
       const hand = this.#hands[side];
-      const [forward = 0, left = 0, up = 0] = hands[side] ?? [];
-      hand?.position.set(forward, left, up);
+      const place = hands[side];
+      if (place) hand?.position.fromArray(place);
       hand?.updateMatrix();
     }
   }
