@@ -19,8 +19,7 @@ vi.mock("../static/vendor/three.js", async (original) => ({
     info = { render: { calls: 3, triangles: 12 }, memory: { textures: 1 } };
     setPixelRatio() {}
     setSize() {}
-    compile() {}
-    initTexture() {}
+    async compileAsync() {}
     dispose() {}
     getContext() {
       return { getExtension: () => null, getParameter: () => "software", RENDERER: 0 };
@@ -33,7 +32,7 @@ vi.mock("../static/vendor/three.js", async (original) => ({
   },
 }));
 
-const HEADLIGHT = { ambient: [0.5, 0.5, 0.5], diffuse: [0, 0, 0] };
+const HEADLIGHT = { ambient: [0.5, 0.5, 0.5], diffuse: [0, 0, 0], specular: [0, 0, 0] };
 const SPOT = { type: "spot", position: [0, 0, 2], direction: [0, 0, -1], ambient: [0, 0, 0], diffuse: [1, 1, 1], specular: [0, 0, 0] };
 const LIGHT = { ...SPOT, type: "directional", direction: [1, 2, -2] };
 
@@ -170,12 +169,14 @@ describe("objects", () => {
   const pose = [1, 2, 0, 1, 0, 0, 0];
 
   test("enter, move, change their model and leave", async () => {
-    await world.loadModels(["mug"]);
-    await world.setObjects({ object_00: { model: "mug", pose } });
+    const loading = world.setObjects({ object_00: { model: "mug", pose } });
+    world.draw();
+    await loading;
     expect(placed(part("object"))).toEqual([1, 2, 0]);
     world.setPose("object_00", [3, 2, 1, Math.SQRT1_2, 0, 0, Math.SQRT1_2]);
     expect(placed(part("object"), [1, 0, 0])).toEqual([3, 3, 1]);
     world.setPose("object_99", pose); // not known: nothing happens
+    await world.loadModels(["mug"]); // known already
     await world.setObjects({});
     expect(part("object")).toBeUndefined();
     await expect(world.setObjects({ object_01: { model: "cup", pose } })).rejects.toThrow("no object model cup");

@@ -8,17 +8,12 @@ import { DynamicDrawUsage, InstancedBufferAttribute, InstancedMesh, Sphere } fro
 export class Instances extends InstancedMesh {
   #tint;
 
-  /**
-   * @param {BufferGeometry} geometry
-   * @param {Material} material
-   * @param {number} capacity
-   */
+  /** @param {BufferGeometry} geometry @param {Material} material @param {number} capacity */
   constructor(geometry, material, capacity) {
     super(geometry, material, capacity);
     this.#tint = new InstancedBufferAttribute(new Float32Array(4 * capacity), 4);
     geometry.setAttribute("tint", this.#tint);
-    this.instanceMatrix.setUsage(DynamicDrawUsage);
-    this.#tint.setUsage(DynamicDrawUsage);
+    for (const attribute of [this.instanceMatrix, this.#tint]) attribute.setUsage(DynamicDrawUsage);
     this.matrixAutoUpdate = false;
     this.frustumCulled = false;
     this.boundingSphere = new Sphere(); // else three.js computes one, which is of no use here
@@ -30,14 +25,7 @@ export class Instances extends InstancedMesh {
     this.visible = false;
   }
 
-  /**
-   * Past its capacity, nothing is added.
-   * @param {Matrix4} pose
-   * @param {number} red
-   * @param {number} green
-   * @param {number} blue
-   * @param {number} opacity
-   */
+  /** Past its capacity, nothing is added. @param {Matrix4} pose @param {number} red @param {number} green @param {number} blue @param {number} opacity */
   put(pose, red, green, blue, opacity) {
     if (this.count === this.instanceMatrix.count) return;
     this.setMatrixAt(this.count, pose);

@@ -1,25 +1,24 @@
 // Reads the files of a scene: GLBs in mjsim's look, pictures, and what scene.json says of them.
 
 import { GLTFLoader, Group, Mesh, Texture } from "../vendor/three.js";
-import { houseMaterial, lighting } from "./house_material.js";
+import { houseMaterial } from "./house_material.js";
 
-/** @import { Material, MeshStandardMaterial, Object3D } from "../vendor/three.js" */
-/** @import { Headlight, Light, Uniforms } from "./house_material.js" */
+/** @import { MeshStandardMaterial, Object3D } from "../vendor/three.js" */
+/** @import { Uniforms } from "./house_material.js" */
 /** @import { Box, ContactShadow } from "./shadows.js" */
 /**
  * @typedef {(name: string) => string} Resolve URL of a file of a scene by its name
  * @typedef {{ file: string; label: string; bounds: number[][]; boxes: Box[] }} ObjectModel
- * @typedef {{ label: string; polygon: number[][] }} Room
- * @typedef {{ house: string; person: string; objects: Record<string, ObjectModel>; rooms: Room[];
+ * @typedef {{ house: string; person: string; objects: Record<string, ObjectModel>; rooms: { label: string; polygon: number[][] }[];
  *   contact_shadow: ContactShadow | null; sky: string | null }} SceneFile what scene.json says
  */
 
-const DECALS = 1; // flat things on floors are drawn before other things that one can see through
-export const CLEAR = 3;
+const DECALS = 1; // flat things on floors are drawn before the others that one can see through
+const CLEAR = 3;
 
-/** Reads scene.json. @param {Resolve} resolve @returns {Promise<SceneFile>} */
-export async function readScene(resolve) {
-  return (await fetched(resolve("scene.json"))).json();
+/** @param {string} url @returns {Promise<SceneFile>} */
+export async function readScene(url) {
+  return (await fetched(url)).json();
 }
 
 /** A picture as it is stored. @param {string} url */
@@ -37,7 +36,7 @@ export async function readTexture(url) {
 }
 
 /**
- * The content of a GLB in the frame of the house, object or hand, without the node that turns it upright.
+ * The content of a GLB, without its root node, which turns z up into y up, and what that node says.
  * @param {string} url
  * @returns {Promise<{ group: Group; extras: Record<string, any> }>}
  */
@@ -50,40 +49,18 @@ export async function readModel(url) {
   return { group, extras: root.userData };
 }
 
-/**
- * Gives everything the look of mjsim.
- * @param {Object3D} group
- * @param {Uniforms} light
- */
+/** Gives everything the look of mjsim. @param {Object3D} group @param {Uniforms} light */
 export function dress(group, light) {
-  /** @type {Map<Material, Material>} */
-  const made = new Map();
   group.traverse((part) => {
     part.updateMatrix();
     part.matrixAutoUpdate = false;
     if (!(part instanceof Mesh)) return;
-    const source = /** @type {MeshStandardMaterial} */ (part.material);
-    const { specular = 0, shininess = 0, emission = 0 } = source.userData;
-    let material = made.get(source);
-    if (!material) {
-      material = houseMaterial(light, {
-        map: source.map,
-        blend: source.transparent,
-        shine: [specular, shininess, emission],
-        shines: Boolean(part.geometry.getAttribute("_shine")),
-      });
-      made.set(source, material);
-      source.dispose();
-    }
-    part.material = material;
-    if (material.transparent) part.renderOrder = source.userData["decal"] ? DECALS : CLEAR;
+    const { map, transparent, userData } = /** @type {MeshStandardMaterial} */ (part.material);
+    const { specular = 0, shininess = 0, emission = 0, decal } = userData;
+    const shines = Boolean(part.geometry.getAttribute("_shine"));
+    part.material = houseMaterial(light, { map, blend: transparent, shine: [specular, shininess, emission], shines });
+    if (transparent) part.renderOrder = decal ? DECALS : CLEAR;
   });
-}
-
-/** @param {Record<string, any>} extras of a house's root node */
-export function lightingOf(extras) {
-  const { lights = [], headlight } = /** @type {{ lights?: Light[]; headlight: Headlight }} */ (extras);
-  return lighting(lights, headlight);
 }
 
 /** @param {string} url */

@@ -1,11 +1,9 @@
 // The objects of an episode: each an instance of a model, with its contact shadow.
 
 import { Group } from "../vendor/three.js";
-import { dress, readModel } from "./scene_files.js";
 
 /** @import { Object3D } from "../vendor/three.js" */
-/** @import { Uniforms } from "./house_material.js" */
-/** @import { ObjectModel, Resolve } from "./scene_files.js" */
+/** @import { ObjectModel } from "./scene_files.js" */
 /** @import { ContactShadows } from "./shadows.js" */
 /**
  * @typedef {ArrayLike<number>} Pose position, m, and turn as a unit quaternion (w, x, y, z)
@@ -19,32 +17,23 @@ export class Things extends Group {
   #things = new Map(); // by instance
   #moved = true; // a shadow has to follow
   #files;
-  #resolve;
-  #light;
+  #read;
   #shadows;
-  #loaded;
 
   /**
    * @param {Record<string, ObjectModel>} files
-   * @param {Resolve} resolve
-   * @param {Uniforms} light
+   * @param {(file: string) => Promise<Object3D>} read
    * @param {ContactShadows | null} shadows
-   * @param {(model: Object3D) => void} loaded is called with every model
    */
-  constructor(files, resolve, light, shadows, loaded) {
+  constructor(files, read, shadows) {
     super();
-    this.#files = files;
-    this.#resolve = resolve;
-    this.#light = light;
-    this.#shadows = shadows;
-    this.#loaded = loaded;
     this.matrixAutoUpdate = false;
+    this.#files = files;
+    this.#read = read;
+    this.#shadows = shadows;
   }
 
-  /**
-   * What there is; an object shows as soon as its model is loaded.
-   * @param {Record<string, Thing>} things by instance
-   */
+  /** What there is, by instance; an object shows as soon as its model is loaded. @param {Record<string, Thing>} things */
   async set(things) {
     for (const [instance, { model, object }] of this.#things) {
       if (things[instance]?.model === model) continue;
@@ -57,31 +46,24 @@ export class Things extends Group {
 
   /** @param {string} instance @param {Thing} thing */
   async #put(instance, { model, pose }) {
-    if (!this.#things.has(instance)) {
-      const object = new Group();
-      object.matrixAutoUpdate = false;
-      this.add(object);
-      this.#things.set(instance, { model, object });
-      this.move(instance, pose);
-      object.add((await this.read(model)).clone());
-    } else this.move(instance, pose);
+    const known = this.#things.has(instance);
+    const object = this.object(instance) ?? new Group();
+    this.#things.set(instance, { model, object });
+    this.move(instance, pose);
+    if (known) return;
+    object.matrixAutoUpdate = false;
+    this.add(object);
+    object.add((await this.model(model)).clone());
+    object.matrixWorldNeedsUpdate = true; // it may have been drawn without its model
   }
 
-  /** Reads a model; each is read once. @param {string} name */
-  read(name) {
-    let model = this.#models.get(name);
-    if (!model) this.#models.set(name, (model = this.#read(name)));
-    return model;
-  }
-
-  /** @param {string} name */
-  async #read(name) {
+  /** Each model is read once. @param {string} name */
+  async model(name) {
     const file = this.#files[name]?.file;
     if (!file) throw new Error(`scene.json has no object model ${name}`);
-    const { group } = await readModel(this.#resolve(file));
-    dress(group, this.#light);
-    this.#loaded(group);
-    return group;
+    const model = this.#models.get(name) ?? this.#read(file);
+    this.#models.set(name, model);
+    return model;
   }
 
   /** @param {string} instance @param {Pose} pose */
@@ -106,9 +88,7 @@ export class Things extends Group {
     if (!this.#moved || !this.#shadows) return;
     this.#moved = false;
     this.#shadows.empty();
-    for (const { model, object } of this.#things.values()) {
-      this.#shadows.under(object, this.#files[model]?.boxes ?? []);
-    }
+    for (const { model, object } of this.#things.values()) this.#shadows.under(object, this.#files[model]?.boxes ?? []);
     this.#shadows.send();
   }
 }

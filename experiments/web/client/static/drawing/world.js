@@ -1,11 +1,11 @@
 // Draws the house, its objects and the person with WebGL 2. Everything is in the house frame: metres, z up.
 
-import { Group, Scene, WebGLRenderer } from "../vendor/three.js";
+import { Group, LinearSRGBColorSpace, Scene, WebGLRenderer } from "../vendor/three.js";
 import { HouseCamera } from "./camera.js";
-import { OUTPUT } from "./house_material.js";
+import { lighting } from "./house_material.js";
 import { Markers } from "./markers.js";
 import { Outline } from "./outline.js";
-import { dress, lightingOf, readModel, readPicture, readScene, readTexture } from "./scene_files.js";
+import { dress, readModel, readPicture, readScene, readTexture } from "./scene_files.js";
 import { ContactShadows } from "./shadows.js";
 import { skyOf } from "./sky.js";
 import { Things } from "./things.js";
@@ -34,10 +34,10 @@ export class World3D {
   #house = new Group();
   #camera = new HouseCamera();
   #outline = new Outline();
+  #person = new Group();
   #milliseconds = 0;
   /** @type {Object3D[]} */
   #ceilings = [];
-  #person = new Group();
   /** @type {(Object3D | undefined)[]} */
   #hands = [];
   /** @type {Things | null} */
@@ -45,17 +45,14 @@ export class World3D {
   /** @type {Markers | null} */
   #markers = null;
 
-  /**
-   * @param {HTMLCanvasElement} canvas one that has no other context
-   * @throws {NoWebGL}
-   */
+  /** @param {HTMLCanvasElement} canvas one that has no other context @throws {NoWebGL} */
   constructor(canvas) {
     const options = { alpha: false, antialias: true, stencil: true };
     const context = canvas.getContext("webgl2", { ...options, powerPreference: "high-performance" });
     if (!context) throw new NoWebGL("this browser has no WebGL 2");
     this.#canvas = canvas;
     this.#renderer = new WebGLRenderer({ ...options, canvas, context });
-    this.#renderer.outputColorSpace = OUTPUT;
+    this.#renderer.outputColorSpace = LinearSRGBColorSpace; // shaders give colours as the display takes them
     this.#house.rotation.x = -Math.PI / 2; // three.js has y up
     this.#house.updateMatrix();
     for (const group of [this.#scene, this.#house, this.#person]) group.matrixAutoUpdate = false;
@@ -64,13 +61,9 @@ export class World3D {
     canvas.addEventListener("webglcontextlost", () => this.onLost());
   }
 
-  /**
-   * Loads the house, the person, the sky and the contact shadow. It rejects where a file cannot be read.
-   * @param {Resolve} resolve URL of a file of the scene by its name
-   * @returns {Promise<SceneFile>}
-   */
+  /** Loads all but the models of objects; rejects where a file cannot be read. @param {Resolve} resolve @returns {Promise<SceneFile>} */
   async load(resolve) {
-    const file = await readScene(resolve);
+    const file = await readScene(resolve("scene.json"));
     const spot = file.contact_shadow;
     const [house, person, sky, round] = await Promise.all([
       readModel(resolve(file.house)),
@@ -78,28 +71,37 @@ export class World3D {
       file.sky ? readPicture(resolve(file.sky)).then(skyOf) : null,
       spot ? readTexture(resolve(spot.texture)) : null,
     ]);
-    const light = lightingOf(house.extras);
+    const light = lighting(house.extras["lights"] ?? [], house.extras["headlight"]);
     for (const { group } of [house, person]) dress(group, light);
     house.group.traverse((part) => part.userData["ceiling"] && this.#ceilings.push(part));
     this.#hands = ["left_hand", "right_hand"].map((name) => person.group.getObjectByName(name));
     const shadows = spot && round ? new ContactShadows(light, spot, round) : null;
-    this.#things = new Things(file.objects, resolve, light, shadows, (model) => this.#prepare(model));
+    const read = async (/** @type {string} */ name) => {
+      const { group } = await readModel(resolve(name));
+      dress(group, light);
+      return this.#prepared(group);
+    };
+    this.#things = new Things(file.objects, read, shadows);
     this.#markers = new Markers(light);
     this.#person.add(person.group);
     this.#house.add(house.group, this.#things, this.#markers);
     if (shadows) this.#house.add(shadows);
     if (sky) this.#scene.add(sky);
-    this.#prepare(this.#scene);
+    this.#scene.add(await this.#prepared(this.#house));
     return file;
   }
 
-  /** Compiles and uploads now, so that turning to a thing does not stutter. @param {Object3D} part */
-  #prepare(part) {
-    this.#renderer.compile(part, this.#camera, this.#scene);
-    part.traverse((child) => {
-      const map = /** @type {any} */ (child).material?.uniforms?.map?.value;
-      if (map) this.#renderer.initTexture(map);
-    });
+  /** Compiles and uploads all that a part needs, so that turning to it does not stutter. @template {Object3D} T @param {T} part */
+  async #prepared(part) {
+    await this.#renderer.compileAsync(part, this.#camera);
+    /** @type {Object3D[]} */
+    const culled = [];
+    part.traverse((child) => child.frustumCulled && culled.push(child));
+    for (const child of culled) child.frustumCulled = false;
+    this.#renderer.render(new Scene().add(part), this.#camera);
+    for (const child of culled) child.frustumCulled = true;
+    this.draw(); // over what was just drawn
+    return part;
   }
 
   /** Takes the size of the canvas on the page. @param {number} [scale] pixels of the drawing for one of the display */
@@ -127,31 +129,24 @@ export class World3D {
     this.#camera.setFree(camera);
   }
 
-  /**
-   * Where a point appears.
-   * @param {Point} point
-   * @returns {Readonly<Place>} the same value at every call
-   */
+  /** Where a point appears, the same value at every call. @param {Point} point @returns {Readonly<Place>} */
   project(point) {
     return this.#camera.locate(point);
   }
 
-  /** @param {boolean} shown what hangs above the rooms, as a view from above must not */
+  /** @param {boolean} shown what hangs above the rooms, which hides them from above */
   showCeilings(shown) {
     for (const part of this.#ceilings) part.visible = shown;
   }
 
-  /**
-   * What there is, by instance. An object shows as soon as its model is loaded; resolves when all are.
-   * @param {Record<string, Thing>} things
-   */
+  /** What there is, by instance; an object shows as soon as its model is loaded. @param {Record<string, Thing>} things */
   async setObjects(things) {
     await this.#things?.set(things);
   }
 
   /** Loads models of objects ahead of time. @param {string[]} models */
   async loadModels(models) {
-    await Promise.all(models.map((model) => this.#things?.read(model)));
+    await Promise.all(models.map((model) => this.#things?.model(model)));
   }
 
   /** @param {string} instance @param {Pose} pose */
@@ -165,10 +160,8 @@ export class World3D {
     this.#person.rotation.z = heading;
     this.#person.updateMatrix();
     this.#person.matrixWorldNeedsUpdate = true;
-    for (let side = 0; side < 2; side++) {
-      const hand = this.#hands[side];
-      const place = hands[side];
-      if (place) hand?.position.fromArray(place);
+    for (const [side, hand] of this.#hands.entries()) {
+      hand?.position.fromArray(hands[side] ?? [0, 0, 0]);
       hand?.updateMatrix();
     }
   }
@@ -192,11 +185,11 @@ export class World3D {
 
   /** @returns {Info} */
   info() {
-    const { render, memory } = this.#renderer.info;
+    const { render: { calls, triangles }, memory: { textures } } = this.#renderer.info;
     const gl = this.#renderer.getContext();
     const names = gl.getExtension("WEBGL_debug_renderer_info");
     const renderer = String(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
-    return { calls: render.calls, triangles: render.triangles, textures: memory.textures, milliseconds: this.#milliseconds, renderer };
+    return { calls, triangles, textures, milliseconds: this.#milliseconds, renderer };
   }
 
   /** Frees what the graphics card holds. */
