@@ -259,18 +259,21 @@ class DisplayEvent(LoggedEvent, frozen=True):
     """How well the person saw the session in the last 5 s, as the page measured it.
 
     Attributes:
-        renderer: What drew the picture.
+        draw: Who drew the picture: the browser, or the server, whose frames it showed.
+        renderer: What drew it.
         width: Width of the view, px of the page.
         height: Its height, px of the page.
         pixel_ratio: How many px of the screen one px of the page has.
         frames_per_s: Pictures shown a second.
         frame_ms: Median of the times between two pictures.
         frame_ms_95: 95 % of these times are shorter.
-        latency_ms: Median from an input to the picture that shows it; null where nothing was pressed.
+        latency_ms: Median from an input to the picture that shows it, or, where the browser draws, to the state of the
+            server that counts it; null where nothing was pressed.
         dropped: Pictures that came and were not shown.
         wall: When, s since 1970.
     """
 
+    draw: Literal["browser", "server"]
     renderer: str
     width: Count
     height: Count
@@ -280,6 +283,20 @@ class DisplayEvent(LoggedEvent, frozen=True):
     frame_ms_95: float
     latency_ms: float | None
     dropped: Count
+    wall: float
+
+
+class DrawEvent(LoggedEvent, frozen=True):
+    """The server draws from now on, because the browser cannot.
+
+    Attributes:
+        draw: Who draws now.
+        reason: Why the other one does not: `slow` (below 20 pictures a second), `context lost`, or what was lacking.
+        wall: When, s since 1970.
+    """
+
+    draw: Literal["browser", "server"]
+    reason: str
     wall: float
 
 

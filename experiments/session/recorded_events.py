@@ -9,7 +9,7 @@ from mjsim.observation import Observation
 
 WORLD_EVENTS = {kind.value: kind for kind in EventKind}
 # that come from outside of the simulation
-EXTERNAL_EVENTS = ("scroll", "overrun", "started", "pause", "resume", "blur", "display")
+EXTERNAL_EVENTS = ("scroll", "overrun", "started", "pause", "resume", "blur", "display", "draw")
 
 
 def catch_up(assistant: Assistant, observation: Observation, events: Sequence[Event]) -> None:

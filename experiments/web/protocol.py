@@ -25,6 +25,7 @@ KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # codes with which the server closes
 
 Codec = Literal["jpeg", "h264", "none"]
+Drawer = Literal["browser", "server"]  # who draws the picture
 PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
 Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # px
@@ -87,13 +88,14 @@ class Beat(WireMessage, frozen=True):
 class Display(WireMessage, frozen=True):
     """How well the person saw the session in the last 5 s; this is only logged.
 
-    `renderer` is what drew the picture, in words; `width` and `height` are those of the view, px of the page, and
-    `pixel_ratio` is how many px of the screen one of them has. `frames_per_s` counts the pictures that were shown,
+    `draw` is who drew, and `renderer` what drew, in words; `width` and `height` are those of the view, px of the page,
+    and `pixel_ratio` is how many px of the screen one of them has. `frames_per_s` counts the pictures that were shown,
     `frame_ms` and `frame_ms_95` are median and 95 % of the times between two of them, `latency_ms` the median from an
-    input to the picture that shows it, absent where nothing was pressed, and `dropped` counts the pictures that came
-    and were not shown.
+    input to the picture that shows it, or, where the browser draws, to the state of the server that counts it, absent
+    where nothing was pressed, and `dropped` counts the pictures that came and were not shown.
     """
 
+    draw: Drawer
     renderer: Annotated[str, msgspec.Meta(max_length=200)]
     width: Length
     height: Length
@@ -103,6 +105,13 @@ class Display(WireMessage, frozen=True):
     frame_ms_95: Measured
     dropped: Count
     latency_ms: Measured | None = None
+
+
+class Draw(WireMessage, frozen=True):
+    """Who draws from now on, and why no longer the other one; this is only logged."""
+
+    draw: Drawer
+    reason: Annotated[str, msgspec.Meta(max_length=200)]
 
 
 class Pause(WireMessage, frozen=True):
@@ -333,7 +342,7 @@ class Error(WireMessage, frozen=True):
     message: str
 
 
-FromBrowser = Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave
+FromBrowser = Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
 ToBrowser = (
     State
     | Taken
@@ -351,7 +360,7 @@ ToBrowser = (
     | Replaced
     | Error
 )
-ToWorker = Open | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave
+ToWorker = Open | Run | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
 FromWorker = State | Taken | Frame | Scene | Snapshot | Markers | Pictures | Hud | Moment | Busy | Saved
 
 decode_from_browser: Any = msgspec.json.Decoder(FromBrowser).decode

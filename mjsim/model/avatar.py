@@ -20,7 +20,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from mjsim.errors import AssetError
 from mjsim.model.hand_look import draw_hand
@@ -86,12 +85,6 @@ def eye_position(
     out = EYE_FORWARD * math.cos(pitch)
     height = eye_height + EYE_FORWARD * math.sin(pitch)
     return x + out * math.cos(heading), y + out * math.sin(heading), height
-
-
-def hand_positions(data: mujoco.MjData) -> NDArray[np.float64]:
-    """Positions of the left and the right hand in the frame of the body (forward, left, up), m, shape (2, 3)."""
-    body, hands = data.body(BODY), [data.body(f"{PREFIX}{hand}_hand").xpos for hand in HANDS]
-    return np.asarray((np.array(hands) - body.xpos) @ body.xmat.reshape(3, 3))
 
 
 def attach_avatar(

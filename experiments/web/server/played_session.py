@@ -13,6 +13,7 @@ from experiments.web import protocol
 from experiments.web.protocol import (
     Beat,
     Display,
+    Draw,
     Error,
     Inputs,
     Leave,
@@ -100,7 +101,7 @@ class PlayedSession:
 
     def take(self, message: Any) -> Error | None:
         """Take a message from the browser; why it was refused, or None."""
-        by_itself = isinstance(message, Seen | Beat | Display) or (
+        by_itself = isinstance(message, Seen | Beat | Display | Draw) or (
             isinstance(message, Inputs) and not message.inputs
         )
         if not by_itself:

@@ -19,6 +19,7 @@ from experiments.web import protocol
 from experiments.web.protocol import (
     Blur,
     Display,
+    Draw,
     Inputs,
     Leave,
     Open,
@@ -87,8 +88,8 @@ class Worker:
                 self._control.apply(Trigger.END, INTERRUPTED)
             case Blur(away):
                 self._control.note("blur", away=away)
-            case Display():
-                self._control.note("display", **msgspec.structs.asdict(message))
+            case Display() | Draw():
+                self._control.note(type(message).__name__.lower(), **msgspec.structs.asdict(message))
             case View():
                 self._viewer.set_view(message)
             case Seen(frame) if self._viewer.drawer is not None:

@@ -17,6 +17,8 @@ export class Connection {
   #wait = FIRST_WAIT;
   /** @type {Input[]} */
   #waiting = []; // inputs that are not taken yet
+  /** @type {Input[]} */
+  #unsent = []; // of them, those that wait for the end of their control step
   #next = 1;
   #open = false; // whether the session takes inputs
   #heard = performance.now();
@@ -54,15 +56,22 @@ export class Connection {
   }
 
   /**
-   * Sends an input, repeatedly until it is taken.
+   * Sends an input, repeatedly until it is taken; one of a control step is sent with the others of that step.
    * @param {Omit<Input, "number">} values
-   * @returns {number} its number
+   * @returns {Input}
    */
   input(values) {
     const input = { number: this.#next++, ...values };
     this.#waiting.push(input);
-    if (this.#open) this.send({ type: "inputs", inputs: [input] });
-    return input.number;
+    if (typeof values.step === "number") this.#unsent.push(input);
+    else if (this.#open) this.send({ type: "inputs", inputs: [input] });
+    return input;
+  }
+
+  /** Sends the inputs of control steps before `until`, of which there are no more. @param {number} until */
+  flush(until) {
+    if (!this.#open) return;
+    this.send({ type: "inputs", inputs: this.#unsent.splice(0, MAX_INPUTS), until });
   }
 
   /** Number of inputs that are not safe yet. */
@@ -100,6 +109,7 @@ export class Connection {
   }
 
   #repeat() {
+    this.#unsent = [];
     for (let i = 0; i < this.#waiting.length; i += MAX_INPUTS) {
       this.send({ type: "inputs", inputs: this.#waiting.slice(i, i + MAX_INPUTS) });
     }

@@ -84,6 +84,12 @@ export const queue = (position) => ({
   ],
 });
 
+/** @param {string} reason @returns {Dialog} */
+export const cannotDraw = (reason) => ({
+  title: "This browser cannot draw the apartment",
+  texts: [`It needs WebGL 2 (${reason}). Please try another browser, or another computer.`],
+});
+
 /** @type {Dialog} */
 export const OCCUPIED = {
   title: "This session is open in another page",

@@ -63,11 +63,11 @@ export class Hud {
     const due = this.#waiting.filter((moment) => moment.step <= step);
     this.#waiting = this.#waiting.slice(due.length);
     const moment = due.at(-1);
-    if (moment) this.#moment(moment);
+    if (moment) this.showMoment(moment);
   }
 
   /** @param {Moment} moment */
-  #moment({ clock, room, reach, pointer, minimap }) {
+  showMoment({ clock, room, reach, pointer, minimap }) {
     byId("clock", HTMLElement).textContent = clock === null ? "" : clockText(clock);
     byId("room", HTMLElement).textContent = room;
     this.#reach(reach);
@@ -91,8 +91,14 @@ export class Hud {
     if (!reach) return;
     const what = reach.receptacle ? `Put ${reach.object} into ${reach.receptacle}` : `Pick up ${reach.object}`;
     mark.replaceChildren(made("kbd", this.#key()), made("span", what));
-    mark.classList.toggle("away", !reach.at);
-    const [x, y] = reach.at ?? [0.5, 0.9];
+    this.moveReach(reach.at);
+  }
+
+  /** Puts the mark of what is in reach to a place in shares of the view. @param {[number, number] | null} at */
+  moveReach(at) {
+    const mark = byId("reach", HTMLElement);
+    mark.classList.toggle("away", !at);
+    const [x, y] = at ?? [0.5, 0.9];
     mark.style.left = `${100 * Math.min(Math.max(x, 0.15), 0.85)}%`;
     mark.style.top = `${100 * Math.min(Math.max(y, 0.15), 0.95)}%`;
   }

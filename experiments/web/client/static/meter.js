@@ -1,4 +1,5 @@
-// How well the person sees: frames a second, times between frames, latency from an input to the frame that shows it.
+// How well the person sees: frames a second, times between frames, latency from an input to the frame that shows it,
+// or, where the browser draws, to the state of the server that counts it.
 
 /** @import { Frame } from "./protocol.js" */
 
@@ -28,12 +29,23 @@ export class Meter {
 
   /** @param {Frame} frame */
   shown(frame) {
+    this.answered(frame.input);
+    this.drawn();
+  }
+
+  /** The server has counted all inputs up to this number. @param {number} input */
+  answered(input) {
     const now = performance.now();
     for (const [number, time] of this.#sent) {
-      if (number > frame.input) continue;
+      if (number > input) continue;
       this.#trips.push(now - time);
       this.#sent.delete(number);
     }
+  }
+
+  /** A picture is shown. */
+  drawn() {
+    const now = performance.now();
     if (this.#shown++) this.#gaps.push(now - this.#last);
     this.#last = now;
   }

@@ -1,6 +1,6 @@
 // The page on which a trial is played: joins view, controls, connection and dialogs.
 
-/** @import { Codec, PauseReason, View } from "./protocol.js" */
+/** @import { PauseReason } from "./protocol.js" */
 /** @import { Received } from "./connection.js" */
 
 import { Bindings, learnLayout } from "./bindings.js";
@@ -12,28 +12,26 @@ import { Help } from "./help.js";
 import { Hud } from "./hud.js";
 import { Inputs } from "./inputs.js";
 import { Keyboard } from "./keyboard.js";
-import { Meter } from "./meter.js";
+import { watchPage } from "./page_events.js";
 import { Panel } from "./panel.js";
+import { Picture } from "./picture.js";
 import { connectMouse, connectTouch } from "./pointer.js";
 import { BEAT_PERIOD, DISPLAY_PERIOD, MAX_SILENCE, TOO_MUCH } from "./protocol.js";
-import { Screen, bestCodec } from "./screen.js";
 import { Session } from "./session.js";
+import { Settings } from "./settings.js";
+import { Sounds } from "./sounds.js";
 import { rememberVisit } from "./visit.js";
 
-const HIDDEN_GRACE = 5000; // ms that the page may be hidden before the session is paused
 const DONE = 1500; // ms for which the end of a trial is shown
-const RESIZED = 300; // ms after which a new size of the page is sent
+const TICK = 20; // ms between two looks at the clock; pages in the background get no pictures to draw
 
 const page = byId("play", HTMLElement);
-const { trial = "", objects = "", wait = "0" } = page.dataset;
+const { trial = "", objects = "", wait = "0", draw = "auto" } = page.dataset;
 const endable = performance.now() + 1000 * Number(wait); // when the trial may be ended by hand, ms
 const canvas = byId("screen", HTMLCanvasElement);
 const tab = Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16)).join("-");
 
 const session = new Session();
-/** @type {Codec} */
-let codec = "jpeg";
-let renderer = "";
 let silent = false; // whether the link was lost without being closed
 const panel = new Panel(
   byId("panel", HTMLDialogElement),
@@ -46,24 +44,16 @@ const panel = new Panel(
   },
   () => canvas.focus(),
 );
-const meter = new Meter();
-const screen = new Screen(
-  canvas,
-  (frame) => {
-    connection.send({ type: "seen", frame: frame.number });
-    meter.shown(frame);
-    renderer = `frames of the server, ${frame.codec}, ${frame.width}x${frame.height}`;
-    hud.reached(frame.step);
-  },
-  () => {
-    codec = "jpeg";
-    sendView();
-  },
-);
-/** @returns {View} */
-const view = () => ({ type: "view", ...screen.size, codec });
-const connection = new Connection(() => ({ type: "hello", tab, trial, view: view() }), take);
-const inputs = new Inputs((input) => meter.sent(connection.input(input)));
+const picture = new Picture(new URLSearchParams(location.search).get("draw") ?? draw, {
+  send: (message) => connection.send(message),
+  flush: (until) => connection.flush(until),
+  shown: (step) => hud.reached(step),
+  loaded: () => session.phase === "ready" && showInstructions(),
+  failed: (reason) => panel.show(dialogs.cannotDraw(reason)),
+});
+const connection = new Connection(() => ({ type: "hello", tab, trial, view: picture.view }), take);
+const inputs = new Inputs((values) => picture.add(connection.input({ ...values, step: picture.drawn?.step ?? null })));
+const sounds = new Sounds();
 const bindings = new Bindings();
 const hud = new Hud(() => bindings.label("act"));
 const help = new Help(byId("help", HTMLDialogElement), bindings, () => canvas.focus());
@@ -86,19 +76,25 @@ function take(message) {
       session.take(message);
       showState();
       break;
-    case "frame":
-      meter.came(message);
-      screen.show(message);
-      if (session.phase === "ready") showInstructions(); // there is something to see now
-      break;
     case "pictures":
       hud.learn(message);
       break;
     case "hud":
       hud.show(message.state);
+      sounds.hear(message.state);
       break;
     case "moment":
       hud.expect(message);
+      picture.take(message);
+      break;
+    case "snapshot":
+      byId("busy", HTMLElement).hidden = !message.busy;
+      picture.take(message);
+      break;
+    case "frame":
+    case "markers":
+    case "scene":
+      picture.take(message);
       break;
     case "beat":
       if (session.phase === "running") connection.send({ type: "beat" }); // not by a timer: those of hidden pages are slow
@@ -125,14 +121,25 @@ function take(message) {
       else console.warn(`the server refused a message (${message.code}): ${message.message}`);
       break;
     case "closed":
-      screen.reset();
+      picture.reset();
       silent = false;
       if (!message.final) lose();
       else if (message.code === TOO_MUCH) panel.show(dialogs.CLOSED);
   }
 }
 
+/** @param {number} now ms */
+function drawFrame(now) {
+  requestAnimationFrame(drawFrame);
+  const drawn = session.phase === "running" ? picture.draw(now) : null;
+  if (!drawn) return;
+  hud.moveReach(drawn.reach);
+  sounds.walk(drawn.body[0] ?? 0, drawn.body[1] ?? 0);
+  byId("view", HTMLElement).classList.toggle("moving", drawn.moving);
+}
+
 function showState() {
+  if (session.phase !== "running") picture.drawn?.end();
   page.dataset.phase = session.phase; // the style sheet hides what belongs to the task while the clock does not run
   switch (session.phase) {
     case "loading":
@@ -172,14 +179,14 @@ function watchLink() {
 }
 
 function report() {
-  const { kilobits, ...seen } = meter.take();
+  const { kilobits, ...seen } = picture.report();
   const { width, height } = canvas.getBoundingClientRect();
   const size = { width: Math.max(1, Math.round(width)), height: Math.max(1, Math.round(height)) };
-  if (session.phase === "running" && renderer) {
-    connection.send({ type: "display", renderer, ...size, pixel_ratio: window.devicePixelRatio || 1, ...seen });
+  if (session.phase === "running" && seen.renderer) {
+    connection.send({ type: "display", ...seen, ...size, pixel_ratio: window.devicePixelRatio || 1 });
   }
   byId("debug", HTMLElement).textContent =
-    `${seen.latency_ms ?? "–"} ms · ${seen.frames_per_s} fps · ${kilobits} kbit/s · ${renderer} · ${connection.pending} not taken`;
+    `${seen.latency_ms ?? "–"} ms · ${seen.frames_per_s} fps · ${kilobits} kbit/s · ${seen.renderer} · ${connection.pending} not taken`;
 }
 
 function showInstructions() {
@@ -192,6 +199,8 @@ function showInstructions() {
 function run() {
   if (!session.run()) return;
   showState();
+  picture.drawn?.begin(performance.now());
+  sounds.unlock();
   connection.send({ type: "run" });
 }
 
@@ -218,32 +227,6 @@ function release() {
   inputs.release();
 }
 
-function sendView() {
-  screen.reset();
-  connection.send(view());
-}
-
-function watchPage() {
-  let hidden = 0;
-  document.addEventListener("visibilitychange", () => {
-    clearTimeout(hidden);
-    if (!document.hidden) return;
-    release();
-    hidden = window.setTimeout(() => pause("hidden"), HIDDEN_GRACE);
-  });
-  window.addEventListener("blur", () => {
-    release();
-    connection.send({ type: "blur", away: true });
-  });
-  window.addEventListener("focus", () => connection.send({ type: "blur", away: false }));
-  window.addEventListener("pagehide", () => connection.close());
-  let resized = 0;
-  window.addEventListener("resize", () => {
-    clearTimeout(resized);
-    resized = window.setTimeout(sendView, RESIZED);
-  });
-}
-
 byId("panel", HTMLDialogElement).addEventListener("keydown", (event) => {
   if (session.phase !== "paused" || bindings.action(event.code)?.name !== "pause") return;
   event.stopPropagation(); // else the view, which listens again, pauses anew
@@ -262,15 +245,31 @@ full.addEventListener("click", () => {
   if (document.fullscreenElement) document.exitFullscreen();
   else document.documentElement.requestFullscreen();
 });
-connectMouse(canvas, inputs, listens, () => hud.reach);
+const mouse = connectMouse(canvas, inputs, listens, () => hud.reach);
 connectTouch(canvas, byId("touch", HTMLElement), inputs, listens);
 connectGamepad(inputs, commands, listens);
-watchPage();
+watchPage({
+  release,
+  hidden: () => pause("hidden"),
+  blur: (away) => connection.send({ type: "blur", away }),
+  close: () => connection.close(),
+  resize: () => picture.resize(),
+  resized: () => picture.tellSize(),
+});
 setInterval(watchLink, 1000 * BEAT_PERIOD);
 setInterval(report, 1000 * DISPLAY_PERIOD);
+setInterval(() => session.phase === "running" && picture.drawn?.tick(performance.now()), TICK);
 byId("debug", HTMLElement).hidden = !new URLSearchParams(location.search).has("debug");
 rememberVisit();
 panel.show(dialogs.loading(false));
 learnLayout();
-codec = await bestCodec();
-connection.open();
+const lack = await picture.prepare();
+new Settings(byId("settings", HTMLFormElement), ({ sensitivity, inverted, sounds: audible, calm, text }) => {
+  Object.assign(mouse, { sensitivity, inverted });
+  sounds.on = audible;
+  if (picture.drawn) picture.drawn.calm = calm;
+  document.documentElement.classList.toggle("calm", calm);
+  document.documentElement.style.fontSize = `${100 * text}%`;
+});
+if (!lack || draw !== "browser") connection.open();
+requestAnimationFrame(drawFrame);

@@ -13,8 +13,10 @@ const LINE = 40; // px of the wheel for one row
  * @param {Inputs} inputs
  * @param {() => boolean} listens whether inputs are for the view
  * @param {() => boolean} reaches whether the action key would do something
+ * @returns {{ sensitivity: number, inverted: boolean }} what may be changed: a factor, and whether forward looks down
  */
 export function connectMouse(canvas, inputs, listens, reaches) {
+  const mouse = { sensitivity: 1, inverted: false };
   canvas.addEventListener("click", (event) => {
     if ((event instanceof PointerEvent && event.pointerType === "touch") || !listens()) return;
     canvas.focus();
@@ -25,7 +27,8 @@ export function connectMouse(canvas, inputs, listens, reaches) {
   });
   document.addEventListener("mousemove", (event) => {
     if (document.pointerLockElement !== canvas || !listens()) return;
-    inputs.look(-event.movementX * TURN_PER_PIXEL, -event.movementY * TURN_PER_PIXEL);
+    const turn = TURN_PER_PIXEL * mouse.sensitivity;
+    inputs.look(-event.movementX * turn, (mouse.inverted ? 1 : -1) * event.movementY * turn);
   });
   let rolled = 0;
   canvas.addEventListener(
@@ -40,6 +43,7 @@ export function connectMouse(canvas, inputs, listens, reaches) {
     },
     { passive: false },
   );
+  return mouse;
 }
 
 /**

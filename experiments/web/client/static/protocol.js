@@ -11,7 +11,8 @@
 /** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs What the person pressed, in order, each once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen The browser has shown a frame, by its number. */
 /** @typedef {{ type: "beat" }} Beat A sign of life: the server sends one twice a second, and the page sends one back. */
-/** @typedef {{ type: "display"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null }} Display How well the person saw the session in the last 5 s; this is only logged. */
+/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null }} Display How well the person saw the session in the last 5 s; this is only logged. */
+/** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw Who draws from now on, and why no longer the other one; this is only logged. */
 /** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "restarted" | "silent" | "taken over" }} Pause Stop the clock; the reason is logged. */
 /** @typedef {{ type: "blur"; away: boolean }} Blur The page lost the keyboard to another window, or got it back; this is only logged. */
 /** @typedef {{ type: "leave" }} Leave End the trial now. */
@@ -41,7 +42,7 @@
 /** @typedef {{ type: "replaced" }} Replaced Another page took the session over; this connection is closed. */
 /** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was refused and does not count: a code, and the reason in words. */
 /** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} Frame A frame of a view, by number from 1: the start of a control step, the last input that counts, and the picture. */
-/** @typedef {Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Pause | Blur | Leave} FromBrowser */
+/** @typedef {Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave} FromBrowser */
 /** @typedef {State | Taken | Scene | Snapshot | Markers | Pictures | Hud | Moment | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
 
 export const FRAME_HEAD_BYTES = 28;

@@ -19,7 +19,8 @@ export async function bestCodec() {
 
 export class Screen {
   #canvas;
-  #context;
+  /** @type {CanvasRenderingContext2D | null} */
+  #context = null; // there is none before the first frame: until then the canvas lets through what is below
   #shown;
   #failed;
   /** @type {VideoDecoder | null} */
@@ -36,9 +37,6 @@ export class Screen {
    */
   constructor(canvas, shown, failed) {
     this.#canvas = canvas;
-    const context = canvas.getContext("2d", { alpha: false });
-    if (!context) throw new Error("this browser draws no canvas");
-    this.#context = context;
     this.#shown = shown;
     this.#failed = failed;
   }
@@ -99,7 +97,8 @@ export class Screen {
       this.#newest = frame.number;
       if (this.#canvas.width !== frame.width) this.#canvas.width = frame.width;
       if (this.#canvas.height !== frame.height) this.#canvas.height = frame.height;
-      this.#context.drawImage(image, 0, 0, frame.width, frame.height);
+      this.#context ??= this.#canvas.getContext("2d", { alpha: false });
+      this.#context?.drawImage(image, 0, 0, frame.width, frame.height);
     }
     image.close();
     this.#shown(frame);

@@ -78,7 +78,7 @@ beforeEach(() => {
 describe("inputs", () => {
   test("wait until the session takes them", () => {
     const { connection, socket } = connected();
-    expect(connection.input({ forward: 1 })).toBe(1);
+    expect(connection.input({ forward: 1 }).number).toBe(1);
     socket.state("loading");
     socket.state("ready");
     expect(socket.numbers).toEqual([]);
@@ -114,7 +114,7 @@ describe("inputs", () => {
   test("of a page that was loaded again continue the numbers of the session", () => {
     const { connection, socket } = connected();
     socket.state("running", 41);
-    expect(connection.input({})).toBe(42);
+    expect(connection.input({}).number).toBe(42);
   });
 
   test("are sent in batches that the server accepts", () => {

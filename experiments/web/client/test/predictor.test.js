@@ -3,21 +3,10 @@ import { beforeEach, describe, expect, test } from "vitest";
 import { HEADING, PITCH, X, Y } from "../static/prediction/body.js";
 import { Predictor } from "../static/prediction/predictor.js";
 import { Walker } from "../static/prediction/walking.js";
+import { DT, EMPTY, GAIT, SPEEDS } from "./walks.js";
 
 /** @import { Input } from "../static/protocol.js" */
 
-const DT = 0.04;
-const SPEEDS = { walking_speed: 1.3, turning_speed: 2.5, looking_speed: 1.5 };
-const GAIT = {
-  max_speed: 1.4, max_turn: 2.5, max_look: 1.5, acceleration: 3, turn_acceleration: 15, dt: DT, substeps: 10, mass: 70,
-  walk_gain: 7000, walk_force: 600, inertia: 2.3, turn_gain: 250, turn_force: 120, head_inertia: 0.03,
-  head_stiffness: 120, head_damping: 4, head_force: 40, lowest: -1.3, highest: 1.05, radius: 0.2, eye_height: 1.6,
-  eye_forward: 0.06,
-};
-const EMPTY = {
-  edges: [], first: [0], boxes: [], near: [], near_first: [0, 0], origin_x: 0, origin_y: 0, rows: 1, columns: 1,
-  cell: 0.25, margin: 0.12,
-};
 const predictor = () => new Predictor(new Walker(GAIT, EMPTY), SPEEDS, DT, 0, new Float64Array(16));
 
 /** @param {number} number @param {Partial<Input>} values @returns {Input} */
@@ -143,6 +132,20 @@ describe("a correction", () => {
     mine.advance();
     expect(mine.step).toBe(31);
   });
+});
+
+test("a walk that is physics is shown as the server says, without jumps", () => {
+  mine = new Predictor(null, SPEEDS, DT, 0, new Float64Array(16));
+  const eye = new Eye();
+  server.add(input(1, { forward: 1 }));
+  for (let k = 0; k < 50; k++) {
+    mine.correct(k, state(), false);
+    for (const share of [0, 0.4, 0.8]) eye.look(mine, share);
+    mine.advance();
+    server.advance();
+  }
+  expect(eye.jump).toBeLessThan(0.06);
+  expect(mine.drawn(0)[X]).toBeCloseTo(server.drawn(0)[X] ?? NaN, 0);
 });
 
 describe("a pick or place", () => {

@@ -18,7 +18,7 @@ const POSE = 4; // numbers: x, y, heading and pitch
 
 export class Predictor {
   step; // the next control step
-  predicting = true; // false while a pick or place is under way, which only the server knows
+  predicting; // false while only the server knows: a pick or place is under way, or the walk is physics
   #walker;
   #speeds;
   #duration;
@@ -34,11 +34,13 @@ export class Predictor {
   #ahead = new Float64Array(BODY_SIZE);
 
   /**
-   * @param {Walker} walker @param {Speeds} speeds @param {number} duration of a control step, s
+   * @param {Walker | null} walker null where walks cannot be predicted
+   * @param {Speeds} speeds @param {number} duration of a control step, s
    * @param {number} step the next one @param {ArrayLike<number>} body
    */
   constructor(walker, speeds, duration, step, body) {
     this.#walker = walker;
+    this.predicting = walker !== null;
     this.#speeds = speeds;
     this.#duration = duration;
     this.step = step;
@@ -75,7 +77,7 @@ export class Predictor {
   correct(step, body, busy) {
     const mine = step === this.step ? this.#body : this.#kept.get(step)?.body;
     const before = this.predicting;
-    this.predicting = !busy;
+    this.predicting = !busy && this.#walker !== null;
     if (mine && before === this.predicting && !differ(mine, body)) return;
     const shown = this.drawn(0).slice();
     this.#body.set(body);
@@ -123,7 +125,7 @@ export class Predictor {
   #apply(body, controls, inputs) {
     const [heading, pitch] = [body[HEADING] ?? 0, body[PITCH] ?? 0];
     const next = controlStep(controls, inputs, heading, pitch, this.#speeds, this.#duration);
-    if (this.predicting) this.#walker.step(body, next.move);
+    if (this.predicting) this.#walker?.step(body, next.move);
     return next.controls;
   }
 }

@@ -1,0 +1,166 @@
+// The view that this browser draws: scene, prediction of one's own walk, and what the server says about the rest.
+
+/** @import { Thing } from "./drawing/things.js" */
+/** @import { Input, Markers, Moment, Scene, Snapshot } from "./protocol.js" */
+
+import { World3D } from "./drawing/world.js";
+import { X, Y, eyeOf } from "./prediction/body.js";
+import { Poses } from "./prediction/poses.js";
+import { Predictor } from "./prediction/predictor.js";
+import { Walker } from "./prediction/walking.js";
+
+const MAX_LATE = 1000; // ms that control steps may be behind before they are left out: the page was asleep
+const SNAP = Math.PI / 8; // rad of a turn in calm pictures
+
+/** @typedef {{ body: ArrayLike<number>, moving: boolean, reach: [number, number] | null }} Drawn what was drawn: the body, whether it moves, and where in the view, in shares, is what E would take */
+
+export class DrawnView {
+  calm = false;
+  #world;
+  #flush;
+  /** @type {Scene | null} */
+  #scene = null;
+  /** @type {Walker | null} */
+  #walker = null;
+  /** @type {Predictor | null} */
+  #predictor = null;
+  #poses = new Poses();
+  /** @type {Record<string, Thing>} */
+  #things = {};
+  /** @type {Snapshot | null} */
+  #newest = null;
+  /** @type {Moment["reach"]} */
+  #reach = null;
+  #due = 0; // when the next control step ends, ms; 0 while the clock does not run
+  #body = new Float64Array(4); // on show
+
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {(until: number) => void} flush is called when a control step is over
+   * @param {() => void} lost is called when nothing can be drawn any more
+   */
+  constructor(canvas, flush, lost) {
+    this.#world = new World3D(canvas);
+    this.#world.onLost = lost;
+    this.#flush = flush;
+  }
+
+  /** Whether there is something to see. */
+  get loaded() {
+    return this.#scene !== null;
+  }
+
+  /** What draws, in words. */
+  get renderer() {
+    return this.#world.info().renderer;
+  }
+
+  /** Loads a house; a page that reconnects has it. @param {Scene} message */
+  async load(message) {
+    if (this.#scene?.path !== message.path) {
+      const { objects } = await this.#world.load((name) => message.path + name);
+      this.#world.loadModels(Object.keys(objects)); // now, so that an object that comes into view is there
+    }
+    const floor = message.floor === null ? null : await fetch(message.floor);
+    if (floor && !floor.ok) throw new Error(`${message.floor}: ${floor.status}`);
+    this.#walker = floor && new Walker(message.gait, await floor.json());
+    this.#world.setFieldOfView(message.field_of_view);
+    this.#scene = message;
+  }
+
+  resize() {
+    this.#world.resize();
+  }
+
+  /** The clock runs from now on. @param {number} now ms */
+  begin(now) {
+    this.#due = now + 1000 * this.#duration;
+    this.#predictor = null;
+  }
+
+  /** The clock is stopped: nothing is predicted. */
+  end() {
+    this.#due = 0;
+    this.#predictor = null;
+  }
+
+  /** The control step at which an input of now counts; null while there is none. */
+  get step() {
+    return this.#predictor?.step ?? null;
+  }
+
+  /** @param {Input} input */
+  add(input) {
+    this.#predictor?.add(input);
+  }
+
+  /** @param {Snapshot} state @param {number} now ms */
+  take(state, now) {
+    const scene = this.#scene;
+    if (!scene) return;
+    this.#newest = state;
+    if (this.#predictor) this.#predictor.correct(state.step, state.body, state.busy);
+    else if (this.#due) {
+      this.#predictor = new Predictor(this.#walker, scene.speeds, scene.gait.dt, state.step, state.body);
+      this.tick(now);
+    }
+    for (const name of state.gone) delete this.#things[name];
+    for (const [name, model] of Object.entries(state.models)) this.#things[name] = { model, pose: state.objects[name] ?? [] };
+    if (state.gone.length || Object.keys(state.models).length) this.#world.setObjects(this.#things);
+    this.#poses.take(state, now / 1000, this.#body);
+  }
+
+  /** @param {Markers} message */
+  show({ markers }) {
+    this.#world.setMarkers(markers);
+  }
+
+  /** @param {Moment["reach"]} reach */
+  outline(reach) {
+    this.#reach = reach;
+    this.#world.setOutline(reach?.instance ?? null);
+  }
+
+  /** Takes the control steps that are due. @param {number} now ms */
+  tick(now) {
+    const predictor = this.#predictor;
+    if (!predictor) return;
+    if (now - this.#due > MAX_LATE) this.#due = now;
+    for (; this.#due <= now; this.#due += 1000 * this.#duration) {
+      predictor.advance();
+      this.#flush(predictor.step);
+    }
+  }
+
+  /** Draws. @param {number} now ms @returns {Drawn | null} */
+  draw(now) {
+    const [scene, state, predictor] = [this.#scene, this.#newest, this.#predictor];
+    if (!scene || !state) return null;
+    const share = Math.min(1, Math.max(0, 1 - (this.#due - now) / (1000 * this.#duration)));
+    const body = predictor ? predictor.drawn(share) : state.body;
+    const moving = Math.hypot((body[X] ?? 0) - (this.#body[X] ?? 0), (body[Y] ?? 0) - (this.#body[Y] ?? 0)) > 1e-3;
+    for (let i = 0; i < 4; i++) this.#body[i] = body[i] ?? 0;
+    const [x = 0, y = 0, heading = 0] = this.#body;
+    for (const name of this.#poses.names()) {
+      const pose = this.#poses.at(name, now / 1000, this.#body);
+      if (pose) this.#world.setPose(name, pose);
+    }
+    this.#world.setPerson({ x, y, heading, hands: state.hands });
+    const eye = eyeOf(this.#body, scene.gait);
+    if (this.calm) eye.heading = SNAP * Math.round(heading / SNAP);
+    this.#world.setEye(eye);
+    this.#world.draw();
+    return { body: this.#body, moving, reach: this.#reachAt() };
+  }
+
+  /** @returns {[number, number] | null} */
+  #reachAt() {
+    const place = this.#reach?.place;
+    const at = place && this.#world.project(place);
+    return at?.inView ? [at.x, at.y] : null;
+  }
+
+  get #duration() {
+    return this.#scene?.gait.dt ?? 0.04;
+  }
+}

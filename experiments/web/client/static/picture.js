@@ -1,0 +1,167 @@
+// The picture of the apartment: drawn by this browser, or frames that the server draws.
+
+/** @import { Codec, Draw, Input, View } from "./protocol.js" */
+/** @import { Received } from "./connection.js" */
+/** @import { Drawn } from "./drawn_view.js" */
+
+import { byId } from "./dom.js";
+import { DrawnView } from "./drawn_view.js";
+import { Meter } from "./meter.js";
+import { Screen, bestCodec } from "./screen.js";
+
+const SLOWEST = 20; // pictures a second below which the server draws instead
+
+/**
+ * @typedef {object} Events
+ * @property {(message: View | Draw | { type: "seen", frame: number }) => void} send
+ * @property {(until: number) => void} flush sends what counts at the control steps before `until`
+ * @property {(step: number) => void} shown the state of this control step is on show
+ * @property {() => void} loaded there is something to see
+ * @property {(reason: string) => void} failed this browser cannot draw, and the server must not
+ */
+
+export class Picture {
+  meter = new Meter();
+  /** @type {DrawnView | null} */
+  drawn = null; // null where the server draws
+  #wanted;
+  #events;
+  #screen;
+  /** @type {Codec} */
+  #codec = "jpeg";
+  #frame = ""; // what the last frame was
+
+  /** @param {string} wanted `auto`, `browser` or `server` @param {Events} events */
+  constructor(wanted, events) {
+    this.#wanted = wanted;
+    this.#events = events;
+    this.#screen = new Screen(
+      byId("screen", HTMLCanvasElement),
+      (frame) => {
+        events.send({ type: "seen", frame: frame.number });
+        this.meter.shown(frame);
+        this.#frame = `frames of the server, ${frame.codec}, ${frame.width}x${frame.height}`;
+        events.shown(frame.step);
+      },
+      () => {
+        this.#codec = "jpeg";
+        this.#sendView();
+      },
+    );
+  }
+
+  /** Finds out what this browser can do; why it does not draw, or null. @returns {Promise<string | null>} */
+  async prepare() {
+    this.#codec = await bestCodec();
+    if (this.#wanted === "server") return null;
+    try {
+      this.#show(true);
+      this.drawn = new DrawnView(byId("world", HTMLCanvasElement), this.#events.flush, () => this.fallBack("context lost"));
+      this.drawn.resize();
+      return null;
+    } catch (error) {
+      this.#show(false);
+      const reason = error instanceof Error ? error.message : `${error}`;
+      if (this.#wanted === "browser") this.#events.failed(reason);
+      return reason;
+    }
+  }
+
+  /** @returns {View} */
+  get view() {
+    return { type: "view", ...this.#screen.size, codec: this.drawn ? "none" : this.#codec };
+  }
+
+  /** What draws, in words; empty before there is anything to see. */
+  get renderer() {
+    return this.drawn ? this.drawn.renderer : this.#frame;
+  }
+
+  /** @param {Received} message */
+  take(message) {
+    const { drawn, meter } = this;
+    switch (message.type) {
+      case "frame":
+        meter.came(message);
+        this.#screen.show(message);
+        this.#events.loaded();
+        break;
+      case "scene":
+        drawn?.load(message).then(this.#events.loaded, (error) => this.fallBack(`house not loaded: ${error.message}`));
+        break;
+      case "snapshot":
+        drawn?.take(message, performance.now());
+        meter.answered(message.input);
+        this.#events.shown(message.step);
+        break;
+      case "markers":
+        drawn?.show(message);
+        break;
+      case "moment":
+        drawn?.outline(message.reach);
+    }
+  }
+
+  /** @param {number} now ms @returns {Drawn | null} null where the server draws */
+  draw(now) {
+    this.drawn?.tick(now);
+    const drawn = this.drawn?.draw(now) ?? null;
+    if (drawn) this.meter.drawn();
+    return drawn;
+  }
+
+  /** @param {Input} input */
+  add(input) {
+    this.drawn?.add(input);
+    this.meter.sent(input.number);
+  }
+
+  /** How well it was seen since the last call; too slow a browser draws no more. */
+  report() {
+    const seen = this.meter.take();
+    const slow = seen.frames_per_s < SLOWEST && !document.hidden;
+    const draw = /** @type {"browser" | "server"} */ (this.drawn ? "browser" : "server");
+    const { renderer } = this;
+    if (slow && this.drawn && this.#wanted === "auto") this.fallBack("slow");
+    return { draw, renderer, ...seen };
+  }
+
+  /** Lets the server draw from now on. @param {string} reason */
+  fallBack(reason) {
+    if (!this.drawn) return;
+    if (this.#wanted === "browser") {
+      this.#events.failed(reason);
+      return;
+    }
+    this.drawn = null;
+    this.#show(false);
+    this.#events.send({ type: "draw", draw: "server", reason });
+    this.#sendView();
+  }
+
+  /** Forgets frames of an earlier connection. */
+  reset() {
+    this.#screen.reset();
+  }
+
+  /** The window has another size. */
+  resize() {
+    this.drawn?.resize();
+  }
+
+  #sendView() {
+    this.reset();
+    this.#events.send(this.view);
+  }
+
+  /** The server has to know the size. */
+  tellSize() {
+    this.#sendView();
+  }
+
+  /** @param {boolean} drawn whether this browser draws */
+  #show(drawn) {
+    byId("world", HTMLCanvasElement).hidden = !drawn;
+    byId("play", HTMLElement).classList.toggle("fills", drawn);
+  }
+}

@@ -1,0 +1,118 @@
+// A recorded run: what `mjsim view` writes into its page, and the state at any time.
+
+/** @import { HudState, Marker } from "../protocol.js" */
+
+import { mixed } from "../prediction/poses.js";
+
+/** @typedef {{ t: number, kind: string, text: string }} Moment */
+/** @typedef {{ t: number, cost_m: number, status: string, path: number[] }} Plan */
+/** @typedef {{ title: string, person: { eye_height: number, eye_forward: number, body_radius: number, field_of_view: number }, bounds: [number, number, number, number], models: Record<string, string>, labels: Record<string, string>, time: number[], body: number[], hands: number[], objects: Record<string, number[]>, hud: [number, HudState][], markers: Marker[], shown: [number, number[]][], moments: Moment[], plans: Plan[], pictures: Record<string, string> }} Recorded as `RunRecorder` and `view_page` write it */
+
+const [BODY, HANDS, POSE] = [4, 6, 8]; // numbers of a step
+
+export class Run {
+  recorded;
+
+  /** @param {Recorded} recorded */
+  constructor(recorded) {
+    this.recorded = recorded;
+  }
+
+  /** How long it lasts, s. */
+  get duration() {
+    return this.recorded.time.at(-1) ?? 0;
+  }
+
+  /** The control step under way at a time, and the share of it that is over. @param {number} time s */
+  at(time) {
+    const step = Math.max(0, before(this.recorded.time, time));
+    const [start, end] = [of(this.recorded.time, step), this.recorded.time[step + 1]];
+    return { step, share: end === undefined ? 0 : Math.min(1, Math.max(0, (time - start) / (end - start))) };
+  }
+
+  /** Position, heading and pitch of the body. @param {number} step @param {number} share */
+  body(step, share) {
+    const [a, b] = this.#pair(this.recorded.body, BODY, step);
+    const turn = of(b, 2) - of(a, 2);
+    const between = a.map((value, i) => value + share * (of(b, i) - value));
+    between[2] = of(a, 2) + share * Math.atan2(Math.sin(turn), Math.cos(turn));
+    return between;
+  }
+
+  /** Both hands in the frame of the body, m. @param {number} step @param {number} share */
+  hands(step, share) {
+    const [a, b] = this.#pair(this.recorded.hands, HANDS, step);
+    const between = a.map((value, i) => value + share * (of(b, i) - value));
+    return [between.slice(0, 3), between.slice(3)];
+  }
+
+  /** Where objects are: position, m, and quaternion wxyz. @param {number} step @param {number} share */
+  *poses(step, share) {
+    for (const [name, rows] of Object.entries(this.recorded.objects)) {
+      const row = lastRow(rows, step);
+      const pose = rows.slice(row + 1, row + POSE);
+      const next = rows.slice(row + POSE, row + 2 * POSE);
+      yield { name, pose: next[0] === step + 1 ? mixed(pose, next.slice(1), share) : pose };
+    }
+  }
+
+  /** @param {number} step */
+  hud(step) {
+    return valueAt(this.recorded.hud, step);
+  }
+
+  /** @param {number} step @returns {Marker[]} */
+  markers(step) {
+    return valueAt(this.recorded.shown, step).map((index) => /** @type {Marker} */ (this.recorded.markers[index]));
+  }
+
+  /** The plan that was followed at a time. @param {number} time s */
+  plan(time) {
+    return this.recorded.plans.findLast((plan) => plan.t <= time);
+  }
+
+  /** Floor points that were walked up to a step, flat, m. @param {number} step */
+  walked(step) {
+    const points = [];
+    for (let k = 0; k <= step; k++) points.push(...this.recorded.body.slice(BODY * k, BODY * k + 2));
+    return points;
+  }
+
+  /** @param {number[]} values @param {number} size @param {number} step @returns {[number[], number[]]} */
+  #pair(values, size, step) {
+    const next = Math.min(step + 1, this.recorded.time.length - 1);
+    return [values.slice(size * step, size * (step + 1)), values.slice(size * next, size * (next + 1))];
+  }
+}
+
+/** Index of the last value that is not above a limit. @param {number[]} values ascending @param {number} limit */
+function before(values, limit) {
+  let [low, high] = [0, values.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (of(values, middle) <= limit) low = middle + 1;
+    else high = middle;
+  }
+  return low - 1;
+}
+
+/** Where the row that holds at a step begins. @param {number[]} rows @param {number} step */
+function lastRow(rows, step) {
+  let [low, high] = [0, rows.length / POSE];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (of(rows, POSE * middle) <= step) low = middle + 1;
+    else high = middle;
+  }
+  return POSE * Math.max(0, low - 1);
+}
+
+/** The value that holds at a step. @template T @param {[number, T][]} changes @param {number} step @returns {T} */
+function valueAt(changes, step) {
+  const found = changes[before(changes.map(([at]) => at), step)] ?? changes[0];
+  if (!found) throw new Error("the run shows nothing");
+  return found[1];
+}
+
+/** @param {number[]} values @param {number} index @returns {number} */
+const of = (values, index) => /** @type {number} */ (values[index]);

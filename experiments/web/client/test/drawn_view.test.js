@@ -1,0 +1,115 @@
+import { beforeEach, describe, expect, test, vi } from "vitest";
+
+import { DrawnView } from "../static/drawn_view.js";
+import { EMPTY, GAIT, SPEEDS } from "./walks.js";
+
+/** @import { Scene, Snapshot } from "../static/protocol.js" */
+
+const world = vi.hoisted(() => ({
+  load: vi.fn(async () => ({ objects: { mug: {} } })), loadModels: vi.fn(), setFieldOfView: vi.fn(), resize: vi.fn(),
+  setObjects: vi.fn(), setPose: vi.fn(), setPerson: vi.fn(), setEye: vi.fn(), setMarkers: vi.fn(), setOutline: vi.fn(),
+  draw: vi.fn(), project: vi.fn(() => ({ x: 0.25, y: 0.5, inView: true })), onLost: () => {}, info: () => ({ renderer: "a card" }),
+}));
+vi.mock("../static/drawing/world.js", () => ({ World3D: vi.fn(function () { return world; }) }));
+
+/** @type {Scene} */
+const SCENE = {
+  type: "scene", path: "/scene/1/", floor: "/scene/1/floor.json", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, step_duration: 0.04,
+};
+/** @param {Partial<Snapshot>} more @returns {Snapshot} */
+const state = (more) => ({
+  type: "snapshot", step: 0, input: 0, time: 0, busy: false, body: new Array(16).fill(0), eye: [], hands: [[0.3, 0.2, 1], [0.3, -0.2, 1]],
+  held: [null, null], objects: {}, models: {}, gone: [], ...more,
+});
+
+describe("a view that this browser draws", () => {
+  /** @type {number[]} */
+  let sent;
+  /** @type {DrawnView} */
+  let view;
+  beforeEach(async () => {
+    vi.clearAllMocks();
+    vi.stubGlobal("fetch", async () => new Response(JSON.stringify(EMPTY)));
+    sent = [];
+    view = new DrawnView(/** @type {HTMLCanvasElement} */ ({}), (until) => sent.push(until), () => {});
+    await view.load(SCENE);
+  });
+
+  test("loads a house once", async () => {
+    await view.load(SCENE);
+    expect(world.load).toHaveBeenCalledTimes(1);
+    expect(world.loadModels).toHaveBeenCalledWith(["mug"]);
+    expect(view.loaded).toBe(true);
+    expect(view.renderer).toBe("a card");
+  });
+
+  test("says why there is no floor", async () => {
+    vi.stubGlobal("fetch", async () => new Response("", { status: 404 }));
+    await expect(view.load(SCENE)).rejects.toThrow("floor.json: 404");
+  });
+
+  test("draws nothing before there is a state", () => {
+    expect(view.draw(0)).toBeNull();
+  });
+
+  test("counts control steps from when the clock was started, not from the first state", () => {
+    view.begin(1000);
+    view.take(state({ step: 0 }), 1205); // the way there and back took 205 ms
+    expect(sent).toEqual([1, 2, 3, 4, 5]);
+    expect(view.step).toBe(5);
+    view.tick(1241);
+    expect(sent.at(-1)).toBe(6);
+  });
+
+  test("leaves out the steps in which the page was asleep", () => {
+    view.begin(0);
+    view.take(state({}), 10);
+    view.tick(60_000);
+    expect(sent.length).toBeLessThan(5);
+  });
+
+  test("walks at once, and the eye with it", () => {
+    view.begin(0);
+    view.take(state({}), 10);
+    view.draw(20);
+    view.add({ number: 1, forward: 1, step: view.step });
+    view.draw(39);
+    const [eye] = world.setEye.mock.lastCall ?? [];
+    expect(eye.position[0]).toBeGreaterThan(GAIT.eye_forward);
+  });
+
+  test("shows what the server says while the clock is stopped", () => {
+    view.begin(0);
+    view.take(state({}), 10);
+    view.end();
+    view.take(state({ body: [1, 2, ...new Array(14).fill(0)] }), 100);
+    const drawn = view.draw(120);
+    expect(Array.from(drawn?.body ?? []).slice(0, 2)).toEqual([1, 2]);
+    expect(view.step).toBeNull();
+  });
+
+  test("knows of an object from when it enters until it is gone", () => {
+    view.take(state({ objects: { cup: [1, 1, 1, 1, 0, 0, 0] }, models: { cup: "mug" } }), 0);
+    expect(Object.keys(world.setObjects.mock.lastCall?.[0])).toEqual(["cup"]);
+    view.draw(100);
+    expect(world.setPose).toHaveBeenCalledWith("cup", [1, 1, 1, 1, 0, 0, 0]);
+    view.take(state({ gone: ["cup"] }), 200);
+    expect(Object.keys(world.setObjects.mock.lastCall?.[0])).toEqual([]);
+  });
+
+  test("outlines what E would take, and says where it is", () => {
+    view.take(state({}), 0);
+    view.outline({ object: "Mug", instance: "cup", receptacle: null, place: [1, 2, 3], at: null });
+    expect(world.setOutline).toHaveBeenCalledWith("cup");
+    expect(view.draw(10)?.reach).toEqual([0.25, 0.5]);
+    view.outline(null);
+    expect(view.draw(20)?.reach).toBeNull();
+  });
+
+  test("turns in steps where less motion is wanted", () => {
+    view.calm = true;
+    view.take(state({ body: [0, 0, 0.3, ...new Array(13).fill(0)] }), 0);
+    view.draw(10);
+    expect(world.setEye.mock.lastCall?.[0].heading).toBeCloseTo(Math.PI / 8);
+  });
+});

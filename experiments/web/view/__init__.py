@@ -1,0 +1,1 @@
+"""Shows recorded runs in the browser: `mjsim view`."""
