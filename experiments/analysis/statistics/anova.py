@@ -71,15 +71,34 @@ def welch(groups: Mapping[str, Values]) -> FTest:
 
 
 def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
-    """Test for equal variances: an analysis of variance of the distances from the median.
+    """Test for equal variances: an analysis of variance of the distances from the median, without structural zeros.
 
-    Source: Brown and Forsythe 1974, doi:10.1080/01621459.1974.10482955.
+    The median takes one distance from each group: of d1 <= d2 <= ... <= dn, d1 is 0 where n is odd, and d1 equals d2
+    where n is even. So d2, ..., dn are compared, with (d1 + d2) / sqrt(2) in place of d2 where n is even. With d1 the
+    test finds a difference in 3.5 % of studies of the published sizes that have none.
+
+    Sources: Brown and Forsythe 1974, doi:10.1080/01621459.1974.10482955; Hines and Hines 2000,
+    doi:10.1111/j.0006-341X.2000.00451.x.
     """
     check_groups(groups, least=2)
-    distances = {name: np.abs(values - np.median(values)) for name, values in groups.items()}
+    distances = {name: _distances(values) for name, values in groups.items()}
+    if people_in(distances) <= len(groups):
+        raise StatisticsError(
+            "each group has two persons at most; how their distances from the median vary is unknown"
+        )
     if not any(varies(values) for values in distances.values()):
         raise StatisticsError("the distances from the median do not vary within any group")
-    return replace(_fisher(distances), of="variance of the distances from the medians")
+    return replace(
+        _fisher(distances), people=people_in(groups), of="variance of the distances from the medians"
+    )
+
+
+def _distances(values: Values) -> Values:
+    """Distances of values (n,) from their median, (n - 1,)."""
+    distances = np.sort(np.abs(values - np.median(values)))
+    if len(values) % 2 == 0:
+        distances[1] = (distances[0] + distances[1]) / np.sqrt(2.0)
+    return np.asarray(distances[1:])
 
 
 def _fisher(groups: Mapping[str, Values]) -> FTest:

@@ -38,7 +38,6 @@ def groups(sizes=(40, 37, 42)):
         (one_way, 40, stats.f_oneway),
         (one_way, 1, stats.f_oneway),
         (welch, 40, functools.partial(stats.f_oneway, equal_var=False)),
-        (brown_forsythe, 40, functools.partial(stats.levene, center="median")),
     ],
 )
 def test_one_factor_is_analysed_as_by_scipy(test, smallest, expected):
@@ -49,6 +48,28 @@ def test_one_factor_is_analysed_as_by_scipy(test, smallest, expected):
     assert (found.statistic, found.p) == pytest.approx((peer.statistic, peer.pvalue), **EXACT)
     share = 2 * found.statistic / (2 * found.statistic + smallest + 76)
     assert found.eta_squared == pytest.approx(share, **EXACT)
+
+
+@pytest.mark.parametrize("sizes", [(3, 4, 5), (40, 37, 42), (2, 2, 9)])
+def test_variances_are_compared_without_what_the_median_takes(sizes):
+    """Every group is turned such that its median is one axis; the rest, n - 1 coordinates, are the distances."""
+    data, distances = groups(sizes), []
+    for values in data.values():
+        deviations, n = np.sort(values) - np.median(values), len(values)
+        turn = np.eye(n)
+        if n % 2 == 0:
+            middle = slice(n // 2 - 1, n // 2 + 1)
+            turn[middle, middle] = np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2.0)
+        assert (turn @ deviations)[(n - 1) // 2] == pytest.approx(0.0, abs=1e-15)
+        distances.append(np.abs(np.delete(turn @ deviations, (n - 1) // 2)))
+    found, peer = brown_forsythe(data), stats.f_oneway(*distances)
+    assert (found.df1, found.df2, found.people) == (2, sum(sizes) - 6, sum(sizes))
+    assert (found.statistic, found.p) == pytest.approx((peer.statistic, peer.pvalue), **EXACT)
+
+
+def test_variances_of_pairs_alone_are_not_compared():
+    with pytest.raises(StatisticsError, match="two persons at most"):
+        brown_forsythe(groups((2, 2, 2)))
 
 
 @pytest.mark.parametrize("kind", [2, 3])

@@ -20,8 +20,16 @@ one <- oneway.test(y ~ a, six, var.equal = TRUE)
 welch <- oneway.test(y ~ a, six)
 out$one_way <- f_test(one$statistic[[1]], one$parameter[[1]], one$parameter[[2]])
 out$welch <- f_test(welch$statistic[[1]], welch$parameter[[1]], welch$parameter[[2]])
-levene <- leveneTest(y ~ a, six, center = median)
-out$brown_forsythe <- f_test(levene[1, "F value"], levene[1, "Df"], levene[2, "Df"])
+spread_test <- function(y, cell) {  # Hines and Hines 2000: ordered deviations turned in the plane of the middle pair
+  parts <- lapply(split(y, cell), function(v) {
+    z <- sort(v - median(v)); k <- length(z) %/% 2
+    if (length(z) %% 2 == 0) z[k:(k + 1)] <- c(1, -1) / sqrt(2) * z[k] + c(1, 1) / sqrt(2) * z[k + 1]
+    abs(z[-(if (length(z) %% 2) k + 1 else k)])
+  })
+  found <- anova(lm(z ~ g, data.frame(z = unlist(parts), g = rep(factor(seq_along(parts)), lengths(parts)))))
+  f_test(found[1, "F value"], found[1, "Df"], found[2, "Df"])
+}
+out$brown_forsythe <- spread_test(six$y, six$a)
 hc <- Anova(lm(y ~ a, six), type = 3, white.adjust = "hc3")
 out$hc3_one_way <- f_test(hc["a", "F"], hc["a", "Df"], hc["Residuals", "Df"])
 n <- nrow(six)
@@ -68,10 +76,9 @@ left <- residuals(fit)
 shapiro <- shapiro.test(left)
 m <- function(k) mean((left - mean(left))^k)
 cell <- interaction(people$a, people$b)
-equal <- leveneTest(people$y, cell, center = median)
 out$diagnostics <- list(shapiro_wilk = shapiro$statistic[[1]], shapiro_wilk_p = shapiro$p.value,
   skewness = m(3) / m(2)^1.5, kurtosis = m(4) / m(2)^2 - 3,
-  equal_variances = f_test(equal[1, "F value"], equal[1, "Df"], equal[2, "Df"]),
+  equal_variances = spread_test(people$y, cell),
   largest = max(tapply(people$y, cell, sd)), smallest = min(tapply(people$y, cell, sd)))
 
 # Pairs.
