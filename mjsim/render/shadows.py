@@ -17,13 +17,13 @@ from mjsim.render.markers import add_decorative_geom
 # Material of the house with a round texture whose alpha fades outwards; without it there are no spots.
 MATERIAL = "shadow_round"
 # How far a spot reaches beyond the object, m: its texture is faint at the edge.
-_BORDER = 0.05
+BORDER = 0.05
 # Above the lowest point of the object, m: above the house's rugs and drawn shadows (at most 5 mm, docs/models.md) and
 # below the bottom of a plate (7 mm), which would look grey under it.
-_LIFT = 0.006
+LIFT = 0.006
 _THICKNESS = 1e-4
 # Objects higher than this above the floor throw no spot, m.
-_REACH = 0.3
+REACH = 0.3
 
 
 class ContactShadows:
@@ -59,12 +59,12 @@ class ContactShadows:
         low, high = self._boxes(positions[self._geoms], rotations[self._geoms])
         middle, half = (low + high) / 2, (high - low) / 2
         height = np.maximum(low[:, 2], 0.0)  # boxes of tilted meshes reach into the floor
-        strength = np.clip(1.0 - height / _REACH, 0.0, 1.0)
-        centres = np.column_stack((middle[:, :2], height + _LIFT))
-        radii = np.hypot(half[:, 0], half[:, 1]) + 2 * _BORDER
+        strength = np.clip(1.0 - height / REACH, 0.0, 1.0)
+        centres = np.column_stack((middle[:, :2], height + LIFT))
+        radii = np.hypot(half[:, 0], half[:, 1]) + 2 * BORDER
         seen = (strength > 0.0) & ~outside(view, aspect, centres, radii)
         for index in np.flatnonzero(seen):
-            self._append(scene, centres[index], half[index, :2] + _BORDER, strength[index])
+            self._append(scene, centres[index], half[index, :2] + BORDER, strength[index])
 
     def _append(
         self, scene: Any, centre: NDArray[np.float64], half: NDArray[np.float64], strength: float

@@ -30,8 +30,10 @@ from experiments.web.server.limit import SessionLimit
 from experiments.web.server.pages import STATIC, message_page, page
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.readings import Readings
+from experiments.web.server.scene_files import scene_route
 from experiments.web.server.sessions import Sessions
 from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, following, token_hash
+from mjsim.scene_export.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.play")
 MAX_QUEUE = 100  # visits that may wait for a place
@@ -80,6 +82,7 @@ class PlayServer:
                 Route("/play/{token}/film", self._film_seen, methods=["POST"]),
                 Route("/play/{token}/floor-plan.png", self._floor_plan),
                 WebSocketRoute("/play/{token}", self._play),
+                scene_route(scenes_folder()),
                 Mount("/static", StaticFiles(directory=STATIC)),
             ],
             middleware=[

@@ -10,6 +10,8 @@ from experiments.trials import warmup
 from experiments.web.worker.encoders import Image, data_url
 from hud.options.minimap import FLOORPLAN
 from mjsim.render import render_house_map, render_pictures
+from mjsim.scene_export.cache import cached_floor, cached_scene
+from mjsim.scene_export.store import scenes_folder
 
 DRAWING_TIMEOUT = 60.0  # s
 _pictures: dict[str, dict[str, Image]] = {}
@@ -38,9 +40,17 @@ def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
 
 
 def scene_files(house: House) -> tuple[str, str]:
-    """Folder of the files of a house's scene on the server, and path of its floor for the house's person."""
-    folder = "/scene/0000000000000000/"
-    return folder, f"{folder}floor-{house.person.body_radius:g}.json"
+    """Folder of the files of a house's scene on the server, and path of its floor for the house's person.
+
+    They are made unless they are there, which takes seconds.
+
+    Raises:
+        AssetError: The house shows something that cannot be exported.
+        OSError: The files cannot be written.
+    """
+    scene = cached_scene(house.catalogue, scenes_folder())
+    folder = f"/scene/{scene.name}/"
+    return folder, folder + cached_floor(house.catalogue, scene, house.person.body_radius)
 
 
 def preload(name: str) -> None:

@@ -1,0 +1,98 @@
+"""Scene files on disk: each made once, whole or not at all, and compressed beforehand."""
+
+import fcntl
+import gzip
+import hashlib
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import mujoco
+
+from mjsim.files import WORK, replacing, work_folder
+from mjsim.kernels import UNUSED
+from mjsim.model.catalogue import Catalogue
+from mjsim.scene_export.export import export_scene, floor_json
+from mjsim.scene_export.store import GZIP
+from mjsim.sources import source_digest
+
+_LEVEL = 9
+_COMPRESSED = (".webp",)  # endings of files that are so already
+
+
+def scene_hash(catalogue: Catalogue) -> str:
+    """20 hex digits over all that the files of a scene follow from: the house, and what makes them."""
+    parts = (catalogue.content, source_digest("mjsim"), mujoco.__version__, cv2.__version__)
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
+
+
+def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
+    """The folder with the files of a house, in `folder`, named by their hash; they are made unless they are there.
+
+    What can be compressed is stored as `NAME.gz` alone. A process that needs files which another one is making waits.
+
+    Raises:
+        AssetError: As `export_scene`.
+        OSError: The files cannot be written.
+    """
+    target = folder / scene_hash(catalogue)
+    if not target.is_dir():
+        folder.mkdir(parents=True, exist_ok=True)
+        with _locked(folder):
+            if not target.is_dir():
+                _delete_unused(folder)
+                _make(catalogue, folder, target)
+    os.utime(target)  # in use
+    return target
+
+
+def cached_floor(catalogue: Catalogue, scene: Path, body_radius: float) -> str:
+    """The file in the folder `scene` with the walking kernel's floor for a trunk of this radius, m; made if need be.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    name = f"floor-{body_radius!r}.json"
+    path = scene / f"{name}{GZIP}"
+    if not path.is_file():
+        with replacing(path) as temporary:
+            temporary.write_bytes(_compressed(floor_json(catalogue, body_radius)))
+    return name
+
+
+def _make(catalogue: Catalogue, folder: Path, target: Path) -> None:
+    with work_folder(folder) as work:
+        for name, content in export_scene(catalogue).items():
+            path = work / name
+            path.parent.mkdir(exist_ok=True)
+            if path.suffix in _COMPRESSED:
+                path.write_bytes(content)
+            else:
+                path.with_name(f"{path.name}{GZIP}").write_bytes(_compressed(content))
+        work.chmod(0o755)
+        work.rename(target)
+
+
+def _compressed(content: bytes) -> bytes:
+    return gzip.compress(content, _LEVEL, mtime=0)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """One process at a time makes scenes in a folder."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _delete_unused(folder: Path) -> None:
+    for scene in folder.iterdir():
+        if not scene.name.startswith(WORK) and time.time() - scene.stat().st_mtime > UNUSED:
+            shutil.rmtree(scene, ignore_errors=True)

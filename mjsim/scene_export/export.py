@@ -1,0 +1,294 @@
+"""The files of a house from which a client draws: the house, its object models, the person, and what joins them."""
+
+import json
+import re
+import zlib
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.errors import AssetError
+from mjsim.fidelity.trunk_contact import CELL, MARGIN, Floor
+from mjsim.model import avatar
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.house import compiled_house
+from mjsim.model.rooms import RoomMap
+from mjsim.model.scene import Scene, assemble
+from mjsim.render import shadows
+from mjsim.scene_export import textures
+from mjsim.scene_export.glb import UPRIGHT, Glb
+from mjsim.scene_export.shapes import Floats
+from mjsim.scene_export.store import SCENE
+from mjsim.scene_export.surfaces import Surface, drawn_scene, surfaces
+
+HOUSE, PERSON, SKY, SHADOW = "house.glb", "person.glb", "sky.webp", "shadow.webp"
+_AWAY = -100.0  # m; where the object models stand, below the house
+_HANDS = tuple(f"{avatar.PREFIX}{hand}_hand" for hand in avatar.HANDS)
+
+
+def export_scene(catalogue: Catalogue) -> dict[str, bytes]:
+    """All files of a house by name; `scene.json` says what the others are.
+
+    Raises:
+        AssetError: The house breaks a convention of docs/models.md, or shows something that cannot be exported.
+    """
+    return _Export(_one_of_each(catalogue)).files()
+
+
+def export_episode(scene: Scene) -> bytes:
+    """One GLB file of an episode as it starts: the house, its receptacles and the objects where they lie.
+
+    Raises:
+        AssetError: The scene shows something that cannot be exported.
+    """
+    return _Export(scene).episode()
+
+
+def floor_json(catalogue: Catalogue, body_radius: float) -> bytes:
+    """The walking kernel's floor for a trunk of this radius, m: its arrays row by row."""
+    floor = Floor.of(compiled_house(catalogue).model, body_radius)
+    plain = {
+        name: np.ravel(value).tolist() if isinstance(value, np.ndarray) else value
+        for name, value in floor._asdict().items()
+    }
+    return _json({**plain, "cell": CELL, "margin": MARGIN})
+
+
+def _one_of_each(catalogue: Catalogue) -> Scene:
+    """A scene with one object of each model, far below the house."""
+    placed = tuple(
+        PlacedObject(f"object_{i}", model.category, key, (0.0, 0.0), (0.0, 0.0, _AWAY), (1.0, 0.0, 0.0, 0.0))
+        for i, (key, model) in enumerate(catalogue.objects.items())
+    )
+    episode = Episode(
+        catalogue.name,
+        0,
+        StartPose(0.0, 0.0, 0.0),
+        placed,
+        tuple(catalogue.receptacles),
+        {one.name: catalogue.categories[one.category].receptacle for one in placed},
+    )
+    return assemble(episode, catalogue)
+
+
+class _Export:
+    """A composed scene and what is seen of it."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._model = scene, scene.model
+        self._data = mujoco.MjData(scene.model)
+        mujoco.mj_forward(scene.model, self._data)
+        self._drawn = drawn_scene(scene.model, self._data)
+        self._images: dict[tuple[int, bool], tuple[str, bytes]] = {}
+
+    @cached_property
+    def _by_body(self) -> dict[int, list[Surface]]:
+        """Visible geoms by the body that carries them along, 0 for what never moves."""
+        found: dict[int, list[Surface]] = {}
+        carried = self._model.body_weldid[self._model.geom_bodyid]
+        for surface in surfaces(self._model, self._drawn):
+            found.setdefault(int(carried[surface.geom]), []).append(surface)
+        return found
+
+    def files(self) -> dict[str, bytes]:
+        """All files by name."""
+        files: dict[str, bytes] = {}
+        sizes: dict[str, dict[str, int]] = {}
+
+        def add(name: str, glb: Glb, root: int) -> None:
+            files[name] = glb.content(root)
+            sizes[name] = {
+                "triangles": glb.triangles,
+                "draw_calls": glb.primitives,
+                "bytes": len(files[name]),
+            }
+
+        add(HOUSE, *self._house())
+        add(PERSON, *self._person())
+        objects = {}
+        for placed in self._scene.episode.objects:
+            name = f"objects/{_file_name(placed.model)}.glb"
+            add(name, *self._object(placed))
+            objects[placed.model] = {"file": name, **self._about(placed)}
+        sky, shadow = self._sky(), self._shadow()
+        if sky is not None:
+            files[SKY] = sky
+        if shadow is not None:
+            files[SHADOW] = shadow[1]
+        general, extent = self._model.vis.map, self._model.stat.extent
+        files[SCENE] = _json(
+            {
+                "house": HOUSE,
+                "person": PERSON,
+                "objects": objects,
+                "rooms": _rooms(self._scene.rooms),
+                "contact_shadow": shadow and shadow[0],
+                "sky": None if sky is None else SKY,
+                "clip": [general.znear * extent, general.zfar * extent],
+                "sizes": sizes,
+            }
+        )
+        return files
+
+    def episode(self) -> bytes:
+        """House and objects in one file."""
+        glb = Glb(self._image)
+        nodes = self._rooms(glb)
+        for placed in self._scene.episode.objects:
+            position, rotation, quaternion = self._frame(self._scene.index.body(placed.name))
+            inner = glb.mesh(placed.model, self._carried(placed, position, rotation))
+            nodes.append(
+                glb.node(placed.name, [inner], translation=position.tolist(), rotation=_xyzw(quaternion))
+            )
+        return glb.content(glb.node("house", nodes, rotation=UPRIGHT, extras=self._lights()))
+
+    def _house(self) -> tuple[Glb, int]:
+        glb = Glb(self._image)
+        return glb, glb.node("house", self._rooms(glb), rotation=UPRIGHT, extras=self._lights())
+
+    def _rooms(self, glb: Glb) -> list[int]:
+        """Nodes of what never moves, by room and whether top-down views show it."""
+        groups: dict[tuple[bool, str], list[Surface]] = {}
+        for surface in self._by_body.get(0, []):
+            middle = (surface.positions.min(axis=0) + surface.positions.max(axis=0)) / 2
+            groups.setdefault((surface.is_ceiling, self._scene.rooms.room_at(middle)), []).append(surface)
+        return [
+            glb.mesh(f"ceiling_{room}", group, extras={"ceiling": True})
+            if ceiling
+            else glb.mesh(f"static_{room}", group)
+            for (ceiling, room), group in sorted(groups.items(), key=lambda item: item[0])
+        ]
+
+    def _object(self, placed: PlacedObject) -> tuple[Glb, int]:
+        glb = Glb(self._image)
+        position, rotation, _ = self._frame(self._scene.index.body(placed.name))
+        mesh = glb.mesh(placed.model, self._carried(placed, position, rotation))
+        return glb, glb.node(placed.model, [mesh], rotation=UPRIGHT)
+
+    def _carried(self, placed: PlacedObject, position: Floats, rotation: Floats) -> Iterable[Surface]:
+        body = self._scene.index.body(placed.name)
+        found = self._by_body.get(body, [])
+        if not found:
+            raise AssetError(f"object {placed.model!r} shows nothing; give it geoms in group 0 to 2")
+        return (surface.within(position, rotation) for surface in found)
+
+    def _person(self) -> tuple[Glb, int]:
+        """The body with the hands at rest; the body itself is not drawn."""
+        glb = Glb(self._image)
+        base, turned, _ = self._frame(self._model.body(avatar.BODY).id)
+        hands = []
+        for hand, name in zip(avatar.HANDS, _HANDS, strict=True):
+            body = self._model.body(name).id
+            position, rotation, _ = self._frame(body)
+            mesh = glb.mesh(hand, [s.within(position, rotation) for s in self._by_body[body]])
+            hands.append(glb.node(f"{hand}_hand", [mesh], translation=((position - base) @ turned).tolist()))
+        return glb, glb.node("person", [glb.node("body", hands)], rotation=UPRIGHT)
+
+    def _frame(self, body: int) -> tuple[Floats, Floats, Floats]:
+        data = self._data
+        return data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy(), data.xquat[body].copy()
+
+    def _about(self, placed: PlacedObject) -> dict[str, Any]:
+        """Label, bounds and boxes of an object model, m, in the body's frame."""
+        position, rotation, _ = self._frame(self._scene.index.body(placed.name))
+        points = np.concatenate([s.positions for s in self._carried(placed, position, rotation)])
+        boxes = []
+        for surface in self._by_body[self._scene.index.body(placed.name)]:
+            geom, box = surface.geom, self._model.geom_aabb[surface.geom]
+            turned = rotation.T @ self._data.geom_xmat[geom].reshape(3, 3)
+            centre = (self._data.geom_xpos[geom] - position) @ rotation + turned @ box[:3]
+            quaternion = np.zeros(4)
+            mujoco.mju_mat2Quat(quaternion, turned.ravel())
+            boxes.append(_rounded([*centre, *box[3:], *quaternion]))
+        return {
+            "label": self._scene.catalogue.objects[placed.model].label,
+            "bounds": [_rounded(points.min(axis=0)), _rounded(points.max(axis=0))],
+            "boxes": boxes,
+        }
+
+    def _lights(self) -> dict[str, Any]:
+        """The lights that MuJoCo would switch on, apart from the one on the viewer's head."""
+        lights, headlight = [], {"ambient": [0.0] * 3, "diffuse": [0.0] * 3, "specular": [0.0] * 3}
+        for light in self._drawn.lights[: self._drawn.nlight]:
+            colours = {name: _rounded(getattr(light, name)) for name in headlight}
+            if light.headlight:
+                headlight = colours
+            else:
+                lights.append(
+                    {
+                        "type": mujoco.mjtLightType(light.type).name.removeprefix("mjLIGHT_").lower(),
+                        "position": _rounded(light.pos),
+                        "direction": _rounded(light.dir),
+                        "cutoff": float(light.cutoff),
+                        "exponent": float(light.exponent),
+                        "attenuation": _rounded(light.attenuation),
+                        **colours,
+                    }
+                )
+        return {"lights": lights, "headlight": headlight}
+
+    def _sky(self) -> bytes | None:
+        """The sky's six faces below each other: right, left, up, down, front, back; None without a sky."""
+        found = np.flatnonzero(self._model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+        return textures.webp(textures.pixels(self._model, found[0]), lossless=True) if len(found) else None
+
+    def _shadow(self) -> tuple[dict[str, Any], bytes] | None:
+        """What draws the spots under objects, and their texture; None where the house has no material for them."""
+        material = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_MATERIAL, shadows.MATERIAL)
+        texture = (
+            self._model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB] if material >= 0 else -1
+        )
+        if texture < 0:
+            return None
+        about = {
+            "rgba": _rounded(self._model.mat_rgba[material]),
+            "border": shadows.BORDER,
+            "lift": shadows.LIFT,
+            "reach": shadows.REACH,
+            "texture": SHADOW,
+        }
+        return about, textures.webp(textures.pixels(self._model, texture), alpha=True, lossless=True)
+
+    def _image(self, texture: int, alpha: bool) -> tuple[str, bytes]:
+        key = (texture, alpha)
+        if key not in self._images:
+            image = textures.webp(textures.pixels(self._model, texture), alpha=alpha)
+            self._images[key] = textures.name_of(self._model, texture), image
+        return self._images[key]
+
+
+def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
+    """Rectangles on the floor with the label of their room, corners counter-clockwise, m."""
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    return [
+        {
+            "label": rooms.label(key),
+            "polygon": [_rounded(point) for point in centre + (corners * half) @ axes.T],
+        }
+        for key, centre, half, axes in zip(
+            rooms.keys, rooms.centers, rooms.half_sizes, rooms.axes, strict=True
+        )
+    ]
+
+
+def _file_name(key: str) -> str:
+    """A name for a file and a URL from a catalogue key, which may hold anything."""
+    if re.fullmatch(r"[A-Za-z0-9_-]{1,80}", key):
+        return key
+    return f"{re.sub(r'[^A-Za-z0-9_-]', '_', key)[:40]}-{zlib.crc32(key.encode()):08x}"
+
+
+def _xyzw(quaternion: Floats) -> list[float]:
+    return [float(v) for v in np.roll(quaternion, -1)]
+
+
+def _rounded(values: Any) -> list[float]:
+    return [round(float(value), 6) for value in values]
+
+
+def _json(value: Mapping[str, Any]) -> bytes:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False).encode()

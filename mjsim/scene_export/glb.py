@@ -1,0 +1,209 @@
+"""Writing GLB files: merged meshes with quantised vertices, materials and WebP textures."""
+
+import json
+import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.scene_export.shapes import Floats
+from mjsim.scene_export.surfaces import Surface
+
+UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion xyzw that turns z up into y up
+_STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]  # m between quantised positions: 1/128 mm to 128 mm
+_UV_STEP = 2.0**-13
+_COMPONENTS = {
+    np.dtype(kind): code
+    for kind, code in (("i1", 5120), ("u1", 5121), ("u2", 5123), ("u4", 5125), ("f4", 5126))
+}
+_VERTICES, _TRIANGLES = 34962, 34963  # targets of buffer views
+_EXTENSIONS = {"mesh": "KHR_mesh_quantization", "texture": "EXT_texture_webp"}
+
+
+class Look(NamedTuple):
+    """What surfaces share that are drawn by one call."""
+
+    texture: int  # id, -1 for none
+    is_translucent: bool
+    is_decal: bool  # a translucent plane, which MuJoCo draws before all else that is translucent
+
+    @classmethod
+    def of(cls, surface: Surface) -> "Look":
+        """The look of a surface."""
+        return cls(surface.texture, surface.is_translucent, surface.is_decal)
+
+
+class Glb:
+    """A GLB file in the making; `image` encodes the texture of an id, with or without alpha, and names it."""
+
+    def __init__(self, image: Callable[[int, bool], tuple[str, bytes]]) -> None:
+        self._image = image
+        self._blob = bytearray()
+        self._views: list[dict[str, Any]] = []
+        self._accessors: list[dict[str, Any]] = []
+        self._images: list[dict[str, Any]] = []
+        self._textures: dict[tuple[int, bool], int] = {}
+        self._materials: list[dict[str, Any]] = []
+        self._looks: dict[Look, int] = {}
+        self._meshes: list[dict[str, Any]] = []
+        self._nodes: list[dict[str, Any]] = []
+        self.triangles = 0
+        self.primitives = 0
+
+    def node(self, name: str, children: Sequence[int] = (), **properties: Any) -> int:
+        """Add a node without a mesh, and return its number; `properties` as in glTF."""
+        node = {"name": name, **properties}
+        if children:
+            node["children"] = list(children)
+        self._nodes.append(node)
+        return len(self._nodes) - 1
+
+    def mesh(self, name: str, surfaces: Iterable[Surface], **properties: Any) -> int:
+        """Add a node with surfaces merged by look, and return its number."""
+        groups: dict[Look, list[Surface]] = {}
+        for surface in surfaces:
+            groups.setdefault(Look.of(surface), []).append(surface)
+        every = np.concatenate([s.positions for group in groups.values() for s in group])
+        low, extent = every.min(axis=0), float(np.ptp(every, axis=0).max())
+        step = next((step for step in _STEPS if extent / step < 65535.0), extent / 65535.0)
+        origin = np.floor(low / step) * step
+        primitives = [self._primitive(look, groups[look], origin, step) for look in sorted(groups)]
+        self._meshes.append({"name": name, "primitives": primitives})
+        inner = self.node(
+            name, mesh=len(self._meshes) - 1, translation=origin.tolist(), scale=[step] * 3, **properties
+        )
+        return inner
+
+    def _primitive(self, look: Look, group: Sequence[Surface], origin: Floats, step: float) -> dict[str, Any]:
+        counts = [len(surface.positions) for surface in group]
+        starts = np.cumsum([0, *counts])
+        triangles = np.concatenate(
+            [s.triangles + start for s, start in zip(group, starts, strict=False)]
+        ).ravel()
+        positions = np.rint((np.concatenate([s.positions for s in group]) - origin) / step).astype("u2")
+        normals = np.concatenate([s.normals for s in group])
+        colours = np.repeat([_linear(s.rgba) for s in group], counts, axis=0)
+        shine = np.repeat([s.shine for s in group], counts, axis=0)
+        attributes = {
+            "POSITION": self._attribute(positions, "VEC3", bounds=True),
+            "NORMAL": self._attribute(np.rint(normals * 127.0).astype("i1"), "VEC3", normalized=True),
+            "COLOR_0": self._attribute(np.rint(colours * 65535.0).astype("u2"), "VEC4", normalized=True),
+            "_SHINE": self._attribute(np.rint(shine * 255.0).astype("u1"), "VEC3", normalized=True),
+        }
+        if look.texture >= 0:
+            uv = np.concatenate([s.uv for s in group if s.uv is not None])
+            attributes["TEXCOORD_0"] = self._attribute(
+                (np.rint(uv / _UV_STEP) * _UV_STEP).astype("f4"), "VEC2"
+            )
+        kind = "u2" if starts[-1] < 65535 else "u4"
+        self.triangles += len(triangles) // 3
+        self.primitives += 1
+        indices = self._accessor(
+            triangles.astype(kind), self._view(triangles.astype(kind).tobytes(), _TRIANGLES), "SCALAR"
+        )
+        return {"attributes": attributes, "indices": indices, "material": self._material(look)}
+
+    def _material(self, look: Look) -> int:
+        if look not in self._looks:
+            pbr: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
+            material: dict[str, Any] = {"name": "plain", "pbrMetallicRoughness": pbr}
+            if look.texture >= 0:
+                pbr["baseColorTexture"] = {"index": self._texture(look.texture, look.is_translucent)}
+                material["name"] = self._image(look.texture, look.is_translucent)[0]
+            if look.is_translucent:
+                material |= {"alphaMode": "BLEND", "extras": {"decal": look.is_decal}}
+            self._materials.append(material)
+            self._looks[look] = len(self._materials) - 1
+        return self._looks[look]
+
+    def _texture(self, texture: int, alpha: bool) -> int:
+        key = (texture, alpha)
+        if key not in self._textures:
+            name, encoded = self._image(*key)
+            self._images.append({"name": name, "mimeType": "image/webp", "bufferView": self._view(encoded)})
+            self._textures[key] = len(self._images) - 1
+        return self._textures[key]
+
+    def _attribute(
+        self, values: NDArray[Any], kind: str, *, normalized: bool = False, bounds: bool = False
+    ) -> int:
+        """An accessor of vertex values (n, k); each vertex begins at a multiple of 4 bytes."""
+        width = values.shape[1] * values.itemsize
+        stride = -(-width // 4) * 4
+        padded = np.zeros((len(values), stride // values.itemsize), values.dtype)
+        padded[:, : values.shape[1]] = values
+        view = self._view(padded.tobytes(), _VERTICES, stride)
+        accessor = self._accessor(values, view, kind)
+        if normalized:
+            self._accessors[accessor]["normalized"] = True
+        if bounds:
+            self._accessors[accessor] |= {
+                "min": values.min(axis=0).tolist(),
+                "max": values.max(axis=0).tolist(),
+            }
+        return accessor
+
+    def _accessor(self, values: NDArray[Any], view: int, kind: str) -> int:
+        self._accessors.append(
+            {
+                "bufferView": view,
+                "componentType": _COMPONENTS[values.dtype],
+                "count": len(values),
+                "type": kind,
+            }
+        )
+        return len(self._accessors) - 1
+
+    def _view(self, content: bytes, target: int | None = None, stride: int | None = None) -> int:
+        self._blob += b"\0" * (-len(self._blob) % 4)
+        view = {"buffer": 0, "byteOffset": len(self._blob), "byteLength": len(content)}
+        if target is not None:
+            view["target"] = target
+        if stride is not None:
+            view["byteStride"] = stride
+        self._blob += content
+        self._views.append(view)
+        return len(self._views) - 1
+
+    def content(self, root: int) -> bytes:
+        """The whole file; its scene has one root node."""
+        sampler = {"magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497}
+        lists: Mapping[str, Any] = {
+            "nodes": self._nodes,
+            "meshes": self._meshes,
+            "materials": self._materials,
+            "textures": [
+                {"sampler": 0, "extensions": {_EXTENSIONS["texture"]: {"source": number}}}
+                for number in range(len(self._images))
+            ],
+            "images": self._images,
+            "samplers": [sampler] if self._images else [],
+            "bufferViews": self._views,
+            "accessors": self._accessors,
+        }
+        used = [_EXTENSIONS["mesh"]] * bool(self._meshes) + [_EXTENSIONS["texture"]] * bool(self._images)
+        gltf = {
+            "asset": {"version": "2.0", "generator": "mjsim"},
+            "scene": 0,
+            "scenes": [{"nodes": [root]}],
+            **{name: values for name, values in lists.items() if values},
+        }
+        if self._blob:
+            gltf["buffers"] = [{"byteLength": len(self._blob)}]
+        if used:
+            gltf |= {"extensionsUsed": used, "extensionsRequired": used}
+        text = json.dumps(gltf, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        blob = bytes(self._blob) + b"\0" * (-len(self._blob) % 4)
+        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+        if blob:
+            chunks += struct.pack("<II", len(blob), 0x004E4942) + blob
+        return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def _linear(rgba: Floats) -> Floats:
+    """A displayed colour (4,) as linear light, which glTF wants of vertices."""
+    rgb = rgba[:3]
+    return np.append(np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4), rgba[3])

@@ -1,0 +1,119 @@
+"""What the `fast` profile shows of a scene, geom by geom: triangles, colours, shine and texture coordinates."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.errors import AssetError
+from mjsim.render.profiles import FAST
+from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS
+from mjsim.render.scene_settings import visual_option
+from mjsim.scene_export.shapes import Floats, Indices, Shape, shape_of
+
+_OPAQUE_FROM = 0.995  # MuJoCo blends geoms of a lower alpha
+_RGB = mujoco.mjtTextureRole.mjTEXROLE_RGB
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """What is seen of one geom, in the frame of the house.
+
+    Attributes:
+        geom: Id of the geom.
+        positions: Vertices, m, (n, 3).
+        normals: Unit vectors, (n, 3).
+        triangles: Rows of vertices, counter-clockwise seen from outside, (t, 3).
+        uv: Texture coordinates, v downwards, (n, 2); None without a texture.
+        texture: Id of the texture, -1 for none.
+        rgba: Colour as displayed, 0 to 1, (4,).
+        shine: Specular, shininess and emission, 0 to 1, (3,).
+        is_translucent: Whether it is blended with what is behind it.
+        is_decal: Whether it is a translucent plane (a drawn shadow); MuJoCo draws them before all else translucent.
+        is_ceiling: Whether top-down views leave it out.
+    """
+
+    geom: int
+    positions: Floats
+    normals: Floats
+    triangles: Indices
+    uv: Floats | None
+    texture: int
+    rgba: Floats
+    shine: Floats
+    is_translucent: bool
+    is_decal: bool
+    is_ceiling: bool
+
+    def within(self, position: Floats, rotation: Floats) -> "Surface":
+        """The same in the frame of a body at `position` (3,), m, with the axes in the columns of `rotation`, (3, 3)."""
+        return Surface(
+            **{
+                **vars(self),
+                "positions": (self.positions - position) @ rotation,
+                "normals": self.normals @ rotation,
+            }
+        )
+
+
+def drawn_scene(model: Any, data: Any) -> Any:
+    """MuJoCo's abstract scene of all that a first-person view can show."""
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 100)
+    option = visual_option(FIRST_PERSON_GROUPS, FAST)
+    mujoco.mjv_updateScene(model, data, option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, scene)
+    return scene
+
+
+def surfaces(model: Any, scene: Any) -> Iterator[Surface]:
+    """All visible geoms of an abstract scene, in its order.
+
+    Raises:
+        AssetError: A geom is of a kind that cannot be shown.
+    """
+    for geom in scene.geoms[: scene.ngeom]:
+        if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.rgba[3] > 0.0:
+            yield _surface(model, geom)
+
+
+def _surface(model: Any, geom: Any) -> Surface:
+    try:
+        shape = shape_of(model, geom)
+    except ValueError:
+        name = model.geom(geom.objid).name
+        kind = mujoco.mjtGeom(geom.type).name.removeprefix("mjGEOM_").lower()
+        raise AssetError(
+            f"geom {name!r} is of the type {kind}, which cannot be exported; make it a mesh"
+        ) from None
+    is_translucent = bool(geom.rgba[3] < _OPAQUE_FROM)
+    rotation = np.array(geom.mat, np.float64).reshape(3, 3)
+    texture = int(model.mat_texid[geom.matid, _RGB]) if geom.matid >= 0 else -1
+    return Surface(
+        geom=int(geom.objid),
+        positions=shape.positions @ rotation.T + np.array(geom.pos, np.float64),
+        normals=shape.normals @ rotation.T,
+        triangles=shape.triangles,
+        uv=_coordinates(model, geom, shape) if texture >= 0 else None,
+        texture=texture,
+        rgba=np.clip(np.array(geom.rgba, np.float64), 0.0, 1.0),
+        shine=np.clip(np.array([geom.specular, geom.shininess, geom.emission], np.float64), 0.0, 1.0),
+        is_translucent=is_translucent,
+        is_decal=is_translucent and geom.type == mujoco.mjtGeom.mjGEOM_PLANE,
+        is_ceiling=model.geom_group[geom.objid] not in TOP_DOWN_GROUPS,
+    )
+
+
+def _coordinates(model: Any, geom: Any, shape: Shape) -> NDArray[np.float64]:
+    """Texture coordinates (n, 2): those of the mesh, else the image laid over the geom's x and y axes."""
+    if geom.texcoord and shape.uv is not None:
+        return shape.uv
+    repeat, size = np.array(model.mat_texrepeat[geom.matid], np.float64), np.array(geom.size[:2], np.float64)
+    size = np.where(size > 0.0, size, 1.0)
+    if geom.dataid >= 0:
+        repeat = repeat / size  # vertices of meshes are in metres, those of other shapes from -1 to 1
+    if model.mat_texuniform[geom.matid]:
+        repeat = repeat * size
+    x, y = shape.unscaled[:, 0], shape.unscaled[:, 1]
+    return np.column_stack((0.5 * repeat[0] * (x + 1.0), 0.5 * repeat[1] * (1.0 - y)))
