@@ -197,15 +197,18 @@ class ScrollEvent(LoggedEvent, frozen=True):
 
 
 class OverrunEvent(LoggedEvent, frozen=True):
-    """A control step was late, because the machine was busy.
+    """A control step was late: the machine was busy, or inputs of the page did not come.
 
     Attributes:
         seconds: How late, s of wall time.
         skipped: Whether the clock was set to the present, because the process had been suspended.
+        missing: Whether it had waited for inputs that the page had promised, and was taken without them; logged for the
+            first such step in a row.
     """
 
     seconds: float
     skipped: bool
+    missing: bool = False
 
 
 class StartedEvent(LoggedEvent, frozen=True):

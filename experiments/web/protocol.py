@@ -58,7 +58,9 @@ class TakeOver(WireMessage, frozen=True):
 
 
 class Run(WireMessage, frozen=True):
-    """Start the clock, or let it run again."""
+    """Start the clock, or let it run again; a page that will promise its inputs promises here what it has, or 0."""
+
+    until: Count | None = None
 
 
 class Inputs(WireMessage, frozen=True):

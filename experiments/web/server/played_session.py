@@ -36,6 +36,7 @@ LOG = logging.getLogger("mjsim.play")
 MAX_CRASHES = 3  # of workers in a row, without an input taken in between, after which a session fails
 QUEUE_TIMEOUT = 10.0  # s that a place in the queue is kept without a connection
 MAX_AHEAD = 1000  # inputs that may wait to be taken
+MAX_STEPS_AHEAD = 25  # control steps by which inputs and promises may be ahead of the last one taken: 1 s
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
 
@@ -72,7 +73,7 @@ class PlayedSession:
         self._task: asyncio.Task[None] | None = None
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
-        self._taken = 0  # number of the last input that is safe
+        self._taken = self._step = 0  # number of the last input that is safe, and the next control step then
 
     def attach(self, browser: Browser, view: View) -> None:
         """Connect a browser; it replaces the one before."""
@@ -112,9 +113,9 @@ class PlayedSession:
             case Inputs() if self.state.phase is LOADING:
                 return None  # the browser keeps them, and sends them again
             case Inputs(inputs):
-                numbers = [new.number for new in inputs]
-                if (error := self._input_error(numbers)) is not None:
+                if (error := self._input_error(message)) is not None:
                     return error
+                numbers = [new.number for new in inputs]
                 self.state = msgspec.structs.replace(self.state, input=max(self.state.input, *numbers, 0))
             case Run() | Leave() if self.state.phase is LOADING:
                 return Error("too early", "the session is not ready")
@@ -136,13 +137,17 @@ class PlayedSession:
             with suppress(asyncio.CancelledError):
                 await task
 
-    def _input_error(self, numbers: list[int]) -> Error | None:
+    def _input_error(self, message: Inputs) -> Error | None:
+        numbers = [new.number for new in message.inputs]
+        latest = max((new.step or 0 for new in message.inputs), default=0)
         if self.state.phase is READY:
             return Error("too early", "the clock has not been started")
         if numbers != sorted(set(numbers)):
             return Error("out of order", "numbers of inputs must ascend")
         if numbers and numbers[-1] > self._taken + MAX_AHEAD:
             return Error("out of order", f"input {numbers[-1]} comes while {self._taken} was taken last")
+        if (latest := max(latest, message.until or 0)) > self._step + MAX_STEPS_AHEAD:
+            return Error("out of order", f"control step {latest} comes while {self._step} is the next one")
         return None
 
     def _pause(self, reason: protocol.PauseReason) -> None:
@@ -191,7 +196,7 @@ class PlayedSession:
     async def _play(self, trial: str) -> None:
         """Play a trial to its end, with another worker whenever one dies."""
         visit, crashes = self.visit, 0
-        self._taken = 0
+        self._taken = self._step = 0
         opening = Open(
             str(visit.journal(trial)), str(visit.run(trial)), visit.settings(trial), visit.before(trial)
         )
@@ -210,8 +215,9 @@ class PlayedSession:
                             self._taken = number  # of a session that was restored
                         message = msgspec.structs.replace(message, input=max(number, self.state.input))
                         self.state = message
-                    case Taken(number):
-                        crashes, self._taken = 0, number
+                    case Taken(number, step):
+                        crashes = 0 if step > self._step else crashes
+                        self._taken, self._step = number, step
                     case Saved():
                         await asyncio.to_thread(self._finish, trial)
                         self._tell(message)

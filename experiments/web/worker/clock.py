@@ -1,4 +1,4 @@
-"""The clock of a session: a control step every 40 ms, none skipped, each acknowledged once it is on the disk."""
+"""The clock of a session: 25 control steps a second, none skipped, each acknowledged once it is on the disk."""
 
 import time
 from collections.abc import Callable
@@ -6,8 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 from experiments.web.protocol import Taken, WireMessage
 from experiments.web.state import OVER, READY, RUNNING, Trigger
-from experiments.web.worker.control import SessionControl
+from experiments.web.worker.control import Promise, SessionControl
 from experiments.web.worker.live_session import LiveSession
+from experiments.web.worker.schedule import Schedule
 
 LATE = 0.02  # s after its time at which a control step counts as late
 MAX_LAG = 1.0  # s behind schedule from which the process must have been stopped: the clock restarts from now
@@ -23,24 +24,25 @@ class Clock:
         self, live: LiveSession, control: SessionControl, sync: Callable[[], None], send: Send
     ) -> None:
         self._live, self._control = live, control
+        self._schedule = Schedule(live.world.control_timestep, time.monotonic())
         self._acknowledger = _Acknowledger(sync, send)
+        self._missed = False  # whether the last step was taken without the inputs that were promised
 
     def run(self) -> str:
         """Run until the session is over; the reason. After a failure, run until the server ends this process."""
         live, control = self._live, self._control
-        due = time.monotonic()
         try:
             while live.end_reason is None and (phase := control.state.phase) is not OVER:
                 if phase is not READY:
                     self._log_notes()
+                live.session.show()
                 if phase is RUNNING:
-                    due = self._step_at(due)
+                    self._wait_and_step()
                     control.pause_if_silent()
                 else:
                     live.release()
-                    live.session.show()
                     control.wait_for_change(phase, SHOW_PERIOD)
-                    due = time.monotonic()
+                    self._schedule.start(time.monotonic())
             self._log_notes()
         finally:
             self._acknowledger.close()
@@ -48,20 +50,36 @@ class Clock:
         control.apply(Trigger.END, live.end_reason or "")
         return control.state.reason
 
-    def _step_at(self, due: float) -> float:
-        """Take a control step at its time; when the next one is due."""
-        session = self._live.session
-        late = time.monotonic() - due
-        if late < 0.0:
-            time.sleep(-late)
-        elif late > LATE:
-            session.note("overrun", seconds=round(late, 3), skipped=late > MAX_LAG)
-            due += late if late > MAX_LAG else 0.0
+    def _wait_and_step(self) -> None:
+        """Take a control step when it is due and its inputs are there, unless the session stops meanwhile."""
+        live, schedule = self._live, self._schedule
+        session, step = live.session, live.session.record.step
+        if (early := schedule.wait(time.monotonic(), promised=True)) > 0.0:
+            time.sleep(early)
+        left = schedule.wait(time.monotonic(), promised=False)
+        promise = self._control.wait_for_promise(step, left)
+        if self._control.state.phase is not RUNNING:
+            return
+        self._note_lateness(promise)
         self._acknowledger.check()
-        self._live.step(self._control.take_inputs(session.record.step))
+        live.step(self._control.take_inputs(step))
+        schedule.take(promise.came)
         session.show()  # now rather than in the next step: the browser sees it 40 ms earlier
-        self._acknowledger.request(self._live.input, session.record.step)
-        return due + self._live.world.control_timestep
+        self._acknowledger.request(live.input, session.record.step)
+
+    def _note_lateness(self, promise: Promise) -> None:
+        """Log a control step that is late by this machine's fault, and the first one without promised inputs."""
+        due, now = self._schedule.due, time.monotonic()
+        late = now - (due if promise.came is None else max(due, promise.came))
+        if promise.missing:
+            if not self._missed:
+                self._live.session.note("overrun", seconds=round(late, 3), skipped=False, missing=True)
+        elif late > LATE:
+            skipped = late > MAX_LAG
+            self._live.session.note("overrun", seconds=round(late, 3), skipped=skipped, missing=False)
+            if skipped:
+                self._schedule.start(now)
+        self._missed = promise.missing
 
     def _log_notes(self) -> None:
         for event, fields in self._control.take_notes():

@@ -27,6 +27,7 @@ from experiments.web.protocol import (
     Run,
     Saved,
     Seen,
+    Taken,
     View,
     WireMessage,
 )
@@ -80,8 +81,8 @@ class Worker:
                 self._opened.put((message, self._control))
             case Inputs(inputs, until):
                 self._control.add(inputs, until)
-            case Run():
-                self._control.apply(Trigger.RUN)
+            case Run(until):
+                self._control.apply(Trigger.RUN, until=until)
             case Pause(reason):
                 self._control.apply(Trigger.PAUSE, reason)
             case Leave():
@@ -108,6 +109,7 @@ class Worker:
                     if live.resumed:
                         reason = "restarted" if opened.restarted else "disconnected"
                         control.apply(Trigger.RESTORED, reason, last=live.input)
+                        self._send(Taken(live.input, live.session.record.step))
                     else:
                         control.apply(Trigger.OPENED)
                     reason = Clock(live, control, journal.sync, self._send).run()

@@ -6,7 +6,7 @@
 /** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none" }} View How a page wants to see the session: size in px, and how frames are compressed; `none` where it draws itself. */
 /** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page, which may reconnect, its trial and its view. */
 /** @typedef {{ type: "takeover" }} TakeOver Continue here with a session that is open in another page; the answer to `occupied`. */
-/** @typedef {{ type: "run" }} Run Start the clock, or let it run again. */
+/** @typedef {{ type: "run"; until?: number | null }} Run Start the clock, or let it run again; a page that will promise its inputs promises here what it has, or 0. */
 /** @typedef {{ number: number; step?: number | null; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input A change at the keyboard, the mouse, a gamepad or a touch screen. */
 /** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs What the person pressed, in order, each once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen The browser has shown a frame, by its number. */

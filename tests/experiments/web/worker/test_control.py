@@ -19,10 +19,10 @@ from experiments.web.state import (
 from experiments.web.worker.control import MAX_NOTES, SessionControl
 
 
-def after(*triggers):
+def after(*triggers, **clock):
     """Phases that a session announces, and its control."""
     phases = []
-    control = SessionControl(lambda state: phases.append(state.phase))
+    control = SessionControl(lambda state: phases.append(state.phase), **clock)
     for trigger in triggers:
         control.apply(trigger)
     return phases, control
@@ -68,10 +68,9 @@ def test_what_comes_while_the_clock_stands_holds_and_presses_nothing():
     assert control.take_inputs(0) == (Input(number=1, scroll=2), Input(number=2, scroll=3))
 
 
-def test_a_silent_page_stops_the_clock(monkeypatch):
+def test_a_silent_page_stops_the_clock():
     now = [100.0]
-    monkeypatch.setattr("experiments.web.worker.control.time.monotonic", lambda: now[0])
-    phases, control = after(Trigger.OPENED, Trigger.RUN)
+    phases, control = after(Trigger.OPENED, Trigger.RUN, now=lambda: now[0])
     for _ in range(5):
         now[0] += 0.9
         control.hear()
@@ -112,9 +111,15 @@ def test_inputs_count_at_their_step_or_at_the_next_one_in_order():
 
 def test_the_clock_waits_for_what_was_promised_only():
     _, control = after(Trigger.OPENED, Trigger.RUN)
-    assert control.wait_for_inputs(0, 0.0), "a page that promises nothing is not waited for"
+    assert control.wait_for_promise(0, 60.0) == (None, False), (
+        "a page that promises nothing is not waited for"
+    )
     control.add([], until=3)
-    assert control.wait_for_inputs(2, 0.0) and not control.wait_for_inputs(3, 0.01)
+    came = control.wait_for_promise(2, 60.0).came
+    assert came is not None and control.wait_for_promise(3, 0.01) == (None, True)
     control.apply(Trigger.PAUSE, "asked")
     control.apply(Trigger.RUN)
-    assert control.wait_for_inputs(3, 0.0), "a pause forgets promises"
+    assert control.wait_for_promise(3, 60.0) == (None, False), "a pause forgets promises"
+    control.apply(Trigger.PAUSE, "asked")
+    control.apply(Trigger.RUN, until=0)
+    assert control.wait_for_promise(3, 0.01).missing, "a page that lets the clock run can announce promises"
