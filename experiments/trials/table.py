@@ -1,5 +1,6 @@
 """One table of many trials, as Parquet for analysis and CSV for the eye."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from mjsim.files import check_input, replacing
 
 NAME = "trials"
 _TRIAL = ("user", *SEEDS, "assistance", "objects", "fingerprint")  # equal for equal trials
+_WRITTEN = (
+    b"mjsim.columns"  # metadata: types of the columns by name, as the footer of Parquet has no checksum
+)
 
 
 def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
@@ -25,8 +29,9 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
     columns = list(dict.fromkeys(key for row in rows for key in row))
     table = pa.table({c: [row.get(c) for row in rows] for c in columns})
     parquet, csv = folder / f"{NAME}.parquet", folder / f"{NAME}.csv"
+    written = table.replace_schema_metadata({_WRITTEN: json.dumps(_types(table.schema))})
     with replacing(parquet) as temporary:
-        pa.parquet.write_table(table, temporary, write_page_checksum=True)
+        pa.parquet.write_table(written, temporary, write_page_checksum=True)
     # An empty column has no type that CSV could hold.
     present = [c for c in columns if table[c].null_count < len(rows)]
     with replacing(csv) as temporary:
@@ -38,11 +43,13 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """The rows of a Parquet file.
 
     Raises:
-        RecordError: It cannot be read, or has a trial twice.
+        RecordError: It cannot be read, is damaged, or has a trial twice.
     """
     try:
         check_input(path)
-        rows: list[dict[str, Any]] = pa.parquet.read_table(path, page_checksum_verification=True).to_pylist()
+        table = pa.parquet.read_table(path, page_checksum_verification=True)
+        _check_columns(table.schema)
+        rows: list[dict[str, Any]] = table.to_pylist()
     except (OSError, ValueError, pa.ArrowException) as error:
         raise RecordError(f"{path} cannot be read ({error})") from error
     seen: dict[tuple[Any, ...], int] = {}
@@ -58,3 +65,19 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
                 f"{path}: rows {first} and {k} are the same trial ({trial}); remove one of them"
             )
     return rows
+
+
+def _types(schema: pa.Schema) -> dict[str, str]:
+    return {field.name: str(field.type) for field in schema}
+
+
+def _check_columns(schema: pa.Schema) -> None:
+    """Raise a `ValueError` if a column has another name or type than was written; columns may be added or left out."""
+    found = _types(schema)
+    written = json.loads((schema.metadata or {}).get(_WRITTEN, "{}"))
+    renamed = sorted(found.keys() - written) if written.keys() - found else []
+    if bad := [*renamed, *(name for name in found if written.get(name, found[name]) != found[name])]:
+        raise ValueError(
+            f"column {bad[0]!r} is not as it was written: the file is damaged, or the column was renamed or converted; "
+            "then write the table without its metadata, with replace_schema_metadata() of pyarrow"
+        )
