@@ -20,6 +20,7 @@ COMMANDS = {
     "run": "run one trial and film it",
     "play": "tidy the apartment yourself, in a browser",
     "replay": "replay and verify a recorded run; film it in another view",
+    "view": "look at a recorded run in the browser",
     "batch": "run the trials of a design on all cores; resumes",
     "metrics": "compute the metrics of a run or a batch anew",
     "compare": "compare the assistance conditions of a batch",
@@ -37,7 +38,7 @@ COMMANDS = {
 MODULES = {"import": "import_"}  # where a module cannot be called as its command
 CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # modules outside the wheel
 
-WATCHED = ("run", "plan", "replay")  # call a user's own code in their own process
+WATCHED = ("run", "plan", "replay", "view")  # call a user's own code in their own process
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
@@ -51,6 +52,8 @@ examples:
       film one assisted trial, with metrics, event log and floor plan
   mjsim play --objects 6 --assistance optimal --seed 0
       tidy the apartment yourself, in a browser
+  mjsim view runs/demo
+      look at a run in the browser: timeline, any camera, any speed
   mjsim batch --objects 6,12 --assistance none,highlight,optimal --seeds 0:10 --out runs/batch
       run a factorial design on all cores; the same command continues after an interruption
   mjsim compare runs/batch

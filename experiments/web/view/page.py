@@ -1,0 +1,150 @@
+"""One self-contained HTML file that shows a run: the client's modules, the scene and the recorded run in it."""
+
+import base64
+import gzip
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from jinja2 import Environment, FileSystemLoader
+from markupsafe import Markup
+
+from experiments.house import House
+from experiments.record.reader import Record
+from experiments.replay.replay import replay
+from experiments.replay.replayer import Replayer
+from experiments.web.server.pages import CLIENT, STATIC
+from experiments.web.view import timeline
+from experiments.web.view.recorder import RunRecorder
+from experiments.web.worker.encoders import data_url
+from mjsim.model.avatar import EYE_FORWARD
+from mjsim.render import render_pictures
+from mjsim.scene_export.cache import cached_scene
+from mjsim.scene_export.store import GZIP, scenes_folder
+
+ENTRY = "view/view.js"
+_IMPORT = re.compile(r"(\bfrom\s*|\bimport\s*)([\"'])(\.{1,2}/[^\"']+)\2")
+_TYPES = {".json": "application/json", ".glb": "model/gltf-binary", ".webp": "image/webp"}
+
+
+def view_page(
+    directory: Path,
+    *,
+    catalogue: str | None = None,
+    on_progress: Callable[[int, int], None] = lambda *_: None,
+) -> str:
+    """HTML of the page that shows a run, which is simulated again for that.
+
+    Args:
+        directory: Directory of a run, or of a failed run.
+        catalogue: Where the catalogue of its house lies now, if not where it was.
+        on_progress: Called with the numbers of replayed and of recorded control steps.
+
+    Raises:
+        RecordError: `directory` is not a run directory.
+        ReplayError: It cannot be replayed, or differs from the record.
+    """
+    watched: list[tuple[Replayer, RunRecorder]] = []
+
+    def watch(replayer: Replayer) -> RunRecorder:
+        watched.append((replayer, RunRecorder(replayer.scene)))
+        return watched[0][1]
+
+    replay(directory, watch=watch, catalogue=catalogue, on_progress=on_progress)
+    ((replayer, seen),) = watched
+    record, house = replayer.record, replayer.house
+    models = {placed.model for placed in record.episode.objects}
+    page: str = _template().render(
+        title=_title(record),
+        style=Markup((STATIC / "style.css").read_text("utf-8")),
+        modules=Markup(msgspec.json.encode({"imports": _modules(ENTRY)}).decode()),
+        entry=ENTRY,
+        run=_packed(_run(record, house, seen)),
+        scene=_packed(_scene(house, models)),
+    )
+    return page
+
+
+def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
+    """What the page reads: `Run` of view/run.js."""
+    person = record.person
+    catalogue = house.catalogue.objects
+    return {
+        "title": _title(record),
+        "person": {
+            "eye_height": person.eye_height,
+            "eye_forward": EYE_FORWARD,
+            "body_radius": person.body_radius,
+            "field_of_view": person.field_of_view,
+        },
+        "bounds": house.bounds,
+        "models": {placed.name: placed.model for placed in record.episode.objects},
+        "labels": {placed.name: catalogue[placed.model].label for placed in record.episode.objects},
+        "time": seen.time,
+        "body": seen.body,
+        "hands": seen.hands,
+        "objects": seen.objects,
+        "hud": seen.hud,
+        "markers": seen.markers,
+        "shown": seen.shown,
+        "moments": timeline.moments(record, house),
+        "plans": timeline.plans(record, house),
+        "pictures": {key: data_url(picture) for key, picture in render_pictures(house.catalogue).items()},
+    }
+
+
+def _scene(house: House, models: set[str]) -> dict[str, str]:
+    """The files that draw a house with objects of some models, as data URLs by name."""
+    folder = cached_scene(house.catalogue, scenes_folder())
+    found = {}
+    for path in sorted(folder.rglob("*.*")):
+        name = path.relative_to(folder).as_posix().removesuffix(GZIP)
+        if Path(name).stem in models or not name.startswith(("objects/", "floor")):
+            content = path.read_bytes()
+            found[name] = _data_url(name, gzip.decompress(content) if path.suffix == GZIP else content)
+    return found
+
+
+def _title(record: Record) -> str:
+    start = record.start
+    return f"{start['user']}, {start['assistance']}, {len(record.names)} objects, seed {start['house_seed']}"
+
+
+def _template() -> Any:
+    return Environment(loader=FileSystemLoader(CLIENT / "templates"), autoescape=True).get_template(
+        "view.html"
+    )
+
+
+def _packed(value: Any) -> str:
+    """JSON, compressed, in base64."""
+    return base64.b64encode(gzip.compress(msgspec.json.encode(value), 9, mtime=0)).decode()
+
+
+def _data_url(name: str, data: bytes) -> str:
+    return f"data:{_TYPES[Path(name).suffix]};base64,{base64.b64encode(data).decode()}"
+
+
+def _modules(entry: str) -> Mapping[str, str]:
+    """The module `entry` and all that it imports, as data URLs by their paths, which their imports name."""
+    found: dict[str, str] = {}
+    waiting = [entry]
+    while waiting:
+        path = waiting.pop()
+        if path in found:
+            continue
+        needs: list[str] = []
+        source = _IMPORT.sub(lambda match: _absolute(match, path, needs), (STATIC / path).read_text("utf-8"))  # noqa: B023
+        found[path] = f"data:text/javascript;base64,{base64.b64encode(source.encode()).decode()}"
+        waiting += needs
+    return found
+
+
+def _absolute(match: re.Match[str], path: str, needs: list[str]) -> str:
+    """An import with the path from the folder of all modules; the imported path is appended to `needs`."""
+    target = (STATIC / path).parent / match[3]
+    name = target.resolve().relative_to(STATIC.resolve()).as_posix()
+    needs.append(name)
+    return f'{match[1]}"{name}"'
