@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from experiments.errors import ConfigError
-from hud.layout import margins
 from mjsim.render import PROFILES, RenderProfile
 
 FIRST_PERSON, TOP_DOWN, FREE = CAMERAS = ("first-person", "top-down", "free")  # of a film of a replay
@@ -38,6 +37,10 @@ class FilmConfig:
         """Room above, to the left and to the right of the picture, px; frames of films have even sizes."""
         if not self.beside:
             return 0, 0, 0
+        from hud.layout import (
+            margins,
+        )  # imported late: it takes long, and the command line needs the rest at once
+
         top, left, right = margins(self.width, self.height)
         return top + (self.height + top) % 2, left, right + (self.width + left + right) % 2
 
