@@ -184,26 +184,37 @@ def _sight(scene: Scene) -> _SightGeometry:
 
 def _sight_geometry(scene: Scene) -> _SightGeometry:
     model, owner = scene.model, scene.index.geom_owner
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
     drawn, static = DRAWN[model.geom_group] > 0, ~moving_geoms(model)
     geoms = np.flatnonzero((owner >= 0) & drawn)
-    alpha = model.geom_rgba[:, 3].copy()  # a ray passes through what is fully transparent
-    textured = model.geom_matid >= 0
-    alpha[textured] *= model.mat_rgba[model.geom_matid[textured], 3]
-    extents = np.sort(model.geom_size, axis=1)
-    large = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (extents[:, 1] >= _MIN_WALL)
-    walls = np.flatnonzero(large & static & drawn & (alpha > 0))
-    walls = walls[np.argsort(-extents[walls, 1] * extents[walls, 2], kind="stable")]
+    centers, axes, half_sizes = large_boxes(scene, 0.0)
     return _SightGeometry(
         geoms=geoms,
         owners=owner[geoms].astype(np.int64),
         boxes=model.geom_aabb[geoms],
-        wall_centers=data.geom_xpos[walls],
-        wall_axes=data.geom_xmat[walls].reshape(-1, 3, 3),
-        wall_half_sizes=model.geom_size[walls],
+        wall_centers=centers,
+        wall_axes=axes,
+        wall_half_sizes=half_sizes,
         person=(owner == -1) & ~static,
     )
+
+
+def large_boxes(scene: Scene, alpha: float) -> tuple[Floats, Floats, Floats]:
+    """The large boxes in a scene with visuals that never move and are less transparent than `alpha`, the largest first.
+
+    Returns their centres, m, (w, 3), axes as columns, (w, 3, 3), and half extents, m, (w, 3).
+    """
+    model = scene.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    drawn, static = DRAWN[model.geom_group] > 0, ~moving_geoms(model)
+    opacity = model.geom_rgba[:, 3].copy()  # a ray passes through what is fully transparent
+    textured = model.geom_matid >= 0
+    opacity[textured] *= model.mat_rgba[model.geom_matid[textured], 3]
+    extents = np.sort(model.geom_size, axis=1)
+    large = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (extents[:, 1] >= _MIN_WALL)
+    found = np.flatnonzero(large & static & drawn & (opacity > alpha))
+    found = found[np.argsort(-extents[found, 1] * extents[found, 2], kind="stable")]
+    return data.geom_xpos[found], data.geom_xmat[found].reshape(-1, 3, 3), model.geom_size[found]
 
 
 @kernel

@@ -8,9 +8,11 @@ from experiments.web.protocol import Gait, Scene, Snapshot, Speeds
 from experiments.web.worker.houses import scene_files
 from experiments.web.worker.live_session import LiveSession
 from mjsim.fidelity import kinematics
-from mjsim.model.sight import visible_objects
+from mjsim.model.foresight import Foresight
 from mjsim.observation import Observation
 
+HORIZON = 0.3  # s of walking and turning that may bring an object into view, from which on it is known
+LINGERING = 25  # control steps for which it stays known after it no longer can
 METRES, QUATERNIONS = 4, 4  # decimals of positions and orientations
 
 
@@ -29,17 +31,19 @@ def scene_of(live: LiveSession) -> Scene:
 
 
 class SnapshotStream:
-    """Snapshots of a session for a client that has seen none yet."""
+    """Snapshots of a session for a client that has seen none yet; its view has some width over height."""
 
-    def __init__(self, live: LiveSession) -> None:
-        self._live = live
+    def __init__(self, live: LiveSession, aspect: float) -> None:
+        self._live, self._aspect = live, aspect
+        self._foresight = Foresight(live.scene, HORIZON)
+        self._until: dict[str, int] = {}  # control steps before which an object stays known
         self._models = {item.name: item.model for item in live.scene.episode.objects}
         self._sent: dict[str, list[float]] = {}
 
     def next(self, seen: Observation, step: int) -> Snapshot:
         """The snapshot of the state before a control step."""
         world = self._live.world
-        poses, known = _poses(seen), self._known(seen)
+        poses, known = _poses(seen), self._known(seen, step)
         entered = [name for name in known if name not in self._sent]
         gone = [name for name in self._sent if name not in known]
         changed = {name: poses[name] for name in known if self._sent.get(name) != poses[name]}
@@ -59,11 +63,13 @@ class SnapshotStream:
             gone=gone,
         )
 
-    def _known(self, seen: Observation) -> tuple[str, ...]:
+    def _known(self, seen: Observation, step: int) -> tuple[str, ...]:
         """Names of the objects that the client may know, in the episode's order."""
-        world = self._live.world
-        shown = {*visible_objects(world.scene, world.data, seen.eye, seen.heading, seen.pitch), *seen.carried}
-        return tuple(name for name in seen.object_names if name in shown)
+        soon = self._foresight.may_see(seen, self._aspect)
+        for name, may_see in zip(seen.object_names, soon.tolist(), strict=True):
+            if may_see or name in seen.hands:
+                self._until[name] = step + LINGERING
+        return tuple(name for name in seen.object_names if self._until.get(name, 0) > step)
 
 
 def _poses(seen: Observation) -> dict[str, list[float]]:

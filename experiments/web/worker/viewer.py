@@ -87,7 +87,7 @@ class BrowserViewer(Viewer):
         self._shown_to, self._shown, self._step, self._snapshots = (view, live), None, -1, None
         self._sent.clear()
         if view.codec == "none":
-            self._snapshots = SnapshotStream(live)
+            self._snapshots = SnapshotStream(live, view.width / view.height)
             self._send(scene_of(live))
             floor_plan = "minimap" in live.config.assistance
             self._send(Pictures(houses.encoded_pictures(live.config.house, floor_plan)))

@@ -67,8 +67,12 @@ def test_the_scene_has_what_a_prediction_needs(shown):
 
 def test_snapshots_have_the_body_and_what_changed(shown, monkeypatch):
     shown.drawer.hidden = False
+    monkeypatch.setattr("experiments.web.worker.snapshots.LINGERING", 1)
     names, seen = shown.live.world.observation().object_names, []
-    monkeypatch.setattr("experiments.web.worker.snapshots.visible_objects", lambda *_: tuple(seen))
+    monkeypatch.setattr(
+        "experiments.web.worker.snapshots.Foresight",
+        lambda *_: SimpleNamespace(may_see=lambda *_: np.isin(names, seen)),
+    )
     for now in (names[:2], names[:2], names[1:]):
         seen[:] = now
         shown.live.step([Input(number=shown.live.input + 1, forward=1.0)])
