@@ -67,7 +67,7 @@ class Inputs(WireMessage, frozen=True):
     """What the person pressed, in order, each once.
 
     `until` promises that all inputs for the control steps before it have been sent; the clock then waits for such
-    promises, for 0.5 s at most.
+    promises, for 0.75 s at most.
     """
 
     inputs: Annotated[list[Input], msgspec.Meta(max_length=MAX_INPUTS)]
@@ -227,12 +227,12 @@ class Speeds(msgspec.Struct, frozen=True):
 class Scene(WireMessage, frozen=True):
     """What a client that draws needs once: where the files of the scene are, and how the person moves.
 
-    `path` is the folder of the scene's files on this server, and `floor` the file of the obstacles for `gait`, or None
-    where walking cannot be predicted. `field_of_view` is horizontal, rad, whatever the shape of the view;
-    `step_duration` is that of a control step, s.
+    `path` is the folder of the scene's files on this server, None where it has none: then the server has to draw.
+    `floor` is the file of the obstacles for `gait`, or None where walking cannot be predicted. `field_of_view` is
+    horizontal, rad, whatever the shape of the view; `step_duration` is that of a control step, s.
     """
 
-    path: str
+    path: str | None
     floor: str | None
     gait: Gait
     speeds: Speeds

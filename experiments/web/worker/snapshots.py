@@ -1,5 +1,6 @@
 """The states of a session for a client that draws: what it may know, and of that what has changed."""
 
+import logging
 from collections.abc import Iterable
 
 import numpy as np
@@ -7,10 +8,12 @@ import numpy as np
 from experiments.web.protocol import Gait, Scene, Snapshot, Speeds
 from experiments.web.worker.houses import scene_files
 from experiments.web.worker.live_session import LiveSession
+from mjsim.errors import AssetError
 from mjsim.fidelity import kinematics
 from mjsim.model.foresight import Foresight
 from mjsim.observation import Observation
 
+LOG = logging.getLogger("mjsim.play")
 HORIZON = 0.3  # s of walking and turning that may bring an object into view, from which on it is known
 LINGERING = 25  # control steps for which it stays known after it no longer can
 METRES, QUATERNIONS = 4, 4  # decimals of positions and orientations
@@ -19,7 +22,13 @@ METRES, QUATERNIONS = 4, 4  # decimals of positions and orientations
 def scene_of(live: LiveSession) -> Scene:
     """Where the files of a session's scene are, and how its person moves."""
     person, options = live.scene.person, live.world.options
-    path, floor = scene_files(live.house)
+    path: str | None
+    floor: str | None
+    try:
+        path, floor = scene_files(live.house)
+    except (AssetError, OSError) as error:
+        LOG.warning("no browser can draw %s: %s", live.config.house, error)
+        path = floor = None
     return Scene(
         path,
         floor if live.config.fidelity == "event" else None,
