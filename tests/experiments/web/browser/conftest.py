@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+WEBGL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # without a graphics card
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", *WEBGL]
 
 
 @pytest.fixture

@@ -11,6 +11,8 @@ import { Orbit } from "./orbit.js";
 import { Run } from "./run.js";
 import { dots, figure } from "./figure.js";
 
+const AFTER = 0.05; // s after an event, when the HUD shows it
+
 const canvas = byId("screen", HTMLCanvasElement);
 const slider = byId("time", HTMLInputElement);
 const speed = byId("speed", HTMLSelectElement);
@@ -114,7 +116,7 @@ function listed(moment) {
   const button = document.createElement("button");
   button.type = "button";
   button.append(made("time", `${moment.t.toFixed(1)} s`), made("span", moment.text));
-  button.addEventListener("click", () => seek(moment.t));
+  button.addEventListener("click", () => seek(moment.t + AFTER));
   row.dataset.t = `${moment.t}`;
   row.className = moment.kind;
   row.append(button);
