@@ -60,7 +60,7 @@ def test_a_run_can_be_played_and_searched(page):
     page.get_by_label("Speed").select_option("8")
     page.keyboard.press("Space")
     page.get_by_role("button", name="Pause").wait_for()
-    page.get_by_role("button", name="Play").wait_for()  # at the end it stops
+    page.get_by_role("button", name="Play", exact=True).wait_for()  # at the end it stops
     first, last = page.locator("#seconds").inner_text().removesuffix(" s").split(" / ")
     assert first == last
 
