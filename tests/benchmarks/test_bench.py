@@ -1,8 +1,15 @@
 """`mjsim bench` finds the benchmarks of a checkout."""
 
+import math
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
 import pytest
 
+from benchmarks import play
 from benchmarks._command import benchmark, benchmark_names
+from benchmarks.support import play_load
 from benchmarks.support.play_browser import SeenFrame, SimulatedBrowser
 from benchmarks.support.play_load import median_width
 from experiments.cli.main import main
@@ -35,3 +42,41 @@ def test_a_session_without_a_frame_has_a_width_of_nothing():
     blind, seeing = SimulatedBrowser("/"), SimulatedBrowser("/")
     seeing.frames.append(SeenFrame(0.0, 0, 320))
     assert (median_width([blind]), median_width([seeing])) == (0.0, 320.0)
+
+
+class NoServer:
+    """Stands for a server whose sessions show nothing."""
+
+    process = SimpleNamespace(pid=os.getpid())
+
+    def __init__(self, *_):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def begin(self):
+        return "/"
+
+    def journal(self, *_):
+        return Path()
+
+
+def test_latencies_where_no_frame_comes_are_infinite_and_fail(monkeypatch):
+    async def at_once(*_):
+        return True
+
+    for name in ("open", "run", "until", "taken", "close"):
+        monkeypatch.setattr(SimulatedBrowser, name, at_once)
+    monkeypatch.setattr(SimulatedBrowser, "press", lambda *_, **__: None)
+    monkeypatch.setattr(play_load, "PlayProcess", NoServer)
+    monkeypatch.setattr(play_load, "worker_of", lambda _: os.getpid())
+    monkeypatch.setattr(play_load, "SETTLING", 0.0)
+    monkeypatch.setattr(play, "QUICK_SECONDS", 0.0)
+    result = play.measure(parts=["latency"], quick=True)
+    assert (result["latency"]["jpeg_p95_ms"], result["latency"]["jpeg_fps"]) == (math.inf, 0.0)
+    said = [line for line in play.lines(result) if "FAIL" in line]
+    assert len(said) == 3
