@@ -57,8 +57,10 @@ export class DrawnView {
 
   /** Loads a house; a page that reconnects has it. @param {Scene} message */
   async load(message) {
-    if (this.#scene?.path !== message.path) {
-      const { objects } = await this.#world.load((name) => message.path + name);
+    const { path } = message;
+    if (path === null) throw new Error("the server has no files of it");
+    if (this.#scene?.path !== path) {
+      const { objects } = await this.#world.load((name) => path + name);
       this.#world.loadModels(Object.keys(objects)); // now, so that an object that comes into view is there
     }
     const floor = message.floor === null ? null : await fetch(message.floor);

@@ -44,7 +44,8 @@ const panel = new Panel(
   },
   () => canvas.focus(),
 );
-const picture = new Picture(new URLSearchParams(location.search).get("draw") ?? draw, {
+const choice = draw === "auto" && new URLSearchParams(location.search).get("draw");
+const picture = new Picture(choice || draw, {
   send: (message) => connection.send(message),
   flush: (until) => connection.flush(until),
   shown: (step) => hud.reached(step),
@@ -201,7 +202,7 @@ function run() {
   showState();
   picture.drawn?.begin(performance.now());
   sounds.unlock();
-  connection.send({ type: "run" });
+  connection.send({ type: "run", until: picture.drawn ? 0 : null }); // the clock waits for our control steps
 }
 
 /** @param {PauseReason} reason */

@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 import time
 
 import msgspec
@@ -17,43 +16,27 @@ from experiments.record.records import read_events
 from experiments.replay.replay import replay
 from experiments.trials.setup import trial_episode
 from experiments.trials.trial_config import TrialConfig
-from experiments.web.protocol import Frame
-from experiments.web.worker.encoders import JpegEncoder
 
 NEAR = 0.7  # share of the reach from which a pick is tried
 ALIGNED = 0.12  # rad off a way on which one walks
 MAX_STRETCH = 1.2  # m walked before looking again
 TIME_LIMIT = 300.0  # s
-EMPTY, _ = JpegEncoder().encode(np.zeros((8, 8, 3), np.uint8), key=True)
+HARMLESS = ("KHR_parallel_shader_compile", "GL Driver Message")  # said where there is no graphics card
 SETTLED = 30.0  # s within which a few simulated seconds pass
 
 
 class Watcher:
-    """Reads the states that a client which draws would get, and has a page that shows frames show empty ones."""
+    """Reads the states that a page gets which draws."""
 
     def __init__(self, page):
         self.snapshot = None
         self.objects = {}  # name -> where it was seen last
-        self._number = 0
-        page.route_web_socket("**/play/*", self._route)
+        page.on("websocket", lambda socket: socket.on("framereceived", self._take))
 
-    def _route(self, socket):
-        server = socket.connect_to_server()
-        socket.on_message(lambda text: server.send(re.sub('"codec":"(jpeg|h264)"', '"codec":"none"', text)))
-
-        def forward(message):
-            content = json.loads(message)
-            if content["type"] == "snapshot":
-                self.snapshot = content
-                self.objects |= content["objects"]
-            if content["type"] in ("scene", "snapshot"):
-                self._number += 1
-                frame = Frame(self._number, content.get("step", 0), 0, "jpeg", True, 8, 8, 0.0, EMPTY)
-                socket.send(frame.packed())
-            elif content["type"] != "markers":
-                socket.send(message)
-
-        server.on_message(forward)
+    def _take(self, message):
+        if isinstance(message, str) and message.startswith('{"type":"snapshot"'):
+            self.snapshot = json.loads(message)
+            self.objects |= self.snapshot["objects"]
 
 
 class KeyPresser:
@@ -123,7 +106,7 @@ class KeyPresser:
             self._page.wait_for_timeout(20)
 
 
-@pytest.mark.parametrize("assistance", ["none", "optimal"])
+@pytest.mark.parametrize("assistance", [pytest.param("none", marks=pytest.mark.slow), "optimal"])
 def test_an_object_is_put_away_by_keys(tmp_path, chromium, assistance):
     words = ("--objects", "1", "--assistance", assistance, *FAST)
     house = House.load()
@@ -138,7 +121,9 @@ def test_an_object_is_put_away_by_keys(tmp_path, chromium, assistance):
         page.goto(server.url)
         page.keyboard.press("Enter")  # the button has the focus
         page.wait_for_url("**/play/*")
+        page.goto(f"{page.url}?draw=browser")  # however slowly
         page.get_by_role("button", name="Skip the training").press("Enter")
+        page.get_by_role("button", name="Start", exact=True).wait_for()
         page.get_by_role("button", name="Start", exact=True).press("Enter")
         page.locator("#list li").first.wait_for(state="attached")
         page.keyboard.press("p")
@@ -146,8 +131,8 @@ def test_an_object_is_put_away_by_keys(tmp_path, chromium, assistance):
         page.reload()
         page.get_by_role("button", name="Continue").press("Enter")
         KeyPresser(page, watcher, house, episode).tidy()
-        run = server.visit(page.url) / "task"
-    assert not faults
+        run = server.visit(page.url.partition("?")[0]) / "task"
+    assert [fault for fault in faults if not any(words in fault for words in HARMLESS)] == []
     assert all(address.startswith((server.url, "blob:")) for address in asked)
     metrics = msgspec.json.decode((run / records.METRICS).read_bytes())
     assert (metrics["ended"], metrics["delivered"]) == ("all delivered", 1)
