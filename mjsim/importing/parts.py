@@ -17,8 +17,12 @@ MIN_WIDTH = THIN  # of every part in every direction
 _WALL = 0.008  # m; parts thinner than this are walls, and an object of walls collides as its hull
 _CONVEX = 0.9  # share of its convex hull that a convex body fills
 _TRIANGLES = 1000  # of what is decomposed
-_CONCAVITY, _COARSE = 0.12, 0.35  # CoACD's threshold; for bodies of many pieces, which take minutes else
+_CONCAVITY, _COARSE = (
+    0.12,
+    0.35,
+)  # CoACD's threshold; for bodies that would take minutes: of many pieces, or cut by themselves
 _MANY = 8  # pieces
+_CUT = 1e-6  # share of an edge, and of a triangle's sides, by which they cross at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +69,7 @@ def _decomposed(solid: Solid) -> list[Floats]:
     coacd.set_log_level("error")
     found = coacd.run_coacd(
         coacd.Mesh(coarse.vertices, coarse.faces),
-        threshold=_CONCAVITY if solid.pieces <= _MANY else _COARSE,
+        threshold=_COARSE if solid.pieces > _MANY or cuts_itself(coarse) else _CONCAVITY,
         max_convex_hull=MAX_PARTS,
         resolution=500,
         mcts_iterations=20,
@@ -75,6 +79,25 @@ def _decomposed(solid: Solid) -> list[Floats]:
     )
     hulls = [np.asarray(vertices, np.float64) for vertices, _ in found]
     return sorted(hulls, key=lambda points: -scipy.spatial.ConvexHull(points).volume)
+
+
+def cuts_itself(mesh: trimesh.Trimesh) -> bool:
+    """Whether an edge of a surface goes through one of its triangles."""
+    vertices, edges = np.asarray(mesh.vertices), mesh.edges_unique
+    start = vertices[edges[:, 0]]
+    along = vertices[edges[:, 1]] - start
+    for face in mesh.faces:
+        corner, *others = vertices[face]
+        one, two = others - corner
+        normal = np.cross(one, two)
+        with np.errstate(all="ignore"):  # edges in the plane of the triangle give no number
+            share = (corner - start) @ normal / (along @ normal)
+            there = start + share[:, None] * along - corner
+            u, v = (np.cross(there, two) @ normal, np.cross(one, there) @ normal) / (normal @ normal)
+            least = np.min((share, 1.0 - share, u, v, 1.0 - u - v), axis=0)
+        if np.any((least > _CUT) & ~np.isin(edges, face).any(axis=1)):
+            return True
+    return False
 
 
 def _few_vertices(points: Floats) -> Floats:

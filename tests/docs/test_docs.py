@@ -24,7 +24,9 @@ import mjsim
 from experiments.cli.main import main
 from experiments.participants.distribution import Distributions
 from experiments.participants.guest import PARAMETERS
+from experiments.procedure.story import STORY_FILE
 from experiments.session.own_planner import planner_named
+from experiments.study.measures import FILE as MEASURES
 from experiments.trials.person import PARAMETERS as PERSON
 from experiments.trials.person import check_person
 from experiments.trials.trial import run_trial
@@ -227,6 +229,20 @@ def test_every_test_of_a_section_of_the_paper_is_named_by_its_page():
     }
     assert written <= set(PAPER_LINKS)
     assert all(line.count("|") == 3 for line in page("paper.md").splitlines() if "::test_" in line)
+
+
+def test_what_the_paper_page_says_of_departures_is_so(capsys):
+    text, items = page("paper.md"), tomllib.loads(MEASURES.read_text(encoding="utf-8"))["likert"]
+    assert len(items) == 17 and "names the 17 items" in text
+    for file in (STORY_FILE, MEASURES):
+        assert f"`{file.relative_to(TESTS.parent)}`" in text
+    limit = TrialConfig(objects=6, assistance="none", seed=0).limit
+    assert limit == 60.0 + 6 * 150.0 and "after 60 s and 150 s for each object" in text
+    with pytest.raises(SystemExit):
+        main(["play", "--help"])
+    told = capsys.readouterr().out
+    for option in ("--story", "--film", "--phases", "--time-limit"):
+        assert option in text and option in told
 
 
 def test_the_site_has_every_public_name(tmp_path):
