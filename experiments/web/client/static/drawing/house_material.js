@@ -14,11 +14,10 @@ import { upright } from "./camera.js";
  * @typedef {object} Look
  * @property {Texture | null} [map]
  * @property {boolean} [blend] whether one can see through it
- * @property {boolean} [tinted] whether instances have a `tint` instead of vertex colours
+ * @property {boolean} [tinted] whether instances have a `tint`, and all the same `shine`, instead of `color` and `_shine` of vertices
  * @property {boolean} [flat] whether it has its exact colour without any light
  * @property {boolean} [behind] whether instances are shifted behind themselves, seen from the eye
- * @property {number[]} [shine] specular, shininess and emission of the whole material
- * @property {boolean} [shines] whether each vertex has its own `_shine` instead
+ * @property {number[]} [shine] specular, shininess and emission
  */
 
 const KINDS = ["headlight", "directional", "spot"];
@@ -46,7 +45,7 @@ export function houseMaterial(light, { map = null, blend = false, shine = [0, 0,
     map.colorSpace = NoColorSpace;
     map.updateMatrix();
   }
-  const flags = { TEXTURED: map, BLEND: blend, TINTED: look.tinted, FLAT: look.flat, BEHIND: look.behind, SHINES: look.shines };
+  const flags = { TEXTURED: map, BLEND: blend, TINTED: look.tinted, FLAT: look.flat, BEHIND: look.behind };
   const set = Object.entries(flags).filter(([, value]) => value);
   return new ShaderMaterial({
     transparent: blend,
@@ -68,14 +67,11 @@ uniform Light lights[LIGHTS];
 uniform mat3 mapping;
 #ifdef TINTED
 attribute vec4 tint;
+uniform vec3 shine;
 #else
 attribute vec4 color;
-#endif
-#ifdef SHINES
 attribute vec3 _shine;
 #define shine _shine
-#else
-uniform vec3 shine;
 #endif
 varying vec4 vColour;
 varying vec2 vMap;

@@ -13,7 +13,8 @@ import { houseMaterial } from "./house_material.js";
  *   contact_shadow: ContactShadow | null; sky: string | null }} SceneFile what scene.json says
  */
 
-const DECALS = 1; // flat things on floors are drawn before the others that one can see through
+// In the order of drawing: MuJoCo draws planes before the rest that one can see through.
+const PLANES = 1;
 const CLEAR = 3;
 
 /** @param {string} url @returns {Promise<SceneFile>} */
@@ -56,10 +57,8 @@ export function dress(group, light) {
     part.matrixAutoUpdate = false;
     if (!(part instanceof Mesh)) return;
     const { map, transparent, userData } = /** @type {MeshStandardMaterial} */ (part.material);
-    const { specular = 0, shininess = 0, emission = 0, decal } = userData;
-    const shines = Boolean(part.geometry.getAttribute("_shine"));
-    part.material = houseMaterial(light, { map, blend: transparent, shine: [specular, shininess, emission], shines });
-    if (transparent) part.renderOrder = decal ? DECALS : CLEAR;
+    part.material = houseMaterial(light, { map, blend: transparent });
+    if (transparent) part.renderOrder = userData["plane"] ? PLANES : CLEAR;
   });
 }
 

@@ -25,6 +25,7 @@ export class ContactShadows extends Instances {
   /** @param {Uniforms} light @param {ContactShadow} settings @param {Texture} map */
   constructor(light, settings, map) {
     super(new PlaneGeometry(2, 2), houseMaterial(light, { map, blend: true, tinted: true }), CAPACITY);
+    this.renderOrder = 2; // between planes and the rest that one can see through
     this.#settings = settings;
   }
 
