@@ -44,8 +44,9 @@ wheel-check: $(READY) ## Build the wheel and use it in an empty environment
 assets: $(READY) ## Make textures and meshes under models/ anew
 	$(BIN)/python -m tools.authoring
 
-pictures: $(READY) ## Make the pictures of the README anew
+pictures: $(READY) ## Make the pictures of the README and of docs/rendering.md anew
 	$(BIN)/mjsim gallery --force --out docs/pictures
+	$(BIN)/python -m tools.drawn_pairs docs/pictures/browser.webp
 
 data-dictionary: $(READY) ## Make docs/data.md anew from the types
 	$(BIN)/python -m tools.data_dictionary > docs/data.md

@@ -137,7 +137,7 @@ class _Export:
     def episode(self) -> bytes:
         """House and objects in one file."""
         glb = Glb(self._image)
-        nodes = self._rooms(glb)
+        nodes = self._static(glb)
         for placed in self._scene.episode.objects:
             position, rotation, quaternion = self._frame(self._scene.index.body(placed.name))
             inner = glb.mesh(placed.model, self._carried(placed, position, rotation))
@@ -148,19 +148,19 @@ class _Export:
 
     def _house(self) -> tuple[Glb, int]:
         glb = Glb(self._image)
-        return glb, glb.node("house", self._rooms(glb), rotation=UPRIGHT, extras=self._lights())
+        return glb, glb.node("house", self._static(glb), rotation=UPRIGHT, extras=self._lights())
 
-    def _rooms(self, glb: Glb) -> list[int]:
-        """Nodes of what never moves, by room and whether top-down views show it."""
-        groups: dict[tuple[bool, str], list[Surface]] = {}
+    def _static(self, glb: Glb) -> list[int]:
+        """Nodes of what never moves: what top-down views show, and what they leave out.
+
+        They are not split by room: a house has few textures, and each costs a draw in every room that shows it.
+        """
+        groups: dict[bool, list[Surface]] = {}
         for surface in self._by_body.get(0, []):
-            middle = (surface.positions.min(axis=0) + surface.positions.max(axis=0)) / 2
-            groups.setdefault((surface.is_ceiling, self._scene.rooms.room_at(middle)), []).append(surface)
+            groups.setdefault(surface.is_ceiling, []).append(surface)
         return [
-            glb.mesh(f"ceiling_{room}", group, extras={"ceiling": True})
-            if ceiling
-            else glb.mesh(f"static_{room}", group)
-            for (ceiling, room), group in sorted(groups.items(), key=lambda item: item[0])
+            glb.mesh("ceiling", group, extras={"ceiling": True}) if is_ceiling else glb.mesh("static", group)
+            for is_ceiling, group in sorted(groups.items())
         ]
 
     def _object(self, placed: PlacedObject) -> tuple[Glb, int]:

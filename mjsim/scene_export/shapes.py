@@ -23,12 +23,13 @@ class Shape(NamedTuple):
     positions: Floats  # m, (n, 3)
     normals: Floats  # of unit length, (n, 3)
     triangles: Indices  # counter-clockwise seen from outside, (t, 3)
-    unscaled: Floats  # what generated texture coordinates are computed from, (n, 3)
-    uv: Floats | None = None  # texture coordinates of the mesh itself, (n, 2)
+    uv: (
+        Floats | None
+    )  # texture coordinates, of an image that covers the shape once, (n, 2); None for a mesh without
 
 
 def shape_of(model: Any, geom: Any) -> Shape:
-    """Triangles of an `MjvGeom` of a model; None of a kind that the renderer does not draw from a model's geoms."""
+    """Triangles of an `MjvGeom` of a model; `ValueError` of a kind that the renderer does not draw."""
     kind, size = _Geom(geom.type), np.array(geom.size, np.float64)
     if kind in _MESHES:
         return _mesh(model, geom.dataid // 2)
@@ -58,12 +59,13 @@ def _joined(*parts: Shape) -> Shape:
         np.concatenate([part.positions for part in parts]),
         np.concatenate([part.normals for part in parts]),
         np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=False)]),
-        np.concatenate([part.unscaled for part in parts]),
+        np.concatenate([part.uv for part in parts if part.uv is not None]),
     )
 
 
-def _unit(positions: Floats, normals: Floats, triangles: Indices) -> Shape:
-    return Shape(positions, normals, triangles, positions)
+def _laid_over(across: Floats, down: Floats) -> Floats:
+    """Texture coordinates (n, 2) of vertices whose places (n,) across and down an image go from -1 to 1."""
+    return np.column_stack((1.0 + across, 1.0 + down)) / 2.0
 
 
 def _grid(rows: int, columns: int) -> Indices:
@@ -87,12 +89,16 @@ def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
     flat = np.cos(elevations)[:, None]
     heights = np.repeat(np.sin(elevations)[:, None], slices + 1, axis=1)
     points = np.stack((flat * cosines, flat * sines, heights), axis=-1).reshape(-1, 3)
+    down, around = np.meshgrid(
+        np.linspace(1, 0, len(elevations)), np.linspace(0, 1, slices + 1), indexing="ij"
+    )
     triangles = _grid(len(elevations) - 1, slices)
     corners = points[triangles]
     twice_area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
-    return _unit(points, points, triangles[twice_area > 1e-9])
+    uv = np.column_stack((around.ravel(), down.ravel()))
+    return Shape(points, points, triangles[twice_area > 1e-9], uv)
 
 
 def _tube(slices: int) -> Shape:
@@ -101,7 +107,9 @@ def _tube(slices: int) -> Shape:
     around = np.column_stack((cosines, sines, np.zeros(slices + 1)))
     up = np.array([0.0, 0.0, 1.0])
     points = np.concatenate((around - up, around + up))
-    return _unit(points, np.concatenate((around, around)), _grid(1, slices))
+    turn = np.linspace(0.0, 1.0, slices + 1)
+    uv = np.column_stack((np.tile(turn, 2), np.repeat([1.0, 0.0], slices + 1)))
+    return Shape(points, np.concatenate((around, around)), _grid(1, slices), uv)
 
 
 def _disc(slices: int, height: float) -> Shape:
@@ -112,12 +120,14 @@ def _disc(slices: int, height: float) -> Shape:
     triangles = np.column_stack((np.zeros(slices, np.int64), 1 + number, 1 + (number + 1) % slices))
     points = np.concatenate(([[0.0, 0.0, height]], ring))
     normals = np.tile([0.0, 0.0, height], (slices + 1, 1))
-    return _unit(points, normals, triangles if height > 0.0 else triangles[:, ::-1])
+    uv = _laid_over(points[:, 0], points[:, 1])  # on its head: so MuJoCo does it
+    return Shape(points, normals, triangles if height > 0.0 else triangles[:, ::-1], uv)
 
 
 def _quad() -> Shape:
     points = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
-    return _unit(points, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
+    uv = _laid_over(points[:, 0], -points[:, 1])
+    return Shape(points, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]), uv)
 
 
 def _box() -> Shape:
@@ -129,12 +139,13 @@ def _box() -> Shape:
             normals = np.zeros((4, 3))
             normals[:, axis] = sign
             triangles = _quad().triangles
-            sides.append(_unit(turned, normals, triangles if sign > 0.0 else triangles[:, ::-1]))
+            uv = _laid_over(turned[:, 1 if axis == 0 else 0], -turned[:, 1 if axis == 2 else 2])
+            sides.append(Shape(turned, normals, triangles if sign > 0.0 else triangles[:, ::-1], uv))
     return _joined(*sides)
 
 
 def _capsule(size: Floats, slices: int, stacks: int) -> Shape:
-    """A tube between two half spheres; each part is textured as if it were scaled alone."""
+    """A tube between two half spheres, each of which shows the whole image."""
     radius, half = (size[0] + size[1]) / 2.0, size[2]
     parts = [_scaled(_tube(slices), size)]
     for low, high, height in ((0, 1, half), (-1, 0, -half)):
@@ -170,6 +181,4 @@ def _without_copies(faces: Any, vertices: Floats, normals: Floats, uv: Floats | 
         parts.append(uv.reshape(-1, 2))
     unique, index = np.unique(np.concatenate(parts, axis=1), axis=0, return_inverse=True)
     points = unique[:, :3]
-    return Shape(
-        points, unique[:, 3:6], index.reshape(-1, 3), points, unique[:, 6:] if uv is not None else None
-    )
+    return Shape(points, unique[:, 3:6], index.reshape(-1, 3), unique[:, 6:] if uv is not None else None)

@@ -106,14 +106,14 @@ def _surface(model: Any, geom: Any) -> Surface:
 
 
 def _coordinates(model: Any, geom: Any, shape: Shape) -> NDArray[np.float64]:
-    """Texture coordinates (n, 2): those of the mesh, else the image laid over the geom's x and y axes."""
+    """Texture coordinates (n, 2) as MuJoCo 3.17 draws them; other versions do it in other ways."""
     if geom.texcoord and shape.uv is not None:
         return shape.uv
     repeat, size = np.array(model.mat_texrepeat[geom.matid], np.float64), np.array(geom.size[:2], np.float64)
     size = np.where(size > 0.0, size, 1.0)
-    if geom.dataid >= 0:
-        repeat = repeat / size  # vertices of meshes are in metres, those of other shapes from -1 to 1
     if model.mat_texuniform[geom.matid]:
         repeat = repeat * size
-    x, y = shape.unscaled[:, 0], shape.unscaled[:, 1]
-    return np.column_stack((0.5 * repeat[0] * (x + 1.0), 0.5 * repeat[1] * (1.0 - y)))
+    if shape.uv is None:  # of a mesh, whose middle is the middle of the image
+        middle: Floats = 0.5 + 0.5 * repeat * np.array([1.0, -1.0]) * shape.positions[:, :2] / size
+        return middle
+    return shape.uv * repeat

@@ -45,7 +45,7 @@ function glb(nodes, extras = {}) {
     asset: { version: "2.0" }, scene: 0, scenes: [{ nodes: [nodes.length] }],
     nodes: [...nodes.map((node) => ({ mesh: 0, ...node })), { children: nodes.map((_, i) => i), extras }],
     meshes: [{ primitives: [{ attributes: { POSITION: 0, NORMAL: 1, COLOR_0: 2 }, material: 0 }] }],
-    materials: [{ extras: { plane: true }, alphaMode: "BLEND" }],
+    materials: [{ extras: { decal: true }, alphaMode: "BLEND" }],
     accessors: [accessor(0, "VEC3"), accessor(1, "VEC3"), accessor(2, "VEC4")],
     bufferViews: [view(0, 36), view(36, 36), view(72, 48)],
     buffers: [{ byteLength: 120, uri: url("application/octet-stream", new Uint8Array(floats.buffer)) }],

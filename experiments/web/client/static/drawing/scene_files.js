@@ -13,8 +13,8 @@ import { houseMaterial } from "./house_material.js";
  *   contact_shadow: ContactShadow | null; sky: string | null }} SceneFile what scene.json says
  */
 
-// In the order of drawing: MuJoCo draws planes before the rest that one can see through.
-const PLANES = 1;
+// In the order of drawing: MuJoCo draws flat things on floors before the rest that one can see through.
+const DECALS = 1;
 const CLEAR = 3;
 
 /** @param {string} url @returns {Promise<SceneFile>} */
@@ -58,7 +58,7 @@ export function dress(group, light) {
     if (!(part instanceof Mesh)) return;
     const { map, transparent, userData } = /** @type {MeshStandardMaterial} */ (part.material);
     part.material = houseMaterial(light, { map, blend: transparent });
-    if (transparent) part.renderOrder = userData["plane"] ? PLANES : CLEAR;
+    if (transparent) part.renderOrder = userData["decal"] ? DECALS : CLEAR;
   });
 }
 

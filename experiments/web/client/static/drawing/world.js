@@ -192,6 +192,11 @@ export class World3D {
     return { calls, triangles, textures, milliseconds: this.#milliseconds, renderer };
   }
 
+  /** What a headset draws with. */
+  get stage() {
+    return { renderer: this.#renderer, scene: this.#scene, camera: this.#camera };
+  }
+
   /** Frees what the graphics card holds. */
   close() {
     this.#renderer.dispose();
