@@ -40,10 +40,10 @@ def write_analysis(folder: Path, analysis: Analysis, report: str, further: Mappi
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / STATISTICS, {**analysis.as_json(), **further})
     table = people_table(analysis.table)
-    with replacing(folder / f"{PEOPLE}.parquet") as temporary:
-        pa.parquet.write_table(table, temporary)
-    with replacing(folder / f"{PEOPLE}.csv") as temporary:
-        pa.csv.write_csv(table, temporary)
+    with replacing(folder / f"{PEOPLE}.parquet") as temporary, temporary.open("wb") as file:
+        pa.parquet.write_table(table, file)
+    with replacing(folder / f"{PEOPLE}.csv") as temporary, temporary.open("wb") as file:
+        pa.csv.write_csv(table, file)
     write_text_atomically(folder / TESTS, _tests_csv(analysis))
     write_text_atomically(folder / REPORT, report)
 

@@ -30,12 +30,13 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
     table = pa.table({c: [row.get(c) for row in rows] for c in columns})
     parquet, csv = folder / f"{NAME}.parquet", folder / f"{NAME}.csv"
     written = table.replace_schema_metadata({_WRITTEN: json.dumps(_types(table.schema))})
-    with replacing(parquet) as temporary:
-        pa.parquet.write_table(written, temporary, write_page_checksum=True)
+    # pyarrow gets files that are open: it takes no path that is not UTF-8, or that looks like the address of a server.
+    with replacing(parquet) as temporary, temporary.open("wb") as file:
+        pa.parquet.write_table(written, file, write_page_checksum=True)
     # An empty column has no type that CSV could hold.
     present = [c for c in columns if table[c].null_count < len(rows)]
-    with replacing(csv) as temporary:
-        pa.csv.write_csv(table.select(present), temporary)
+    with replacing(csv) as temporary, temporary.open("wb") as file:
+        pa.csv.write_csv(table.select(present), file)
     return parquet, csv
 
 
@@ -47,7 +48,8 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """
     try:
         check_input(path)
-        table = pa.parquet.read_table(path, page_checksum_verification=True)
+        with path.open("rb") as file:
+            table = pa.parquet.read_table(file, page_checksum_verification=True)
         _check_columns(table.schema)
         rows: list[dict[str, Any]] = table.to_pylist()
     except (OSError, ValueError, pa.ArrowException) as error:

@@ -25,6 +25,13 @@ def table(tmp_path):
     return write_tables(tmp_path, ROWS)[0]
 
 
+@pytest.mark.parametrize("name", ["a\udcffb", "file:a", "ünïcode"])
+def test_folders_may_have_any_name(name, tmp_path):
+    (tmp_path / name).mkdir()
+    parquet, csv = write_tables(tmp_path / name, ROWS)
+    assert read_rows(parquet) == ROWS and csv.is_file()
+
+
 def test_a_changed_byte_of_the_footer_is_refused_or_changes_nothing(table):
     data = table.read_bytes()
     footer = len(data) - 8 - int.from_bytes(data[-8:-4], "little")
