@@ -56,14 +56,14 @@ export class World3D {
     this.#house.rotation.x = -Math.PI / 2; // three.js has y up
     this.#house.updateMatrix();
     for (const group of [this.#scene, this.#house, this.#person]) group.matrixAutoUpdate = false;
-    this.#scene.add(this.#house);
-    this.#house.add(this.#outline, this.#person);
     canvas.addEventListener("webglcontextlost", () => this.onLost());
   }
 
   /** Loads all but the models of objects; rejects where a file cannot be read. @param {Resolve} resolve @returns {Promise<SceneFile>} */
   async load(resolve) {
     const file = await readScene(resolve("scene.json"));
+    for (const group of [this.#scene, this.#house, this.#person]) group.clear(); // of another house
+    this.#house.add(this.#outline, this.#person);
     const spot = file.contact_shadow;
     const [house, person, sky, round] = await Promise.all([
       readModel(resolve(file.house)),
@@ -73,6 +73,7 @@ export class World3D {
     ]);
     const light = lighting(house.extras["lights"] ?? [], house.extras["headlight"]);
     for (const { group } of [house, person]) dress(group, light);
+    this.#ceilings = [];
     house.group.traverse((part) => part.userData["ceiling"] && this.#ceilings.push(part));
     this.#hands = ["left_hand", "right_hand"].map((name) => person.group.getObjectByName(name));
     const shadows = spot && round ? new ContactShadows(light, spot, round) : null;
