@@ -23,6 +23,7 @@ import { Sounds } from "./sounds.js";
 import { rememberVisit } from "./visit.js";
 
 const DONE = 1500; // ms for which the end of a trial is shown
+const BUSY = "Busy: your hands are moving";
 const TICK = 20; // ms between two looks at the clock; pages in the background get no pictures to draw
 
 const page = byId("play", HTMLElement);
@@ -32,6 +33,7 @@ const canvas = byId("screen", HTMLCanvasElement);
 const tab = Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16)).join("-");
 
 const session = new Session();
+let pressed = 0; // number of the last input with a press, on which the server decides
 let silent = false; // whether the link was lost without being closed
 const panel = new Panel(
   byId("panel", HTMLDialogElement),
@@ -53,7 +55,13 @@ const picture = new Picture(choice || draw, {
   failed: (reason) => panel.show(dialogs.cannotDraw(reason)),
 });
 const connection = new Connection(() => ({ type: "hello", tab, trial, view: picture.view }), take);
-const inputs = new Inputs((values) => picture.add(connection.input({ ...values, step: picture.drawn?.step ?? null })));
+const inputs = new Inputs((values) => {
+  const input = connection.input({ ...values, step: picture.drawn?.step ?? null });
+  picture.add(input);
+  if (!values.press) return;
+  pressed = input.number;
+  if (picture.drawn) showBusy("One moment");
+});
 const sounds = new Sounds();
 const bindings = new Bindings();
 const hud = new Hud(() => bindings.label("act"));
@@ -89,7 +97,8 @@ function take(message) {
       picture.take(message);
       break;
     case "snapshot":
-      byId("busy", HTMLElement).hidden = !message.busy;
+      if (message.busy) showBusy(BUSY);
+      else if (message.input >= pressed) showBusy("");
       picture.take(message);
       break;
     case "frame":
@@ -101,7 +110,7 @@ function take(message) {
       if (session.phase === "running") connection.send({ type: "beat" }); // not by a timer: those of hidden pages are slow
       break;
     case "busy":
-      byId("busy", HTMLElement).hidden = !message.busy;
+      showBusy(message.busy ? BUSY : "");
       break;
     case "saved":
       connection.close();
@@ -127,6 +136,14 @@ function take(message) {
       if (!message.final) lose();
       else if (message.code === TOO_MUCH) panel.show(dialogs.CLOSED);
   }
+}
+
+/** @param {string} text why a key does nothing now, or empty */
+function showBusy(text) {
+  const mark = byId("busy", HTMLElement);
+  mark.hidden = !text;
+  mark.textContent = text;
+  mark.classList.toggle("asked", text !== BUSY);
 }
 
 /** @param {number} now ms */
