@@ -106,7 +106,7 @@ async function played(delay, lost) {
   const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
   const [up, down, server] = [new Way(delay, lost, random), new Way(delay, lost, random), new Server()];
   /** @type {Input[]} */
-  let unsent = [];
+  const unsent = [];
   let now = 0;
   const view = new DrawnView(
     /** @type {HTMLCanvasElement} */ ({}),
