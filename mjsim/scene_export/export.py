@@ -20,7 +20,10 @@ from mjsim.model.rooms import RoomMap
 from mjsim.model.scene import Scene, assemble
 from mjsim.render import shadows
 from mjsim.scene_export import textures
+from mjsim.scene_export.cube_maps import FACES
 from mjsim.scene_export.glb import UPRIGHT, Glb
+from mjsim.scene_export.lights import lights_of, rounded
+from mjsim.scene_export.parts import divided
 from mjsim.scene_export.shapes import Floats
 from mjsim.scene_export.store import SCENE
 from mjsim.scene_export.surfaces import Surface, drawn_scene, surfaces
@@ -83,16 +86,23 @@ class _Export:
         self._data = mujoco.MjData(scene.model)
         mujoco.mj_forward(scene.model, self._data)
         self._drawn = drawn_scene(scene.model, self._data)
-        self._images: dict[tuple[int, bool], tuple[str, bytes]] = {}
+        self._images = textures.Images(scene.model)
+        self._refuse_moving_lights()
 
     @cached_property
     def _by_body(self) -> dict[int, list[Surface]]:
         """Visible geoms by the body that carries them along, 0 for what never moves."""
         found: dict[int, list[Surface]] = {}
         carried = self._model.body_weldid[self._model.geom_bodyid]
-        for surface in surfaces(self._model, self._drawn):
+        for surface in surfaces(self._model, self._data, self._drawn):
             found.setdefault(int(carried[surface.geom]), []).append(surface)
         return found
+
+    def _refuse_moving_lights(self) -> None:
+        for light, body in enumerate(self._model.light_bodyid):
+            if self._model.body_weldid[body] != 0:
+                name = self._model.light(light).name
+                raise AssetError(f"light {name!r} is part of an object; remove it, or move it into the house")
 
     def files(self) -> dict[str, bytes]:
         """All files by name."""
@@ -136,35 +146,34 @@ class _Export:
 
     def episode(self) -> bytes:
         """House and objects in one file."""
-        glb = Glb(self._image)
-        nodes = self._static(glb)
+        glb = Glb(self._images)
+        nodes = self._rooms(glb)
         for placed in self._scene.episode.objects:
             position, rotation, quaternion = self._frame(self._scene.index.body(placed.name))
             inner = glb.mesh(placed.model, self._carried(placed, position, rotation))
             nodes.append(
                 glb.node(placed.name, [inner], translation=position.tolist(), rotation=_xyzw(quaternion))
             )
-        return glb.content(glb.node("house", nodes, rotation=UPRIGHT, extras=self._lights()))
+        return glb.content(glb.node("house", nodes, rotation=UPRIGHT, extras=lights_of(self._drawn)))
 
     def _house(self) -> tuple[Glb, int]:
-        glb = Glb(self._image)
-        return glb, glb.node("house", self._static(glb), rotation=UPRIGHT, extras=self._lights())
+        glb = Glb(self._images)
+        return glb, glb.node("house", self._rooms(glb), rotation=UPRIGHT, extras=lights_of(self._drawn))
 
-    def _static(self, glb: Glb) -> list[int]:
-        """Nodes of what never moves: what top-down views show, and what they leave out.
-
-        They are not split by room: a house has few textures, and each costs a draw in every room that shows it.
-        """
-        groups: dict[bool, list[Surface]] = {}
-        for surface in self._by_body.get(0, []):
-            groups.setdefault(surface.is_ceiling, []).append(surface)
+    def _rooms(self, glb: Glb) -> list[int]:
+        """Nodes of what never moves, in parts that can be culled; what top-down views leave out is apart."""
+        groups: dict[tuple[bool, str], list[Surface]] = {}
+        for surface, part in divided(self._by_body.get(0, []), self._scene.rooms):
+            groups.setdefault((surface.is_ceiling, part), []).append(surface)
         return [
-            glb.mesh("ceiling", group, extras={"ceiling": True}) if is_ceiling else glb.mesh("static", group)
-            for is_ceiling, group in sorted(groups.items())
+            glb.mesh(f"ceiling_{part}", group, extras={"ceiling": True})
+            if ceiling
+            else glb.mesh(f"static_{part}", group)
+            for (ceiling, part), group in sorted(groups.items(), key=lambda item: item[0])
         ]
 
     def _object(self, placed: PlacedObject) -> tuple[Glb, int]:
-        glb = Glb(self._image)
+        glb = Glb(self._images)
         position, rotation, _ = self._frame(self._scene.index.body(placed.name))
         mesh = glb.mesh(placed.model, self._carried(placed, position, rotation))
         return glb, glb.node(placed.model, [mesh], rotation=UPRIGHT)
@@ -178,7 +187,7 @@ class _Export:
 
     def _person(self) -> tuple[Glb, int]:
         """The body with the hands at rest; the body itself is not drawn."""
-        glb = Glb(self._image)
+        glb = Glb(self._images)
         base, turned, _ = self._frame(self._model.body(avatar.BODY).id)
         hands = []
         for hand, name in zip(avatar.HANDS, _HANDS, strict=True):
@@ -203,38 +212,21 @@ class _Export:
             centre = (self._data.geom_xpos[geom] - position) @ rotation + turned @ box[:3]
             quaternion = np.zeros(4)
             mujoco.mju_mat2Quat(quaternion, turned.ravel())
-            boxes.append(_rounded([*centre, *box[3:], *quaternion]))
+            boxes.append(rounded([*centre, *box[3:], *quaternion]))
         return {
             "label": self._scene.catalogue.objects[placed.model].label,
-            "bounds": [_rounded(points.min(axis=0)), _rounded(points.max(axis=0))],
+            "bounds": [rounded(points.min(axis=0)), rounded(points.max(axis=0))],
             "boxes": boxes,
         }
-
-    def _lights(self) -> dict[str, Any]:
-        """The lights that MuJoCo would switch on, apart from the one on the viewer's head."""
-        lights, headlight = [], {"ambient": [0.0] * 3, "diffuse": [0.0] * 3, "specular": [0.0] * 3}
-        for light in self._drawn.lights[: self._drawn.nlight]:
-            colours = {name: _rounded(getattr(light, name)) for name in headlight}
-            if light.headlight:
-                headlight = colours
-            else:
-                lights.append(
-                    {
-                        "type": mujoco.mjtLightType(light.type).name.removeprefix("mjLIGHT_").lower(),
-                        "position": _rounded(light.pos),
-                        "direction": _rounded(light.dir),
-                        "cutoff": float(light.cutoff),
-                        "exponent": float(light.exponent),
-                        "attenuation": _rounded(light.attenuation),
-                        **colours,
-                    }
-                )
-        return {"lights": lights, "headlight": headlight}
 
     def _sky(self) -> bytes | None:
         """The sky's six faces below each other: right, left, up, down, front, back; None without a sky."""
         found = np.flatnonzero(self._model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
-        return textures.webp(textures.pixels(self._model, found[0]), lossless=True) if len(found) else None
+        if not len(found):
+            return None
+        image = textures.pixels(self._model, found[0])
+        faces = FACES * image.shape[1] // image.shape[0]  # 1 where the image has all six
+        return textures.webp(np.tile(image, (faces, 1, 1)), lossless=True)
 
     def _shadow(self) -> tuple[dict[str, Any], bytes] | None:
         """What draws the spots under objects, and their texture; None where the house has no material for them."""
@@ -245,20 +237,13 @@ class _Export:
         if texture < 0:
             return None
         about = {
-            "rgba": _rounded(self._model.mat_rgba[material]),
+            "rgba": rounded(self._model.mat_rgba[material]),
             "border": shadows.BORDER,
             "lift": shadows.LIFT,
             "reach": shadows.REACH,
             "texture": SHADOW,
         }
         return about, textures.webp(textures.pixels(self._model, texture), alpha=True, lossless=True)
-
-    def _image(self, texture: int, alpha: bool) -> tuple[str, bytes]:
-        key = (texture, alpha)
-        if key not in self._images:
-            image = textures.webp(textures.pixels(self._model, texture), alpha=alpha)
-            self._images[key] = textures.name_of(self._model, texture), image
-        return self._images[key]
 
 
 def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
@@ -267,7 +252,7 @@ def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
     return [
         {
             "label": rooms.label(key),
-            "polygon": [_rounded(point) for point in centre + (corners * half) @ axes.T],
+            "polygon": [rounded(point) for point in centre + (corners * half) @ axes.T],
         }
         for key, centre, half, axes in zip(
             rooms.keys, rooms.centers, rooms.half_sizes, rooms.axes, strict=True
@@ -284,10 +269,6 @@ def _file_name(key: str) -> str:
 
 def _xyzw(quaternion: Floats) -> list[float]:
     return [float(v) for v in np.roll(quaternion, -1)]
-
-
-def _rounded(values: Any) -> list[float]:
-    return [round(float(value), 6) for value in values]
 
 
 def _json(value: Mapping[str, Any]) -> bytes:

@@ -68,13 +68,11 @@ class Glb:
         every = np.concatenate([s.positions for group in groups.values() for s in group])
         low, extent = every.min(axis=0), float(np.ptp(every, axis=0).max())
         step = next((step for step in _STEPS if extent / step < 65535.0), extent / 65535.0)
-        origin = np.floor(low / step) * step
-        primitives = [self._primitive(look, groups[look], origin, step) for look in sorted(groups)]
+        primitives = [self._primitive(look, groups[look], low, step) for look in sorted(groups)]
         self._meshes.append({"name": name, "primitives": primitives})
-        inner = self.node(
-            name, mesh=len(self._meshes) - 1, translation=origin.tolist(), scale=[step] * 3, **properties
+        return self.node(
+            name, mesh=len(self._meshes) - 1, translation=low.tolist(), scale=[step] * 3, **properties
         )
-        return inner
 
     def _primitive(self, look: Look, group: Sequence[Surface], origin: Floats, step: float) -> dict[str, Any]:
         counts = [len(surface.positions) for surface in group]

@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _Geom = mujoco.mjtGeom
-_MESHES = (_Geom.mjGEOM_MESH, _Geom.mjGEOM_SDF)
+MESHES = (_Geom.mjGEOM_MESH, _Geom.mjGEOM_SDF)
 _FLATTENED_BELOW = (
     0.8  # cosine between the normals of a vertex and its face, below which MuJoCo takes the face's
 )
@@ -23,21 +23,22 @@ class Shape(NamedTuple):
     positions: Floats  # m, (n, 3)
     normals: Floats  # of unit length, (n, 3)
     triangles: Indices  # counter-clockwise seen from outside, (t, 3)
+    unscaled: Floats  # directions from the centre of a cube texture, (n, 3)
     uv: (
         Floats | None
-    )  # texture coordinates, of an image that covers the shape once, (n, 2); None for a mesh without
+    )  # texture coordinates of one image over all, v downwards, (n, 2); None for meshes without
 
 
 def shape_of(model: Any, geom: Any) -> Shape:
-    """Triangles of an `MjvGeom` of a model; `ValueError` of a kind that the renderer does not draw."""
+    """Triangles of an `MjvGeom` of a model; `ValueError` for a type of geom that cannot be shown."""
     kind, size = _Geom(geom.type), np.array(geom.size, np.float64)
-    if kind in _MESHES:
+    if kind in MESHES:
         return _mesh(model, geom.dataid // 2)
     slices, stacks = int(model.vis.quality.numslices), int(model.vis.quality.numstacks)
     if kind == _Geom.mjGEOM_CAPSULE:
         return _capsule(size, slices, stacks)
     if kind == _Geom.mjGEOM_PLANE:
-        return _scaled(_quad(), np.array([size[0], size[1], 1.0]))
+        return _plane(size, 2.0 * model.vis.map.zfar * model.stat.extent)
     if kind == _Geom.mjGEOM_BOX:
         return _scaled(_box(), size)
     if kind == _Geom.mjGEOM_CYLINDER:
@@ -59,13 +60,9 @@ def _joined(*parts: Shape) -> Shape:
         np.concatenate([part.positions for part in parts]),
         np.concatenate([part.normals for part in parts]),
         np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=False)]),
+        np.concatenate([part.unscaled for part in parts]),
         np.concatenate([part.uv for part in parts if part.uv is not None]),
     )
-
-
-def _laid_over(across: Floats, down: Floats) -> Floats:
-    """Texture coordinates (n, 2) of vertices whose places (n,) across and down an image go from -1 to 1."""
-    return np.column_stack((1.0 + across, 1.0 + down)) / 2.0
 
 
 def _grid(rows: int, columns: int) -> Indices:
@@ -76,81 +73,94 @@ def _grid(rows: int, columns: int) -> Indices:
     return np.concatenate([np.column_stack((low, low + 1, high + 1)), np.column_stack((low, high + 1, high))])
 
 
-def _circle(slices: int) -> tuple[Floats, Floats]:
-    angles = np.arange(slices + 1) * (2.0 * math.pi / slices)
-    return np.cos(angles), np.sin(angles)
-
-
 def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
     """The unit sphere from the height `low` to `high`, each -1, 0 or 1."""
     halves = max(stacks // 2, 1)
-    elevations = np.arange(low * halves, high * halves + 1) * (0.5 * math.pi / halves)
-    cosines, sines = _circle(slices)
-    flat = np.cos(elevations)[:, None]
-    heights = np.repeat(np.sin(elevations)[:, None], slices + 1, axis=1)
-    points = np.stack((flat * cosines, flat * sines, heights), axis=-1).reshape(-1, 3)
-    down, around = np.meshgrid(
-        np.linspace(1, 0, len(elevations)), np.linspace(0, 1, slices + 1), indexing="ij"
+    around, up = np.meshgrid(
+        np.arange(slices + 1) / slices, np.arange(low * halves, high * halves + 1) / halves
     )
-    triangles = _grid(len(elevations) - 1, slices)
-    corners = points[triangles]
-    twice_area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    uv = np.column_stack((around.ravel(), down.ravel()))
-    return Shape(points, points, triangles[twice_area > 1e-9], uv)
+    flat = np.cos(0.5 * math.pi * up)
+    points = np.stack(
+        (
+            flat * np.cos(2.0 * math.pi * around),
+            flat * np.sin(2.0 * math.pi * around),
+            np.sin(0.5 * math.pi * up),
+        ),
+        axis=-1,
+    ).reshape(-1, 3)
+    uv = np.column_stack((around.ravel(), (high - up.ravel()) / (high - low)))
+    # At a pole a cell is one triangle, with its corner there in the middle of the cell's part of the image.
+    is_pole = np.abs(points[:, 2]) > 1.0 - 1e-9
+    uv[is_pole, 0] -= 0.5 / slices * np.sign(points[is_pole, 2])
+    triangles = _grid(len(up) - 1, slices)
+    return Shape(points, points, triangles[is_pole[triangles].sum(axis=1) < 2], points, uv)
+
+
+def _circle(slices: int) -> Floats:
+    """Points of the unit circle (slices + 1, 2), the first again as the last."""
+    angles = np.arange(slices + 1) * (2.0 * math.pi / slices)
+    return np.column_stack((np.cos(angles), np.sin(angles)))
 
 
 def _tube(slices: int) -> Shape:
     """The unit cylinder without its ends."""
-    cosines, sines = _circle(slices)
-    around = np.column_stack((cosines, sines, np.zeros(slices + 1)))
+    around = np.column_stack((_circle(slices), np.zeros(slices + 1)))
     up = np.array([0.0, 0.0, 1.0])
     points = np.concatenate((around - up, around + up))
-    turn = np.linspace(0.0, 1.0, slices + 1)
-    uv = np.column_stack((np.tile(turn, 2), np.repeat([1.0, 0.0], slices + 1)))
-    return Shape(points, np.concatenate((around, around)), _grid(1, slices), uv)
+    share = np.tile(np.arange(slices + 1) / slices, 2)
+    uv = np.column_stack((share, 0.5 * (1.0 - points[:, 2])))
+    return Shape(points, np.concatenate((around, around)), _grid(1, slices), points, uv)
 
 
 def _disc(slices: int, height: float) -> Shape:
     """The end of a unit cylinder at the height 1 or -1."""
-    cosines, sines = _circle(slices)
-    ring = np.column_stack((cosines, sines, np.full(slices + 1, height)))[:-1]
+    flat = np.concatenate((np.zeros((1, 2)), _circle(slices)[:-1]))
     number = np.arange(slices)
     triangles = np.column_stack((np.zeros(slices, np.int64), 1 + number, 1 + (number + 1) % slices))
-    points = np.concatenate(([[0.0, 0.0, height]], ring))
+    points = np.column_stack((flat, np.full(slices + 1, height)))
     normals = np.tile([0.0, 0.0, height], (slices + 1, 1))
-    uv = _laid_over(points[:, 0], points[:, 1])  # on its head: so MuJoCo does it
-    return Shape(points, normals, triangles if height > 0.0 else triangles[:, ::-1], uv)
+    return Shape(points, normals, triangles if height > 0.0 else triangles[:, ::-1], points, 0.5 + 0.5 * flat)
 
 
 def _quad() -> Shape:
     points = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
-    uv = _laid_over(points[:, 0], -points[:, 1])
-    return Shape(points, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]), uv)
+    uv = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
+    return Shape(points, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]), points, uv)
+
+
+def _plane(size: Floats, far: float) -> Shape:
+    """A plane of half-sizes (x, y, ...), m; one of size 0 ends at `far`, where nothing is seen of it."""
+    shape = _quad()
+    endless = size[:2] <= 0.0
+    half = np.where(endless, far, size[:2])
+    # An endless image begins in the middle and is 2 m wide.
+    uv = shape.positions[:, :2] * [0.5, -0.5] * np.where(endless, half, 1.0) + np.where(endless, 0.0, 0.5)
+    return shape._replace(positions=shape.positions * [*half, 1.0], uv=uv)
 
 
 def _box() -> Shape:
-    sides = []
-    for axis in range(3):
+    """Six quads, with the image upright on the sides and seen in a mirror on three of them."""
+    quad, sides = _quad(), []
+    for normal, right, up in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
         for sign in (-1.0, 1.0):
-            turned = np.roll(_quad().positions, axis + 1, axis=1)
-            turned[:, axis] = sign
-            normals = np.zeros((4, 3))
-            normals[:, axis] = sign
-            triangles = _quad().triangles
-            uv = _laid_over(turned[:, 1 if axis == 0 else 0], -turned[:, 1 if axis == 2 else 2])
-            sides.append(Shape(turned, normals, triangles if sign > 0.0 else triangles[:, ::-1], uv))
+            points, normals = np.zeros((4, 3)), np.zeros((4, 3))
+            points[:, right], points[:, up] = quad.positions[:, 0], quad.positions[:, 1]
+            points[:, normal] = normals[:, normal] = sign
+            is_turned = sign * (1.0 if normal != 1 else -1.0) < 0.0
+            triangles = quad.triangles[:, ::-1] if is_turned else quad.triangles
+            sides.append(Shape(points, normals, triangles, points, quad.uv))
     return _joined(*sides)
 
 
 def _capsule(size: Floats, slices: int, stacks: int) -> Shape:
-    """A tube between two half spheres, each of which shows the whole image."""
+    """A tube between two half spheres, each with the whole image."""
     radius, half = (size[0] + size[1]) / 2.0, size[2]
     parts = [_scaled(_tube(slices), size)]
-    for low, high, height in ((0, 1, half), (-1, 0, -half)):
+    for low, high in ((0, 1), (-1, 0)):
         cap = _scaled(_sphere(slices, stacks, low, high), np.array([size[0], size[1], radius]))
-        parts.append(cap._replace(positions=cap.positions + np.array([0.0, 0.0, height])))
+        up = np.array([0.0, 0.0, low + high])
+        # MuJoCo's half spheres stand on the ends of the unit cylinder.
+        parts.append(cap._replace(positions=cap.positions + half * up, unscaled=cap.unscaled + up))
     return _joined(*parts)
 
 
@@ -181,4 +191,6 @@ def _without_copies(faces: Any, vertices: Floats, normals: Floats, uv: Floats | 
         parts.append(uv.reshape(-1, 2))
     unique, index = np.unique(np.concatenate(parts, axis=1), axis=0, return_inverse=True)
     points = unique[:, :3]
-    return Shape(points, unique[:, 3:6], index.reshape(-1, 3), unique[:, 6:] if uv is not None else None)
+    return Shape(
+        points, unique[:, 3:6], index.reshape(-1, 3), points, unique[:, 6:] if uv is not None else None
+    )

@@ -6,13 +6,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from mjsim.errors import AssetError
 from mjsim.render.profiles import FAST
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS
 from mjsim.render.scene_settings import visual_option
-from mjsim.scene_export.shapes import Floats, Indices, Shape, shape_of
+from mjsim.scene_export.cube_maps import laid_out
+from mjsim.scene_export.shapes import MESHES, Floats, Indices, Shape, shape_of
 
 _OPAQUE_FROM = 0.995  # MuJoCo blends geoms of a lower alpha
 _RGB = mujoco.mjtTextureRole.mjTEXROLE_RGB
@@ -67,7 +67,7 @@ def drawn_scene(model: Any, data: Any) -> Any:
     return scene
 
 
-def surfaces(model: Any, scene: Any) -> Iterator[Surface]:
+def surfaces(model: Any, data: Any, scene: Any) -> Iterator[Surface]:
     """All visible geoms of an abstract scene, in its order.
 
     Raises:
@@ -75,10 +75,10 @@ def surfaces(model: Any, scene: Any) -> Iterator[Surface]:
     """
     for geom in scene.geoms[: scene.ngeom]:
         if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.rgba[3] > 0.0:
-            yield _surface(model, geom)
+            yield _surface(model, data, geom)
 
 
-def _surface(model: Any, geom: Any) -> Surface:
+def _surface(model: Any, data: Any, geom: Any) -> Surface:
     try:
         shape = shape_of(model, geom)
     except ValueError:
@@ -88,14 +88,15 @@ def _surface(model: Any, geom: Any) -> Surface:
             f"geom {name!r} is of the type {kind}, which cannot be exported; make it a mesh"
         ) from None
     is_translucent = bool(geom.rgba[3] < _OPAQUE_FROM)
-    rotation = np.array(geom.mat, np.float64).reshape(3, 3)
-    texture = int(model.mat_texid[geom.matid, _RGB]) if geom.matid >= 0 else -1
+    # The scene moves endless planes along with its camera.
+    position, rotation = data.geom_xpos[geom.objid], data.geom_xmat[geom.objid].reshape(3, 3)
+    shape, texture = _textured(model, geom, shape)
     return Surface(
         geom=int(geom.objid),
-        positions=shape.positions @ rotation.T + np.array(geom.pos, np.float64),
+        positions=shape.positions @ rotation.T + position,
         normals=shape.normals @ rotation.T,
         triangles=shape.triangles,
-        uv=_coordinates(model, geom, shape) if texture >= 0 else None,
+        uv=shape.uv if texture >= 0 else None,
         texture=texture,
         rgba=np.clip(np.array(geom.rgba, np.float64), 0.0, 1.0),
         shine=np.clip(np.array([geom.specular, geom.shininess, geom.emission], np.float64), 0.0, 1.0),
@@ -105,15 +106,22 @@ def _surface(model: Any, geom: Any) -> Surface:
     )
 
 
-def _coordinates(model: Any, geom: Any, shape: Shape) -> NDArray[np.float64]:
-    """Texture coordinates (n, 2) as MuJoCo 3.17 draws them; other versions do it in other ways."""
-    if geom.texcoord and shape.uv is not None:
-        return shape.uv
-    repeat, size = np.array(model.mat_texrepeat[geom.matid], np.float64), np.array(geom.size[:2], np.float64)
-    size = np.where(size > 0.0, size, 1.0)
-    if model.mat_texuniform[geom.matid]:
-        repeat = repeat * size
-    if shape.uv is None:  # of a mesh, whose middle is the middle of the image
-        middle: Floats = 0.5 + 0.5 * repeat * np.array([1.0, -1.0]) * shape.positions[:, :2] / size
-        return middle
-    return shape.uv * repeat
+def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
+    """The shape with the texture coordinates that MuJoCo gives it, and the id of its texture, -1 for none."""
+    texture = int(model.mat_texid[geom.matid, _RGB]) if geom.matid >= 0 else -1
+    if texture < 0:
+        return shape, -1
+    is_cube = model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D
+    size = np.array(geom.size, np.float64)
+    scale = np.where(size > 0.0, size, 1.0) if model.mat_texuniform[geom.matid] else np.ones(3)
+    repeat = scale[:2] * model.mat_texrepeat[geom.matid]
+    if not is_cube:
+        if shape.uv is not None:
+            is_endless = geom.type == mujoco.mjtGeom.mjGEOM_PLANE and size[:2].min() <= 0.0
+            return shape._replace(uv=shape.uv * repeat - 0.5 * is_endless), texture
+        over = shape.unscaled[:, :2] / size[:2] * [0.5, -0.5]  # it lies over the mesh's x and y axes
+        return shape._replace(uv=over * repeat + 0.5), texture
+    if shape.uv is not None and geom.type in MESHES:
+        return shape, -1  # a cube does not show on a mesh with coordinates of its own
+    width = int(model.tex_width[texture])
+    return laid_out(shape, scale, width, int(model.tex_height[texture]) // width), texture

@@ -12,7 +12,10 @@ _LOSSLESS = 101  # of OpenCV's parameter
 
 
 def pixels(model: Any, texture: int) -> NDArray[np.uint8]:
-    """The image of a texture, uint8, (height, width, channels); six faces below each other for cubes and skies."""
+    """The image of a texture, uint8, (height, width, channels).
+
+    Of cubes and skies it holds six faces below each other, or one that shows on all sides.
+    """
     shape = (
         int(model.tex_height[texture]),
         int(model.tex_width[texture]),
@@ -23,9 +26,21 @@ def pixels(model: Any, texture: int) -> NDArray[np.uint8]:
     return image
 
 
-def name_of(model: Any, texture: int) -> str:
-    """The name of a texture."""
-    return str(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXTURE, texture) or f"texture {texture}")
+class Images:
+    """The textures of a model as WebP, each encoded once."""
+
+    def __init__(self, model: Any) -> None:
+        self._model = model
+        self._encoded: dict[tuple[int, bool], tuple[str, bytes]] = {}
+
+    def __call__(self, texture: int, alpha: bool) -> tuple[str, bytes]:
+        """Name and WebP file of a texture, with or without its alpha."""
+        key = (texture, alpha)
+        if key not in self._encoded:
+            name = mujoco.mj_id2name(self._model, mujoco.mjtObj.mjOBJ_TEXTURE, texture)
+            encoded = webp(pixels(self._model, texture), alpha=alpha)
+            self._encoded[key] = str(name or f"texture {texture}"), encoded
+        return self._encoded[key]
 
 
 def webp(image: NDArray[np.uint8], *, alpha: bool = False, lossless: bool = False) -> bytes:

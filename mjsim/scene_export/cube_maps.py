@@ -1,0 +1,115 @@
+"""Cube textures, which glTF does not know: triangles are cut where the cube's faces meet and laid out on one image."""
+
+import itertools
+
+import numpy as np
+
+from mjsim.scene_export.shapes import Floats, Indices, Shape
+
+FACES = 6  # +x, -x, +y, -y, +z, -z below each other in an image
+_MAX_SHIFT = 0.015  # of the image in the middle of an edge, as a share of a face
+_MAX_CUTS = 4  # of each edge in halves
+_EDGE = 1e-6  # share of a direction's length within which it lies on an edge of the cube
+# By face: axes and signs of the directions in which a face's columns and rows run, as OpenGL has them.
+_COLUMNS = ((2, -1.0), (2, 1.0), (0, 1.0), (0, 1.0), (0, 1.0), (0, -1.0))
+_ROWS = ((1, -1.0), (1, -1.0), (2, 1.0), (2, -1.0), (1, -1.0), (1, -1.0))
+
+
+def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
+    """A shape whose `uv` shows a cube texture that surrounds it.
+
+    Args:
+        shape: Triangles; the direction of a vertex from the cube's centre is `unscaled * scale`.
+        scale: Factors (3,).
+        side: Width of a face, px.
+        faces: How many faces the image holds: 6, or 1 that shows on all sides.
+    """
+    directions = shape.unscaled * scale
+    corners = np.concatenate((shape.positions, shape.normals, directions), axis=1)[shape.triangles]
+    for i, j in itertools.combinations(range(3), 2):
+        for sign in (-1.0, 1.0):
+            corners = _cut(corners, sign, 6 + i, 6 + j)
+    for _ in range(_MAX_CUTS):
+        corners = _halved(corners)
+    face = _faces_of(corners)
+    uv = _coordinates(corners[..., 6:], face)
+    inset = 0.5 / side  # of the texture's filter, so that other faces do not shine through
+    uv = np.clip(uv, inset, 1.0 - inset)
+    if faces > 1:
+        uv[..., 1] = (uv[..., 1] + face[:, None]) / faces
+    return _joined(corners, uv)
+
+
+def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
+    """Triangles (t, 3, k) cut where column i equals `sign` times column j."""
+    values = corners[..., i] - sign * corners[..., j]
+    values[np.abs(values) <= _EDGE * np.linalg.norm(corners[..., 6:], axis=-1)] = 0.0
+    crossing = (values.min(axis=1) < 0.0) & (values.max(axis=1) > 0.0)
+    pieces = [corners[~crossing]]
+    corners, values = corners[crossing], values[crossing]
+    # Turned so that the first corner lies alone on its side, or on the line between the other two.
+    signs = np.sign(values)
+    alone = np.where(
+        (signs == 0.0).any(axis=1),
+        np.argmin(np.abs(signs), axis=1),
+        np.argmax(signs == -np.sign(signs.sum(axis=1))[:, None], axis=1),
+    )
+    turn = (alone[:, None] + np.arange(3)) % 3
+    a, b, c = np.moveaxis(np.take_along_axis(corners, turn[..., None], axis=1), 1, 0)
+    at, bt, ct = np.take_along_axis(values, turn, axis=1).T
+    through = at == 0.0
+    middle = _between(b, c, bt, ct)
+    pieces += [_triangles(a, b, middle)[through], _triangles(a, middle, c)[through]]
+    a, b, c, at, bt, ct = (values[~through] for values in (a, b, c, at, bt, ct))
+    left, right = _between(a, b, at, bt), _between(a, c, at, ct)
+    pieces += [_triangles(a, left, right), _triangles(left, b, c), _triangles(left, c, right)]
+    return np.concatenate(pieces)
+
+
+def _between(a: Floats, b: Floats, at: Floats, bt: Floats) -> Floats:
+    """Where values that are `at` (t,) at the points `a` (t, k), and `bt` at `b`, are zero."""
+    share = np.divide(at, at - bt, out=np.zeros_like(at), where=at != bt)[:, None]
+    return a + share * (b - a)
+
+
+def _halved(corners: Floats) -> Floats:
+    """Triangles with those cut into four on which the image would be shifted."""
+    after = np.roll(corners, -1, axis=1)
+    face = _faces_of(corners)
+    ends = _coordinates(corners[..., 6:], face), _coordinates(after[..., 6:], face)
+    middle = _coordinates((corners + after)[..., 6:], face)
+    shifted = (np.abs((ends[0] + ends[1]) / 2 - middle) > _MAX_SHIFT).any(axis=(1, 2))
+    a, b, c = np.moveaxis(corners[shifted], 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    return np.concatenate([corners[~shifted], *(_triangles(*part) for part in parts)])
+
+
+def _triangles(a: Floats, b: Floats, c: Floats) -> Floats:
+    return np.stack((a, b, c), axis=1)
+
+
+def _faces_of(corners: Floats) -> Indices:
+    """The face of the cube that each triangle lies on, (t,)."""
+    middle = corners[..., 6:].mean(axis=1)
+    axis = np.abs(middle).argmax(axis=1)
+    is_negative = np.take_along_axis(middle, axis[:, None], axis=1)[:, 0] < 0.0
+    return np.asarray(2 * axis + is_negative, np.int64)
+
+
+def _coordinates(directions: Floats, face: Indices) -> Floats:
+    """Columns and rows (t, 3, 2), 0 to 1, on the face that each triangle lies on."""
+    axes = np.array([(column[0], row[0]) for column, row in zip(_COLUMNS, _ROWS, strict=True)])[face]
+    signs = np.array([(column[1], row[1]) for column, row in zip(_COLUMNS, _ROWS, strict=True)])[face]
+    depth = np.abs(np.take_along_axis(directions, (face // 2)[:, None, None], axis=2))
+    across = np.take_along_axis(directions, np.repeat(axes[:, None], 3, axis=1), axis=2)
+    return np.asarray(0.5 + 0.5 * signs[:, None] * across / np.maximum(depth, 1e-9))
+
+
+def _joined(corners: Floats, uv: Floats) -> Shape:
+    """Triangles (t, 3, 9) with texture coordinates (t, 3, 2) as a shape, vertices that agree taken once."""
+    rows = np.concatenate((corners, uv), axis=2).reshape(-1, 11)
+    _, first, index = np.unique(rows.round(9), axis=0, return_index=True, return_inverse=True)
+    rows = rows[first]
+    normals = rows[:, 3:6] / np.linalg.norm(rows[:, 3:6], axis=1, keepdims=True)
+    return Shape(rows[:, :3], normals, index.reshape(-1, 3), rows[:, 6:9], rows[:, 9:])
