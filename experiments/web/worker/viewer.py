@@ -96,7 +96,7 @@ class BrowserViewer(Viewer):
         self, live: LiveSession, seen: Observation, state: HudState, step: int
     ) -> Iterator[WireMessage]:
         """What is shown beside and in the picture."""
-        yield _hud(state)
+        yield page_hud(state)
         yield self._moment(live, seen, state, step)
         yield Busy(seen.busy) if self._snapshots is None else Markers(state.markers)
 
@@ -127,7 +127,8 @@ class BrowserViewer(Viewer):
         return Reach(label, receptacle, at if in_view else None, result.object, (px, py, pz))
 
 
-def _hud(state: HudState) -> Hud:
+def page_hud(state: HudState) -> Hud:
+    """What the page shows beside the picture: the state without markers and without what moves."""
     message = state.message
     if message is not None:
         message = dataclasses.replace(message, opacity=1.0) if message.opacity > 0.0 else None
