@@ -20,7 +20,7 @@ from hud.conditions import condition
 from hud.messages import message
 
 CONDITIONS = ("none", "highlight", "optimal", "guided", "highlight-regret", "optimal-bins")
-# What only one of them writes around the content: words for counts, titles of panels, and what is said to screen readers.
+# What only one of them writes around the content: words for counts, titles, and what only screen readers say.
 PAGE_ALONE = {"put", "away", "of", "left", "in", "your", "hand", "done", "·", "✓", "i", "→"}
 FILM_ALONE = {"•", "→", "·", "/"}
 PAGE = """<!doctype html><title>HUD</title><main id="play"><p id="progress"></p><p id="clock"></p><p id="room"></p>
@@ -33,7 +33,7 @@ SHOW = """async (state) => {
     hud.showMoment(moment);
     const rows = (id) => [...document.querySelectorAll(`#${id} li`)];
     return {
-        parts: [...document.querySelectorAll("#play b, #play small, #play i, #play p, #play h2")].map((e) => e.textContent),
+        parts: [...document.querySelectorAll("#play :is(b, small, i, p, h2)")].map((part) => part.textContent),
         tasks: rows("list").map((row) => row.querySelector("b").textContent),
         done: rows("list").map((row) => row.className === "done" || row.className === "carried"),
         current: rows("list").map((row) => row.hasAttribute("aria-current")),
