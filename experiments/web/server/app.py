@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
@@ -24,10 +25,11 @@ from starlette.websockets import WebSocket
 from experiments.errors import RecordError
 from experiments.procedure.comprehension import Question
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
+from experiments.web.modules import STATIC
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
 from experiments.web.server.limit import SessionLimit
-from experiments.web.server.pages import STATIC, message_page, page
+from experiments.web.server.pages import message_page, page
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.readings import Readings
 from experiments.web.server.scene_files import scene_route
@@ -83,7 +85,7 @@ class PlayServer:
                 Route("/play/{token}/floor-plan.png", self._floor_plan),
                 WebSocketRoute("/play/{token}", self._play),
                 scene_route(scenes_folder()),
-                Mount("/static", StaticFiles(directory=STATIC)),
+                Mount("/static", GZipMiddleware(StaticFiles(directory=STATIC))),
             ],
             middleware=[
                 Middleware(

@@ -1,14 +1,15 @@
 """The pages, from the Jinja2 templates of the client."""
 
-from pathlib import Path
+import functools
 from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.templating import Jinja2Templates
 
-CLIENT = Path(__file__).parents[1] / "client"
-STATIC = CLIENT / "static"
+from experiments.web.modules import STATIC, modules_of
+
+CLIENT = STATIC.parent
 
 
 def _duration(seconds: float) -> str:
@@ -16,8 +17,15 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 
+@functools.cache
+def _modules(entry: str) -> tuple[str, ...]:
+    """Paths of all modules of a page, which a browser then loads at once rather than one import after the other."""
+    return tuple(modules_of(entry))
+
+
 _templates = Jinja2Templates(CLIENT / "templates")
 _templates.env.filters["duration"] = _duration
+_templates.env.globals["modules"] = _modules
 _templates.env.trim_blocks = True
 
 

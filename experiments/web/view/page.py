@@ -2,8 +2,7 @@
 
 import base64
 import gzip
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,8 @@ from experiments.house import House
 from experiments.record.reader import Record
 from experiments.replay.replay import replay
 from experiments.replay.replayer import Replayer
-from experiments.web.server.pages import CLIENT, STATIC
+from experiments.web.modules import STATIC, modules_of
+from experiments.web.server.pages import CLIENT
 from experiments.web.view import timeline
 from experiments.web.view.recorder import RunRecorder
 from experiments.web.worker.encoders import data_url
@@ -25,8 +25,12 @@ from mjsim.scene_export.cache import cached_scene
 from mjsim.scene_export.store import GZIP, scenes_folder
 
 ENTRY = "view/view.js"
-_IMPORT = re.compile(r"(\bfrom\s*|\bimport\s*)([\"'])(\.{1,2}/[^\"']+)\2")
-_TYPES = {".json": "application/json", ".glb": "model/gltf-binary", ".webp": "image/webp"}
+_TYPES = {
+    ".js": "text/javascript",
+    ".json": "application/json",
+    ".glb": "model/gltf-binary",
+    ".webp": "image/webp",
+}
 
 
 def view_page(
@@ -55,11 +59,12 @@ def view_page(
     replay(directory, watch=watch, catalogue=catalogue, on_progress=on_progress)
     ((replayer, seen),) = watched
     record, house = replayer.record, replayer.house
+    modules = {name: _data_url(name, source.encode()) for name, source in modules_of(ENTRY).items()}
     models = {placed.model for placed in record.episode.objects}
     page: str = _template().render(
         title=_title(record),
         style=Markup((STATIC / "style.css").read_text("utf-8")),
-        modules=Markup(msgspec.json.encode({"imports": _modules(ENTRY)}).decode()),
+        modules=Markup(msgspec.json.encode({"imports": modules}).decode()),
         entry=ENTRY,
         run=_packed(_run(record, house, seen)),
         scene=_packed(_scene(house, models)),
@@ -125,26 +130,3 @@ def _packed(value: Any) -> str:
 
 def _data_url(name: str, data: bytes) -> str:
     return f"data:{_TYPES[Path(name).suffix]};base64,{base64.b64encode(data).decode()}"
-
-
-def _modules(entry: str) -> Mapping[str, str]:
-    """The module `entry` and all that it imports, as data URLs by their paths, which their imports name."""
-    found: dict[str, str] = {}
-    waiting = [entry]
-    while waiting:
-        path = waiting.pop()
-        if path in found:
-            continue
-        needs: list[str] = []
-        source = _IMPORT.sub(lambda match: _absolute(match, path, needs), (STATIC / path).read_text("utf-8"))  # noqa: B023
-        found[path] = f"data:text/javascript;base64,{base64.b64encode(source.encode()).decode()}"
-        waiting += needs
-    return found
-
-
-def _absolute(match: re.Match[str], path: str, needs: list[str]) -> str:
-    """An import with the path from the folder of all modules; the imported path is appended to `needs`."""
-    target = (STATIC / path).parent / match[3]
-    name = target.resolve().relative_to(STATIC.resolve()).as_posix()
-    needs.append(name)
-    return f'{match[1]}"{name}"'

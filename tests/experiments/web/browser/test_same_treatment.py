@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from jinja2 import Environment, FileSystemLoader
 
-from experiments.web.server.pages import CLIENT, STATIC
+from experiments.web.modules import STATIC
+from experiments.web.server.pages import CLIENT
 from experiments.web.worker.viewer import page_hud
 from hud import stencils
 from hud.compose import compose
