@@ -20,6 +20,7 @@ vi.mock("../static/vendor/three.js", async (original) => ({
     setPixelRatio() {}
     setSize() {}
     async compileAsync() {}
+    initTexture() {}
     dispose() {}
     getContext() {
       return { getExtension: () => null, getParameter: () => "software", RENDERER: 0 };

@@ -88,20 +88,20 @@ export class World3D {
     this.#house.add(house.group, this.#things, this.#markers);
     if (shadows) this.#house.add(shadows);
     if (sky) this.#scene.add(sky);
-    this.#scene.add(await this.#prepared(this.#house));
+    this.#outline.around(person.group); // so that it is prepared, too
+    this.#scene.add(this.#house);
+    await this.#prepared(this.#scene);
+    this.#outline.around(null);
     return file;
   }
 
-  /** Compiles and uploads all that a part needs, so that turning to it does not stutter. @template {Object3D} T @param {T} part */
+  /** Compiles shaders and uploads textures now, so that turning to a part does not stutter. @template {Object3D} T @param {T} part */
   async #prepared(part) {
     await this.#renderer.compileAsync(part, this.#camera);
-    /** @type {Object3D[]} */
-    const culled = [];
-    part.traverse((child) => child.frustumCulled && culled.push(child));
-    for (const child of culled) child.frustumCulled = false;
-    this.#renderer.render(new Scene().add(part), this.#camera);
-    for (const child of culled) child.frustumCulled = true;
-    this.draw(); // over what was just drawn
+    part.traverse((child) => {
+      const map = /** @type {any} */ (child).material?.uniforms?.map?.value;
+      if (map) this.#renderer.initTexture(map);
+    });
     return part;
   }
 
