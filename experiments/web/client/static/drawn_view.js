@@ -1,5 +1,6 @@
 // The view that this browser draws: scene, prediction of one's own walk, and what the server says about the rest.
 
+/** @import { HeadsetPage } from "./headset.js" */
 /** @import { Thing } from "./drawing/things.js" */
 /** @import { Input, Markers, Moment, Scene, Snapshot } from "./protocol.js" */
 
@@ -16,6 +17,8 @@ const SNAP = Math.PI / 8; // rad of a turn in calm pictures
 
 export class DrawnView {
   calm = false;
+  /** @type {HeadsetPage | null} */
+  headset = null;
   #world;
   #flush;
   /** @type {Scene | null} */
@@ -43,6 +46,15 @@ export class DrawnView {
     this.#world = new World3D(canvas);
     this.#world.onLost = lost;
     this.#flush = flush;
+  }
+
+  get world() {
+    return this.#world;
+  }
+
+  /** Which way the person looks, rad. */
+  get heading() {
+    return this.#body[2] ?? 0;
   }
 
   /** Whether there is something to see. */
@@ -150,7 +162,7 @@ export class DrawnView {
     this.#world.setPerson({ x, y, heading, hands: state.hands });
     const eye = eyeOf(this.#body, scene.gait);
     if (this.calm) eye.heading = SNAP * Math.round(heading / SNAP);
-    this.#world.setEye(eye);
+    if (!this.headset?.place(eye.position)) this.#world.setEye(eye);
     this.#world.draw();
     return { body: this.#body, moving, reach: this.#reachAt() };
   }

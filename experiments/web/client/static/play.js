@@ -8,6 +8,7 @@ import { Connection } from "./connection.js";
 import * as dialogs from "./dialogs.js";
 import { byId } from "./dom.js";
 import { connectGamepad } from "./gamepad.js";
+import { HeadsetPage } from "./headset.js";
 import { Help } from "./help.js";
 import { Hud } from "./hud.js";
 import { Inputs } from "./inputs.js";
@@ -90,6 +91,7 @@ function take(message) {
       break;
     case "hud":
       hud.show(message.state);
+      picture.drawn?.headset?.show(message.state, message.state.clock);
       sounds.hear(message.state);
       break;
     case "moment":
@@ -148,7 +150,12 @@ function showBusy(text) {
 
 /** @param {number} now ms */
 function drawFrame(now) {
-  requestAnimationFrame(drawFrame);
+  requestAnimationFrame(drawFrame); // of which there are none while a headset is worn
+  drawPicture(now);
+}
+
+/** @param {number} now ms */
+function drawPicture(now) {
   const drawn = session.phase === "running" ? picture.draw(now) : null;
   if (!drawn) return;
   hud.moveReach(drawn.reach);
@@ -282,6 +289,11 @@ rememberVisit();
 panel.show(dialogs.loading(false));
 learnLayout();
 const lack = await picture.prepare();
+const { drawn: view } = picture;
+if (view && "headset" in page.dataset) {
+  view.headset = new HeadsetPage(view.world, inputs);
+  view.headset.offer(byId("headset-button", HTMLElement), () => view.heading, drawPicture);
+}
 new Settings(byId("settings", HTMLFormElement), ({ sensitivity, inverted, sounds: audible, calm, text }) => {
   Object.assign(mouse, { sensitivity, inverted });
   sounds.on = audible;

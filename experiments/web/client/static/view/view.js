@@ -5,6 +5,7 @@
 
 import { byId, made } from "../dom.js";
 import { World3D } from "../drawing/world.js";
+import { HeadsetPage } from "../headset.js";
 import { Hud } from "../hud.js";
 import { eyeOf } from "../prediction/body.js";
 import { Orbit } from "./orbit.js";
@@ -26,6 +27,7 @@ const files = await unpacked("scene-data");
 const run = new Run(recorded);
 const hud = new Hud(() => "E");
 const world = new World3D(canvas);
+const headset = new HeadsetPage(world, null);
 const orbit = new Orbit(canvas, recorded.bounds);
 /** @type {"person" | "above" | "free"} */
 let camera = "person";
@@ -43,13 +45,18 @@ async function unpacked(id) {
 
 /** @param {number} now ms */
 function frame(now) {
+  requestAnimationFrame(frame); // of which there are none while a headset is worn
+  show(now);
+}
+
+/** @param {number} now ms */
+function show(now) {
   if (playing) {
     time = Math.min(run.duration, time + (Number(speed.value) * (now - last)) / 1000);
     if (time === run.duration) setPlaying(false);
   }
   last = now;
   draw();
-  requestAnimationFrame(frame);
 }
 
 function draw() {
@@ -57,7 +64,9 @@ function draw() {
   const [x = 0, y = 0, heading = 0, pitch = 0] = run.body(step, share);
   for (const { name, pose } of run.poses(step, share)) world.setPose(name, pose);
   world.setPerson({ x, y, heading, hands: run.hands(step, share) });
-  if (camera === "person") world.setEye(eyeOf([x, y, heading, pitch], recorded.person));
+  const eye = eyeOf([x, y, heading, pitch], recorded.person);
+  if (headset.place(eye.position)) headset.show(run.hud(step), run.hud(step).clock);
+  else if (camera === "person") world.setEye(eye);
   else world.setCamera(camera === "above" ? orbit.above() : orbit.pose());
   if (step !== shown) showStep(step, x, y, heading);
   slider.value = `${time}`;
@@ -159,4 +168,5 @@ world.setFieldOfView(recorded.person.field_of_view);
 byId("debug", HTMLElement).textContent = "";
 setCamera("person");
 world.resize();
+headset.offer(byId("headset-button", HTMLElement), () => run.body(run.at(time).step, 0)[2] ?? 0, show);
 requestAnimationFrame(frame);

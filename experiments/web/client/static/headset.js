@@ -1,0 +1,71 @@
+// Experimental: joins a page that draws with a headset. The head says where to look, controllers walk and press.
+
+/** @import { Point } from "./drawing/camera.js" */
+/** @import { World3D } from "./drawing/world.js" */
+/** @import { Inputs } from "./inputs.js" */
+/** @import { HudState } from "./protocol.js" */
+
+import { clockText } from "./hud.js";
+import { drawPanel } from "./drawing/xr_panel.js";
+import { Headset, hasHeadset } from "./drawing/xr.js";
+
+export class HeadsetPage {
+  #world;
+  #inputs;
+  #panel = Object.assign(document.createElement("canvas"), { width: 1024, height: 512 });
+  /** @type {Headset | null} */
+  #headset = null; // while it is worn
+  #heading = 0; // to which the person was told to turn, rad
+  #pitch = 0;
+
+  /** @param {World3D} world @param {Inputs | null} inputs of the session; null where a run is only looked at */
+  constructor(world, inputs) {
+    this.#world = world;
+    this.#inputs = inputs;
+  }
+
+  /**
+   * Shows a button where there is a headset.
+   * @param {HTMLElement} button
+   * @param {() => number} heading of the person, rad
+   * @param {(now: number) => void} frame is called for every picture
+   */
+  async offer(button, heading, frame) {
+    button.hidden = !(await hasHeadset());
+    button.addEventListener("click", () => this.#enter(heading(), frame));
+  }
+
+  /** @param {number} heading @param {(now: number) => void} frame */
+  async #enter(heading, frame) {
+    const headset = new Headset(this.#world, this.#panel);
+    [this.#heading, this.#pitch] = [heading, 0];
+    await headset.enter(heading, () => frame(performance.now()), () => {
+      this.#headset = null;
+      this.#inputs?.hold("headset", {});
+    });
+    this.#headset = headset;
+  }
+
+  /** Puts the eye somewhere, and takes what head and hands did; false where no headset is worn. @param {Point} eye */
+  place(eye) {
+    const [headset, inputs] = [this.#headset, this.#inputs];
+    if (!headset) return false;
+    headset.place(eye);
+    if (!inputs) return true;
+    const { heading, pitch } = headset.look();
+    const turn = Math.atan2(Math.sin(heading - this.#heading), Math.cos(heading - this.#heading));
+    inputs.look(turn, pitch - this.#pitch);
+    [this.#heading, this.#pitch] = [heading, pitch];
+    const { forward, left, pressed } = headset.controls();
+    inputs.hold("headset", { forward, left });
+    for (const press of pressed) inputs.press(press);
+    return true;
+  }
+
+  /** Shows the HUD on the panel. @param {HudState} hud @param {number | null} clock s */
+  show(hud, clock) {
+    if (!this.#headset) return;
+    drawPanel(this.#panel, hud, clock === null ? "" : clockText(clock));
+    this.#headset.refresh();
+  }
+}
