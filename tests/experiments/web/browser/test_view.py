@@ -4,6 +4,7 @@ import pytest
 
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
+from experiments.web.modules import STATIC
 from experiments.web.view.page import view_page
 
 HARMLESS = ("KHR_parallel_shader_compile", "GL Driver Message")  # said where there is no graphics card
@@ -23,6 +24,14 @@ VARIED = """() => {
         resolve(1 - Math.max(...colours.values()) / (32 * 24));
     }));
 }"""
+
+
+EMULATOR = STATIC.parent / "node_modules/iwer/build/iwer.min.js"
+WORN = """
+const device = new IWER.XRDevice(IWER.metaQuest3);
+device.installRuntime({ forceInstall: true });
+device.stereoEnabled = true;
+"""
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +78,22 @@ def test_a_run_can_be_played_and_searched(page):
 def test_every_camera_shows_the_house(page, camera):
     page.get_by_role("button", name=camera).click()
     page.wait_for_function(f"({VARIED})().then((share) => share > 0.3)")
+
+
+@pytest.mark.slow
+def test_a_headset_shows_the_run_from_the_persons_eyes(chromium, address):
+    if not EMULATOR.is_file():
+        pytest.skip("the client's packages are not installed: npm ci")
+    page = chromium.new_page(viewport={"width": 800, "height": 400})
+    page.set_default_timeout(60_000.0)
+    page.add_init_script(EMULATOR.read_text(encoding="utf-8") + WORN)
+    page.goto(address)
+    page.wait_for_function(LOADED)
+    page.get_by_role("button", name="Above").click()
+    page.get_by_role("button", name="Play", exact=True).click()
+    page.get_by_role("button", name="Headset").click()
+    at = "Number(document.getElementById('time').value)"
+    begin = page.evaluate(at)
+    page.wait_for_function(f"{at} > {begin} + 0.5")  # pictures come from the headset now
+    page.wait_for_function(f"({VARIED})().then((share) => share > 0.3)")
+    page.close()
