@@ -1,4 +1,4 @@
-// The view that this browser draws: scene, prediction of one's own walk, and what the server says about the rest.
+// The view that this browser draws: the scene, the person's predicted walk, and the server's state of all else.
 
 /** @import { HeadsetPage } from "./headset.js" */
 /** @import { Thing } from "./drawing/things.js" */

@@ -146,7 +146,7 @@ async function played(delay, lost) {
   return { jump, turn, moved, forced: server.forced };
 }
 
-describe("nobody sees a jump", () => {
+describe("the picture does not jump", () => {
   test.each([
     ["a good link", 5, 0],
     ["200 ms there and back, and 2 % of all packets lost", 100, 0.02],

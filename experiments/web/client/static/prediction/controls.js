@@ -15,7 +15,7 @@ const MAX_TURN_AHEAD = 2.8; // rad that the mouse can be ahead of the body
 export const AT_REST = Object.freeze({ held: null, heading: null, pitch: null });
 
 /**
- * The controls after further inputs, and the move that they ask for; a step with a press stands still.
+ * The controls after further inputs, and the move that they ask for; a step with a press has no move.
  * @param {Controls} before
  * @param {readonly Input[]} inputs of this control step
  * @param {number} heading of the body, rad

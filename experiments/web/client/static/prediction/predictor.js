@@ -1,5 +1,5 @@
-// What the server will say about one's own walking, before it says so. Inputs count at the control step for which they
-// were made, so that the prediction is exact unless the server decided something: a pick, or a step without us.
+// The person's walk as the server will compute it. Inputs count at the control step for which they were made, so the
+// prediction is exact, except where the server decides: on a pick, a place, or a step without its inputs.
 
 /** @import { Input } from "../protocol.js" */
 /** @import { Controls, Speeds } from "./controls.js" */
@@ -115,7 +115,7 @@ export class Predictor {
     return drawn;
   }
 
-  /** The server went on without us. @param {number} step */
+  /** Continues at the server's control step, which is ahead. @param {number} step */
   #restart(step) {
     this.step = step;
     this.#kept.clear();
