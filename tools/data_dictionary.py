@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from experiments.record.columns import HEALTH
+from experiments.record.displays import Displays
 from experiments.record.event_check import OUTCOMES, OutcomeEvent
 from experiments.record.events import TYPES, LoggedEvent
 from experiments.record.health import COUNTED
@@ -89,6 +90,7 @@ def _metrics_rows() -> Iterator[str]:
     yield from _rows(_described(PersonParameters, leave_out=set(GROUPS)), prefix="person_")
     yield "| `behaviour_...` | float | Values of the participant model, where it has any (docs/participants.md). |"
     yield from _rows(_described(Metrics))
+    yield from _rows(_described(Displays))
     for name in HEALTH:
         for statistic, words in _STATISTICS.items():
             yield f"| `{statistic}_{name}` | float | {words} {_QUANTITIES[name]}, {name.rsplit('_', 1)[1]}. |"

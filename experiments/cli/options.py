@@ -31,7 +31,7 @@ PERSON_VALUES = {  # options of their own, because they are changed most
 }
 # The settings that run, batch and play have in common.
 TRIAL_OPTIONS = tuple(
-    name for name in SETTINGS if name not in ("objects", "assistance", "user", "live", "behaviour")
+    name for name in SETTINGS if name not in ("objects", "assistance", "user", "live", "behaviour", "draw")
 )
 _TYPES = typing.get_type_hints(TrialConfig)
 

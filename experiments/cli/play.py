@@ -19,6 +19,7 @@ import msgspec
 
 from experiments.cli.options import (
     add_command,
+    add_setting,
     add_task_options,
     add_trial_options,
     given_options,
@@ -58,6 +59,7 @@ def add_parser(commands: Any) -> None:
     add_task_options(parser, OBJECTS)
     parser.add_argument("--user", default=HUMAN, metavar="NAME", help="name of the participant")
     add_trial_options(parser, phases=",".join(PHASES))
+    add_setting(parser, "draw")
     group = parser.add_argument_group("server")
     group.add_argument(
         "--port", type=_number(0, 65535), default=PORT, help="TCP port; 0 for any that is free"
@@ -130,7 +132,7 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
         user=HUMAN,
         **{
             "objects": OBJECTS,
-            **given_options(arguments, ("objects",)),
+            **given_options(arguments, ("objects", "draw")),
             **trial_options(arguments),
             "phases": ",".join(_phases(arguments)),
         },

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.record.displays import displays
 from experiments.record.health import summarise_health
 from experiments.record.origin import is_simulated
 from experiments.record.phases import FLYTHROUGH
@@ -117,6 +118,7 @@ def measure(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict
         **_person(events),
         **asdict(compute_metrics(events, arrays["position"])),
         **summarise_health(events, arrays),
+        **displays(events),
         "simulated_s": float(arrays["time"][-1]),
         **ending,
     }

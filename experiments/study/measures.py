@@ -10,6 +10,7 @@ import msgspec
 
 from experiments.blame import shown
 from experiments.errors import ConfigError
+from experiments.record.displays import Displays
 from experiments.record.metrics import CIRCUMSTANCES, Metrics
 from experiments.study.designs import FOLDER
 from experiments.trials.trial_config import SETTINGS
@@ -82,7 +83,8 @@ def present_columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
     """A sentence on columns that are neither measures nor part of a trial's record, if there are any."""
     read = {c for m in measures.objective.values() for c in (m.column, m.without, *m.others)}
-    known = {*read, *SETTINGS, *CIRCUMSTANCES, *(field.name for field in fields(Metrics))}
+    told = (field.name for kind in (Metrics, Displays) for field in fields(kind))
+    known = {*read, *SETTINGS, *CIRCUMSTANCES, *told}
     answers = {LIKERT_PREFIX + name for name in measures.likert}
     unread = [shown(c) for c in columns if c not in known | answers and not _OF_A_TRIAL.fullmatch(c)]
     more = f" and {len(unread) - SHOWN} more" if len(unread) > SHOWN else ""

@@ -21,6 +21,7 @@ from planner.solver import DEFAULT_SOLVER
 SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
 SEEDS = ("house_seed", "person_seed", "order_seed")
 NO_ASSISTANCE = "none"
+DRAWN_BY = ("auto", "browser", "server")
 MAX_SEED = 2**63 - 1  # tables hold 64 bits
 
 
@@ -124,6 +125,14 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             metavar="NAME",
         ),
     ] = NO_ASSISTANCE
+    draw: Annotated[
+        str,
+        _about(
+            "Who draws the picture of a person in a browser: `browser`, `server`, or `auto`, the browser where it can "
+            "(docs/play.md).",
+            choices=DRAWN_BY,
+        ),
+    ] = DRAWN_BY[0]
     person: Annotated[
         Distributions,
         _about(
@@ -146,7 +155,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             raise ConfigError(str(error)) from error
 
     def __post_init__(self) -> None:
-        for name in ("assistance", "user", "house", "planner", "fidelity", "phases"):
+        for name in ("assistance", "user", "house", "planner", "fidelity", "phases", "draw"):
             if not isinstance(getattr(self, name), str):
                 raise ConfigError(f"{name} must be text, got {getattr(self, name)!r}")
         seed = self.seed
@@ -168,6 +177,8 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     def _check(self) -> None:
         if self.fidelity not in FIDELITIES:
             raise ConfigError(f"no fidelity {self.fidelity!r}; choose one of {', '.join(FIDELITIES)}")
+        if self.draw not in DRAWN_BY:
+            raise ConfigError(f"no draw {self.draw!r}; choose one of {', '.join(DRAWN_BY)}")
         if self.points < 1:
             raise ConfigError(f"points is {self.points}; a house needs at least 1")
         if self.episode is None and not 1 <= self.objects <= self.points:

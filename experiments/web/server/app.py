@@ -194,8 +194,9 @@ class PlayServer:
         if visit.phase == FLYTHROUGH:
             return page(request, "film", wait=wait)
         if visit.phase in PLAYED:
-            objects = visit.settings(visit.phase)["objects"]
-            return page(request, "play", trial=visit.phase, objects=objects, wait=wait)
+            settings = visit.settings(visit.phase)
+            objects, draw = settings["objects"], settings["draw"]
+            return page(request, "play", trial=visit.phase, objects=objects, draw=draw, wait=wait)
         again = visit.settings(TASK)["episode"] is None  # else there is but one, whose best way was shown
         return page(
             request, "result", metrics=visit.metrics(TASK), again=again, token=request.path_params["token"]
