@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from hud.errors import FrameError
 from hud.state import Pointer, Vec3
 
+_IDENTITY, _ROUNDING = np.eye(3), 1e-6
 NEAR = 1e-6  # m; nearer than this along the view direction counts as behind the eye
 
 
@@ -33,7 +34,7 @@ class CameraView:
                 f"camera needs position (3,) and rotation (3, 3), got {np.shape(self.position)} and "
                 f"{np.shape(self.rotation)}"
             )
-        if not np.allclose(np.transpose(self.rotation) @ self.rotation, np.eye(3), atol=1e-6):
+        if not (np.abs(np.transpose(self.rotation) @ self.rotation - _IDENTITY) <= _ROUNDING).all():
             raise FrameError(f"camera rotation must be orthonormal, got {np.asarray(self.rotation).tolist()}")
         if not 0.0 < self.fovy < math.pi or self.width < 1 or self.height < 1:
             raise FrameError(

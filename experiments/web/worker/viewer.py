@@ -19,10 +19,9 @@ from experiments.web.worker.snapshots import SnapshotStream, scene_of
 from hud.projection import CameraView, project
 from hud.state import HudState
 from mjsim.actions import Pick
-from mjsim.model.avatar import EYE
+from mjsim.model.avatar import eye_position
 from mjsim.observation import Observation
 from mjsim.person_parameters import PICTURE_ASPECT
-from mjsim.render.cameras import camera_pose
 from mjsim.world import World
 
 HEIGHT = 480  # px of the picture for which things are projected; any will do
@@ -54,9 +53,12 @@ class BrowserViewer(Viewer):
         if view is None:
             return None
         aspect = view.width / view.height if view.codec == "none" else PICTURE_ASPECT
-        pose = camera_pose(world.model, world.data, EYE, aspect)
-        fovy = 2.0 * math.atan(math.tan(world.scene.person.field_of_view / 2.0) / aspect)
-        return CameraView(pose.position, pose.rotation, fovy, max(1, round(HEIGHT * aspect)), HEIGHT)
+        person, (x, y, heading, pitch) = world.scene.person, world.body[:4].tolist()
+        eye = np.array(eye_position(x, y, heading, pitch, person.eye_height))
+        c, s, cp, sp = math.cos(heading), math.sin(heading), math.cos(pitch), math.sin(pitch)
+        rotation = np.array([[s, -c * sp, -c * cp], [-c, -s * sp, -s * cp], [0.0, cp, -sp]])
+        fovy = 2.0 * math.atan(math.tan(person.field_of_view / 2.0) / aspect)
+        return CameraView(eye, rotation, fovy, max(1, round(HEIGHT * aspect)), HEIGHT)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
         """Send what changed; a session shows every state twice, before a control step and after the one before."""
@@ -109,8 +111,7 @@ class BrowserViewer(Viewer):
     def _reach(self, live: LiveSession, seen: Observation) -> Reach | None:
         """What the action key would do now."""
         result = live.world.answer(act(live.world.answer))
-        camera = self.camera(live.world)
-        if not result.applied or result.object is None or camera is None:
+        if not result.applied or result.object is None or (camera := self.camera(live.world)) is None:
             return None
         catalogue, episode = live.house.catalogue, live.scene.episode
         model = next(item.model for item in episode.objects if item.name == result.object)

@@ -13,6 +13,8 @@ from experiments.web.protocol import Hud, Markers, Moment, Scene, Snapshot, View
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.viewer import BrowserViewer
 from mjsim.fidelity import kinematics
+from mjsim.model.avatar import EYE
+from mjsim.render.cameras import camera_pose
 
 CONFIG = TrialConfig(objects=3, assistance="guided", seed=3, user="human", live=True, fidelity="event")
 DRAWS = View(1920, 1080, "none")
@@ -131,5 +133,7 @@ def test_a_moment_names_the_room_and_what_the_action_key_would_take(shown):
 def test_a_camera_is_as_wide_as_the_person_sees_whatever_the_shape_of_the_view(shown, view, aspect):
     shown.viewer.set_view(view)
     camera, person = shown.viewer.camera(shown.live.world), shown.live.scene.person
+    pose = camera_pose(shown.live.world.model, shown.live.world.data, EYE, aspect)
+    assert np.allclose(camera.position, pose.position) and np.allclose(camera.rotation, pose.rotation)
     assert camera.width / camera.height == pytest.approx(aspect, abs=0.01)
     assert 2.0 * np.arctan(aspect * np.tan(camera.fovy / 2.0)) == pytest.approx(person.field_of_view)
