@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -17,6 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from benchmarks.support.play_server import PATIENCE
 from experiments.web.protocol import BEAT_PERIOD, FRAME_HEAD, MAX_INPUTS
 
+STEP = 0.04  # s of a control step
 RETRANSMISSION = 0.2  # s that a lost packet costs, as TCP sends it again
 
 
@@ -40,6 +41,17 @@ class Link:
         return self.latency + abs(float(rng.normal(0.0, self.jitter))) + float(lost)
 
 
+class CountingConnection(ClientConnection):
+    """A connection that counts what arrives, as it is on the wire."""
+
+    received = 0  # bytes
+
+    def data_received(self, data: bytes) -> None:
+        """Count, and take it."""
+        self.received += len(data)
+        super().data_received(data)
+
+
 @dataclass(frozen=True)
 class SeenFrame:
     """A frame or snapshot that arrived.
@@ -60,7 +72,8 @@ class SimulatedBrowser:
 
     Args:
         address: Of the visit.
-        codec: `jpeg`, `h264`, or `none` for snapshots.
+        codec: `jpeg`, `h264`, or `none` for a client that draws: it stamps its inputs, and promises them step by step.
+        batch: How many control steps a client that draws puts into one message.
         link: What the network does.
         size: Of the view, px.
         seed: Of the network's chance.
@@ -71,6 +84,8 @@ class SimulatedBrowser:
         frames: Frames and snapshots that arrived.
         last: Type -> the latest message of it.
         sent_at: Number of an input -> when it was sent.
+        draws: Whether it draws.
+        trips: From sending an input to its acknowledgement, s.
     """
 
     def __init__(
@@ -78,6 +93,7 @@ class SimulatedBrowser:
         address: str,
         *,
         codec: str = "none",
+        batch: int = 1,
         link: Link | None = None,
         size: tuple[int, int] = (640, 480),
         seed: int = 0,
@@ -85,13 +101,19 @@ class SimulatedBrowser:
         self.address = address
         self._tab = secrets.token_hex(8)
         self._view = {"type": "view", "width": size[0], "height": size[1], "codec": codec}
+        self.draws, self._batch = codec == "none", batch
+        self._step: int | None = (
+            None  # the next control step of a client that draws; None while the clock stands
+        )
+        self._made: list[dict[str, Any]] = []  # inputs for control steps that were not promised yet
         self._link, self._rng = link or Link(), np.random.default_rng(seed)
         self._changed = asyncio.Condition()
         self._tasks: list[asyncio.Task[None]] = []
         self._out: asyncio.Queue[tuple[float, str]] = asyncio.Queue()
         self._waiting: list[dict[str, Any]] = []
-        self._socket: ClientConnection | None = None
-        self.next, self.acknowledged, self.bytes = 1, 0, 0
+        self._socket: CountingConnection | None = None
+        self.next, self.acknowledged = 1, 0
+        self.trips: list[float] = []
         self.frames: list[SeenFrame] = []
         self.last: dict[str, dict[str, Any]] = {}
         self.sent_at: dict[int, float] = {}
@@ -101,15 +123,18 @@ class SimulatedBrowser:
         parts = urlsplit(self.address)
         self.last.clear()
         self._out = asyncio.Queue()
-        self._socket = await connect(
+        connection = await connect(
             f"ws://{parts.netloc}{parts.path}",
             origin=f"http://{parts.netloc}",  # type: ignore[arg-type]
             max_size=None,
             compression="deflate",
             open_timeout=PATIENCE,
+            create_connection=CountingConnection,
         )
+        self._socket = cast(CountingConnection, connection)
         self.say(type="hello", tab=self._tab, trial=trial, view=self._view)
-        doing = (self._send_all(), self._receive_all(), self._beat())
+        doing = [self._send_all(), self._receive_all(), self._beat()]
+        doing += [self._take_steps()] if self.draws else []
         self._tasks = [asyncio.create_task(task) for task in doing]
 
     async def cut(self) -> None:
@@ -132,6 +157,12 @@ class SimulatedBrowser:
         """Forget the frames and inputs so far."""
         self.frames.clear()
         self.sent_at.clear()
+        self.trips.clear()
+
+    @property
+    def arrived(self) -> int:
+        """How many bytes have arrived on this connection."""
+        return 0 if self._socket is None else self._socket.received
 
     @property
     def pending(self) -> int:
@@ -148,8 +179,10 @@ class SimulatedBrowser:
         number, self.next = self.next, self.next + 1
         new = {"number": number, **values}
         self._waiting.append(new)
-        self.sent_at[number] = time.perf_counter()
-        self.say(type="inputs", inputs=[new])
+        if self._step is not None:
+            self._made.append({**new, "step": self._step})
+        else:
+            self._send_inputs([new])
         return number
 
     async def until(self, holds: Callable[[], bool], seconds: float = PATIENCE) -> None:
@@ -186,7 +219,7 @@ class SimulatedBrowser:
         """
         await self.until(lambda: self.phase in ("ready", "paused", "running"))
         number = int(self.last["state"]["input"])
-        self.say(type="run")
+        self.say(type="run", **({"until": 0} if self.draws else {}))
         await self.until(lambda: self.phase == "running")
         self.next = max([number, *(new["number"] for new in self._waiting)]) + 1
         for first in range(0, len(self._waiting), MAX_INPUTS):
@@ -203,6 +236,25 @@ class SimulatedBrowser:
         self.say(type="leave")
         await self.until(lambda: "saved" in self.last)
         await self.close()
+
+    def _send_inputs(self, inputs: list[dict[str, Any]], **promise: int) -> None:
+        now = time.perf_counter()
+        self.sent_at |= {new["number"]: now for new in inputs}
+        self.say(type="inputs", inputs=inputs, **promise)
+
+    async def _take_steps(self) -> None:
+        """Take control steps while the clock runs, and promise their inputs."""
+        while True:
+            await asyncio.sleep(STEP)
+            due = time.perf_counter()
+            while self._step is not None:
+                self._step += 1
+                if self._step % self._batch == 0:
+                    made, self._made = self._made, []
+                    self._send_inputs(made, until=self._step)
+                due += STEP
+                await asyncio.sleep(max(0.0, due - time.perf_counter()))
+            self._made.clear()  # they are repeated once the clock runs again
 
     async def _beat(self) -> None:
         while True:
@@ -239,7 +291,6 @@ class SimulatedBrowser:
             self._changed.notify_all()
 
     def _take(self, message: str | bytes) -> None:
-        self.bytes += len(message)
         if isinstance(message, bytes):
             _, _, _, _, width, _, number, _, shown, _ = FRAME_HEAD.unpack_from(message)
             self.frames.append(SeenFrame(time.perf_counter(), shown, width))
@@ -249,8 +300,14 @@ class SimulatedBrowser:
         self.last[content["type"]] = content
         if content["type"] == "snapshot":
             self.frames.append(SeenFrame(time.perf_counter(), content["input"], 0))
+            self._step = content["step"] if self._step is None else self._step
+        if content["type"] == "state" and content["phase"] != "running":
+            self._step = None
         if content["type"] == "taken":
-            self.acknowledged = max(self.acknowledged, content["input"])
+            now, before = time.perf_counter(), self.acknowledged
+            self.acknowledged = max(before, content["input"])
+            acknowledged = range(before + 1, self.acknowledged + 1)
+            self.trips += [now - self.sent_at[number] for number in acknowledged if number in self.sent_at]
             self._waiting = [new for new in self._waiting if new["number"] > content["input"]]
 
     async def _end(self) -> None:
@@ -258,7 +315,8 @@ class SimulatedBrowser:
             task.cancel()
             with suppress(asyncio.CancelledError):
                 await task
-        self._socket = None
+        self._socket, self._step = None, None
+        self._made.clear()
 
 
 async def begin_task(browser: SimulatedBrowser) -> None:

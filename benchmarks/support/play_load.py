@@ -18,11 +18,19 @@ PERIOD = 0.25  # s between two inputs
 MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
 SETTLING = 2.0  # s before a session is measured
 SETTLING_TOGETHER = 8.0  # s in which sessions find the size of their frames that leaves room for the others
-MIN_FPS, MAX_MS = 15.0, 150.0  # what a session that holds has: frames a second, 95 % from input to frame
+MIN_FPS, MAX_MS = (
+    15.0,
+    150.0,
+)  # what a session with frames has that holds: frames a second, 95 % from input to frame
+MIN_STATES, MAX_ACKNOWLEDGED = (
+    24.5,
+    60.0,
+)  # and one that draws: states a second, 95 % until an input is acknowledged, ms
 CASES = {  # codec, link
     "jpeg": ("jpeg", Link()),
     "h264": ("h264", Link()),
-    "snapshots": ("none", Link()),
+    "states": ("none", Link()),
+    "states, slow link": ("none", MOBILE),
     "jpeg, slow link": ("jpeg", MOBILE),
     "h264, slow link": ("h264", MOBILE),
 }
@@ -30,6 +38,8 @@ CASES = {  # codec, link
 
 def measure_latency(folder: Path, seconds: float, report: Report, *words: str) -> dict[str, Any]:
     """From an input to the frame that shows it, frames a second and bandwidth, for codecs and links.
+
+    For a client that draws it is the time until its input is acknowledged, and states a second.
 
     Args:
         folder: Of the visits.
@@ -47,24 +57,33 @@ def measure_latency(folder: Path, seconds: float, report: Report, *words: str) -
 
 
 def measure_capacity(
-    folder: Path, seconds: float, codec: str, counts: Sequence[int], report: Report, *words: str
+    folder: Path,
+    seconds: float,
+    codec: str,
+    counts: Sequence[int],
+    report: Report,
+    *words: str,
+    batch: int = 1,
+    core: int | None = None,
 ) -> list[dict[str, float]]:
-    """Which numbers of sessions at once hold 15 frames a second and 150 ms.
+    """Which numbers of sessions at once hold 15 frames a second and 150 ms, or 25 states a second and 60 ms.
 
     Args:
         folder: Gets a folder of visits for each number of sessions.
         seconds: How long for each number.
-        codec: Of their frames; `none` for snapshots.
+        codec: Of their frames; `none` for clients that draw.
         counts: Numbers of sessions to try, descending, until one holds.
         report: Takes lines about the progress.
         words: Further words of the server's command line.
+        batch: How many control steps a client that draws puts into one message.
+        core: The only one that the server may use; None for all.
     """
     tried = []
     for count in counts:
         report(f"{count} sessions at once, {codec}, {seconds:.0f} s")
-        visits = folder / f"{codec}-{count}"
-        with PlayProcess(visits, *TASK_ALONE, "--sessions", str(count), *words) as server:
-            browsers = [SimulatedBrowser(server.begin(), codec=codec) for _ in range(count)]
+        visits = folder / f"{codec}-{count}-{batch}"
+        with PlayProcess(visits, *TASK_ALONE, "--sessions", str(count), *words, core=core) as server:
+            browsers = [SimulatedBrowser(server.begin(), codec=codec, batch=batch) for _ in range(count)]
             tried.append(asyncio.run(_sessions_at_once(server, browsers, seconds, SETTLING_TOGETHER)))
         if tried[-1]["holds"]:
             break
@@ -78,24 +97,24 @@ async def _sessions_at_once(
     workers = [worker_of(server.journal(browser.address, TASK)) for browser in browsers]
     processes = [*workers, server.process.pid, os.getpid()]
     before = [processor_time(pid) for pid in processes]
-    for browser in browsers:
-        browser.bytes = 0
-    began = time.perf_counter()
+    began, arrived = time.perf_counter(), [browser.arrived for browser in browsers]
     turns = await asyncio.gather(*(_turn(browser, seconds) for browser in browsers))
     trips = [trip for times in turns for trip in times]
     passed = time.perf_counter() - began
     busy = np.subtract([processor_time(pid) for pid in processes], before) / passed
+    came = [browser.arrived - before for browser, before in zip(browsers, arrived, strict=True)]
     fps = min(len(browser.frames) for browser in browsers) / passed
     median, p95 = np.percentile(trips, (50, 95)) if trips else (math.inf, math.inf)
+    least, most = (MIN_STATES, MAX_ACKNOWLEDGED) if browsers[0].draws else (MIN_FPS, MAX_MS)
     result = {
         "sessions": len(browsers),
         "fps": fps,
         "median_ms": float(median),
         "p95_ms": float(p95),
-        "holds": int(fps >= MIN_FPS and p95 <= MAX_MS),
+        "holds": int(fps >= least and p95 <= most),
         "width": median_width(browsers),
-        "kbit_s": float(np.mean([0.008 * browser.bytes / passed for browser in browsers])),
-        "memory_mb": float(np.mean([memory(worker) for worker in workers])),
+        "kbit_s": float(np.mean(came)) * 0.008 / passed,
+        "memory_mb": sum(map(memory, (*workers, server.process.pid))) / len(browsers),
         "cores": float(np.mean(busy[: len(browsers)])),
         "server_cores": float(busy[-2]),
         "browser_cores": float(busy[-1]),
@@ -118,13 +137,15 @@ async def _show_something(browser: SimulatedBrowser, settling: float) -> None:
 
 
 async def _turn(browser: SimulatedBrowser, seconds: float) -> list[float]:
-    """Turn to and fro; the times from an input to what shows it, ms."""
-    browser.frames.clear()
+    """Turn to and fro; the times from an input to what shows it, ms; where the client draws, to its acknowledgement."""
+    browser.forget()
     first, until = browser.next, time.perf_counter() + seconds
     while time.perf_counter() < until:
         browser.press(turn=1.0 if browser.next % 2 else -1.0)
         await asyncio.sleep(PERIOD)
     await browser.taken()
+    if browser.draws:
+        return [1000.0 * trip for trip in browser.trips]
     frames, trips = iter(browser.frames), list[float]()
     seen = next(frames, None)
     for number in range(first, browser.next):

@@ -29,14 +29,16 @@ class PlayProcess:
     Args:
         folder: Where it keeps visits.
         words: Further words of its command line.
+        core: The only one that it may use; None for all.
 
     Attributes:
         url: Its URL.
         process: The process.
     """
 
-    def __init__(self, folder: Path, *words: str) -> None:
+    def __init__(self, folder: Path, *words: str, core: int | None = None) -> None:
         self._folder, self._words = folder, words
+        self._cores = os.sched_getaffinity(0) if core is None else {core}
         self.output = folder.with_name("server.txt")
         self.url = ""
 
@@ -48,6 +50,7 @@ class PlayProcess:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "mjsim", *command], stdout=subprocess.PIPE, stderr=output, text=True
             )
+        os.sched_setaffinity(self.process.pid, self._cores)
         self.url = self.process.stdout.readline().strip() if self.process.stdout else ""
         if not self.url:
             raise ChildProcessError(self.output.read_text())
