@@ -35,6 +35,9 @@ class Session:
         time_limit: Simulated time after which the session ends, s.
         viewer: Sees every control step, or None. Without one, paths and waits take many control steps at once; the run
             is the same.
+
+    Attributes:
+        shows_each_step: Whether the viewer sees every control step; else those for which `show` is called.
     """
 
     def __init__(
@@ -47,6 +50,7 @@ class Session:
         time_limit: float,
         viewer: Viewer | None = None,
     ) -> None:
+        self.shows_each_step = True
         self._world = world
         self.assistant = assistant
         self._participant = participant
@@ -121,6 +125,11 @@ class Session:
         """Log that an error ended the session."""
         reason = PHYSICS_ERROR if isinstance(error, PhysicsError) else ERROR
         self._log_end(self.record.time, reason, error=describe(error))
+
+    @property
+    def observation(self) -> Observation:
+        """The present state."""
+        return self._now
 
     @property
     def time(self) -> float:
@@ -228,7 +237,8 @@ class Session:
     def _observe(self) -> None:
         """Pass a checkpoint if one is due, and show the present state."""
         self._now = self.record.pass_checkpoint(self._world, self._now)
-        self.show()
+        if self.shows_each_step:
+            self.show()
 
     def _step_limit(self) -> int:
         """How many control steps the next action may take: one if a viewer is attached or a better plan may come."""

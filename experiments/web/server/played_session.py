@@ -22,6 +22,7 @@ from experiments.web.protocol import (
     Run,
     Saved,
     Seen,
+    Snapshot,
     State,
     Taken,
     View,
@@ -218,6 +219,8 @@ class PlayedSession:
                     case Taken(number, step):
                         crashes = 0 if step > self._step else crashes
                         self._taken, self._step = number, step
+                    case Snapshot(step):
+                        self._step = max(self._step, step)
                     case Saved():
                         await asyncio.to_thread(self._finish, trial)
                         self._tell(message)

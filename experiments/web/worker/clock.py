@@ -12,18 +12,24 @@ from experiments.web.worker.schedule import Schedule
 
 LATE = 0.02  # s after its time at which a control step counts as late
 MAX_LAG = 1.0  # s behind schedule from which the process must have been stopped: the clock restarts from now
+MAX_UNWRITTEN = 10  # control steps without an input that are not written through to the disk at once
 SHOW_PERIOD = 0.1  # s between two looks at a session that is not running
 
 Send = Callable[[WireMessage], None]
 
 
 class Clock:
-    """Steps a session in real time; `sync` writes its journal through to the disk."""
+    """Steps a session in real time; `sync` writes its journal through to the disk, `show` shows its state."""
 
     def __init__(
-        self, live: LiveSession, control: SessionControl, sync: Callable[[], None], send: Send
+        self,
+        live: LiveSession,
+        control: SessionControl,
+        sync: Callable[[], None],
+        send: Send,
+        show: Callable[[], None],
     ) -> None:
-        self._live, self._control = live, control
+        self._live, self._control, self._show = live, control, show
         self._schedule = Schedule(live.world.control_timestep, time.monotonic())
         self._acknowledger = _Acknowledger(sync, send)
         self._missed = False  # whether the last step was taken without the inputs that were promised
@@ -35,7 +41,7 @@ class Clock:
             while live.end_reason is None and (phase := control.state.phase) is not OVER:
                 if phase is not READY:
                     self._log_notes()
-                live.session.show()
+                self._show()
                 if phase is RUNNING:
                     self._wait_and_step()
                     control.pause_if_silent()
@@ -64,7 +70,7 @@ class Clock:
         self._acknowledger.check()
         live.step(self._control.take_inputs(step))
         schedule.take(promise.came)
-        session.show()  # now rather than in the next step: the browser sees it 40 ms earlier
+        self._show()
         self._acknowledger.request(live.input, session.record.step)
 
     def _note_lateness(self, promise: Promise) -> None:
@@ -92,12 +98,14 @@ class _Acknowledger:
     def __init__(self, sync: Callable[[], None], send: Send) -> None:
         self._sync, self._send = sync, send
         self._thread = ThreadPoolExecutor(1, "journal")
-        self._newest = 0
+        self._number = self._newest = 0
         self._error: OSError | None = None
 
     def request(self, number: int, step: int) -> None:
-        """Everything up to this input and control step is in the journal."""
-        self._newest = step
+        """Everything up to this input and control step is in the journal; without a new input, some steps may wait."""
+        if number == self._number and step < self._newest + MAX_UNWRITTEN:
+            return
+        self._number, self._newest = number, step
         self._thread.submit(self._acknowledge, number, step)
 
     def check(self) -> None:

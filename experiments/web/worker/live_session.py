@@ -153,6 +153,7 @@ class LiveSession:
             user=self._human,
             journal=journal,
         )
+        self.session.shows_each_step = False  # the clock decides
         Familiarisation(tuple(before), None).log(log)
         if record is None:
             self.session.begin()

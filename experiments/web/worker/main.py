@@ -112,7 +112,7 @@ class Worker:
                         self._send(Taken(live.input, live.session.record.step))
                     else:
                         control.apply(Trigger.OPENED)
-                    reason = Clock(live, control, journal.sync, self._send).run()
+                    reason = Clock(live, control, journal.sync, self._send, viewer.look).run()
                     viewer.live = viewer.drawer = None
                 live.end(reason)
         if not (is_run(run) and (run / records.TOPDOWN).is_file()):

@@ -1,7 +1,6 @@
 """The states of a session for a client that draws: what it may know, and of that what has changed."""
 
 import logging
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -16,7 +15,8 @@ from mjsim.observation import Observation
 LOG = logging.getLogger("mjsim.play")
 HORIZON = 0.3  # s of walking and turning that may bring an object into view, from which on it is known
 LINGERING = 25  # control steps for which it stays known after it no longer can
-METRES, QUATERNIONS = 4, 4  # decimals of positions and orientations
+LOOK_EVERY = 2  # control steps after which it is found out anew what is known
+DECIMALS = 4  # of positions, m, and orientations
 
 
 def scene_of(live: LiveSession) -> Scene:
@@ -47,47 +47,47 @@ class SnapshotStream:
         self._foresight = Foresight(live.scene, HORIZON)
         self._until: dict[str, int] = {}  # control steps before which an object stays known
         self._models = {item.name: item.model for item in live.scene.episode.objects}
+        self._looked = -LOOK_EVERY  # the control step when it was found out what is known
+        self._hands: tuple[str | None, str | None] = (None, None)  # what was in them then
+        self._poses = np.full((len(self._models), 7), np.nan)
         self._sent: dict[str, list[float]] = {}
 
     def next(self, seen: Observation, step: int) -> Snapshot:
         """The snapshot of the state before a control step."""
-        world = self._live.world
-        poses, known = _poses(seen), self._known(seen, step)
-        entered = [name for name in known if name not in self._sent]
-        gone = [name for name in self._sent if name not in known]
-        changed = {name: poses[name] for name in known if self._sent.get(name) != poses[name]}
-        self._sent = {name: poses[name] for name in known}
-        left, right = seen.hands
+        world, names = self._live.world, seen.object_names
+        if step >= self._looked + LOOK_EVERY or seen.hands != self._hands:
+            self._look(seen, step)
+        poses = np.hstack((seen.object_positions, seen.object_quaternions))
+        moved = np.flatnonzero((poses != self._poses).any(axis=1)).tolist()
+        self._poses = poses
+        gone = [name for name in self._sent if self._until[name] <= step]
+        for name in gone:
+            del self._sent[name]
+        entered = [name for name, until in self._until.items() if until > step and name not in self._sent]
+        changed = {}
+        for i in {*moved, *map(names.index, entered)}:
+            name, pose = names[i], np.round(poses[i], DECIMALS).tolist()
+            if (name in self._sent or name in entered) and self._sent.get(name) != pose:
+                changed[name] = self._sent[name] = pose
         return Snapshot(
             step=step,
             input=self._live.input,
             time=round(seen.time, 6),
             busy=seen.busy,
             body=world.body.tolist(),
-            eye=_rounded([*seen.eye, seen.heading, seen.pitch]),
-            hands=np.round(world.hands, METRES).tolist(),
-            held=(left, right),
+            eye=[round(value, DECIMALS) for value in (*seen.eye.tolist(), seen.heading, seen.pitch)],
+            hands=np.round(world.hands, DECIMALS).tolist(),
+            held=seen.hands,
             objects=changed,
             models={name: self._models[name] for name in entered},
             gone=gone,
         )
 
-    def _known(self, seen: Observation, step: int) -> tuple[str, ...]:
-        """Names of the objects that the client may know, in the episode's order."""
+    def _look(self, seen: Observation, step: int) -> None:
+        """Note which objects the client may know, and until when."""
+        self._looked, self._hands = step, seen.hands
         soon = self._foresight.may_see(seen, self._aspect)
-        for name, may_see in zip(seen.object_names, soon.tolist(), strict=True):
-            if may_see or name in seen.hands:
-                self._until[name] = step + LINGERING
-        return tuple(name for name in seen.object_names if self._until.get(name, 0) > step)
-
-
-def _poses(seen: Observation) -> dict[str, list[float]]:
-    """Rounded poses of all objects by name."""
-    poses = np.hstack(
-        (np.round(seen.object_positions, METRES), np.round(seen.object_quaternions, QUATERNIONS))
-    )
-    return dict(zip(seen.object_names, poses.tolist(), strict=True))
-
-
-def _rounded(values: Iterable[float]) -> list[float]:
-    return [round(float(value), METRES) for value in values]
+        for i in np.flatnonzero(soon).tolist():
+            self._until[seen.object_names[i]] = step + LINGERING
+        for name in seen.carried:
+            self._until[name] = step + LINGERING

@@ -24,6 +24,9 @@ from mjsim.observation import Observation
 from mjsim.person_parameters import PICTURE_ASPECT
 from mjsim.world import World
 
+HUD_EVERY = (
+    3  # control steps after which a client that draws gets the HUD anew, if nothing is picked or placed
+)
 HEIGHT = 480  # px of the picture for which things are projected; any will do
 
 
@@ -40,6 +43,8 @@ class BrowserViewer(Viewer):
         self._sent: dict[type[WireMessage], WireMessage] = {}
         self._snapshots: SnapshotStream | None = None
         self._step = -1  # of the last snapshot
+        self._looked = -HUD_EVERY  # the control step when the HUD was looked at
+        self._glance: object = None  # what it showed then
 
     def set_view(self, view: View | None) -> None:
         """Show everything anew, to a browser that has just connected; None repeats the view before."""
@@ -60,8 +65,22 @@ class BrowserViewer(Viewer):
         fovy = 2.0 * math.atan(math.tan(person.field_of_view / 2.0) / aspect)
         return CameraView(eye, rotation, fovy, max(1, round(HEIGHT * aspect)), HEIGHT)
 
+    def look(self) -> None:
+        """Show the present state: to a client that draws, what is beside the picture only now and then."""
+        live = self.live
+        if live is None:
+            return
+        seen, step = live.session.observation, live.session.record.step
+        glance = seen.object_status, seen.hands, seen.busy, self._hidden
+        anew = self._shown_to is None or self._shown_to[0] is not self.view
+        if self._snapshots is None or anew or glance != self._glance or step - self._looked >= HUD_EVERY:
+            self._glance, self._looked = glance, step
+            live.session.show()
+        elif not self._hidden:
+            self._send_snapshot(self._snapshots, seen, step)
+
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Send what changed; a session shows every state twice, before a control step and after the one before."""
+        """Send what changed since the last call."""
         view, live = self.view, self.live
         if live is None or self.drawer is None or view is None:
             return
@@ -75,14 +94,22 @@ class BrowserViewer(Viewer):
         self.drawer.draw(world, hud_state, step, live.input, hidden)
         if hidden:
             return
-        if self._snapshots is not None and step != self._step:
-            self._step = step
-            self._send(self._snapshots.next(observation, step))
+        if self._snapshots is not None:
+            self._send_snapshot(self._snapshots, observation, step)
         for message in self._beside(live, observation, hud_state, step):
             content = msgspec.structs.replace(message, step=0) if isinstance(message, Moment) else message
             if self._sent.get(type(message)) != content:
                 self._sent[type(message)] = content
                 self._send(message)
+
+    @property
+    def _hidden(self) -> bool:
+        return self.drawer is None or self.drawer.hidden
+
+    def _send_snapshot(self, snapshots: SnapshotStream, seen: Observation, step: int) -> None:
+        if step != self._step:
+            self._step = step
+            self._send(snapshots.next(seen, step))
 
     def _begin(self, view: View, live: LiveSession) -> None:
         """Begin to show a session in a view."""

@@ -11,7 +11,7 @@ from experiments.web import protocol
 from experiments.web.controls import Input
 from experiments.web.protocol import Hud, Markers, Moment, Scene, Snapshot, View
 from experiments.web.worker.live_session import LiveSession, open_journal
-from experiments.web.worker.viewer import BrowserViewer
+from experiments.web.worker.viewer import HUD_EVERY, BrowserViewer
 from mjsim.fidelity import kinematics
 from mjsim.model.avatar import EYE
 from mjsim.render.cameras import camera_pose
@@ -70,6 +70,7 @@ def test_the_scene_has_what_a_prediction_needs(shown):
 def test_snapshots_have_the_body_and_what_changed(shown, monkeypatch):
     shown.drawer.hidden = False
     monkeypatch.setattr("experiments.web.worker.snapshots.LINGERING", 1)
+    monkeypatch.setattr("experiments.web.worker.snapshots.LOOK_EVERY", 1)
     names, seen = shown.live.world.observation().object_names, []
     monkeypatch.setattr(
         "experiments.web.worker.snapshots.Foresight",
@@ -77,17 +78,34 @@ def test_snapshots_have_the_body_and_what_changed(shown, monkeypatch):
     )
     for now in (names[:2], names[:2], names[1:]):
         seen[:] = now
+        shown.viewer.look()
         shown.live.step([Input(number=shown.live.input + 1, forward=1.0)])
-        shown.live.session.show()
+    seen[:] = names[1:]
+    shown.viewer.look()
     snapshots = of_kind(shown, Snapshot)
     assert [snapshot.step for snapshot in snapshots] == [0, 1, 2, 3]
     assert [snapshot.input for snapshot in snapshots] == [0, 1, 2, 3]
-    assert [list(snapshot.objects) for snapshot in snapshots] == [list(names[:2]), [], [], [names[2]]]
-    assert [snapshot.gone for snapshot in snapshots] == [[], [], [], [names[0]]]
+    assert [list(snapshot.objects) for snapshot in snapshots] == [list(names[:2]), [], [names[2]], []]
+    assert [snapshot.gone for snapshot in snapshots] == [[], [], [names[0]], []]
     models = {item.name: item.model for item in shown.live.scene.episode.objects}
     assert snapshots[0].models == {name: models[name] for name in names[:2]}
     assert np.array_equal(snapshots[-1].body, shown.live.world.body)
     assert np.shape(snapshots[-1].hands) == (2, 3) and snapshots[-1].held == (None, None)
+
+
+def test_the_display_of_a_client_that_draws_is_looked_at_now_and_then_and_when_something_happens(shown):
+    shown.drawer.hidden, composed = False, []
+    compose = shown.live.session.assistant.hud_state
+    shown.live.session.assistant.hud_state = lambda *seen: composed.append(seen) or compose(*seen)
+    for _ in range(4 * HUD_EVERY):
+        shown.live.step([])
+        shown.viewer.look()
+    assert len(composed) == 4 and len(of_kind(shown, Snapshot)) == 4 * HUD_EVERY
+    shown.drawer.hidden = True
+    shown.viewer.look()
+    shown.drawer.hidden = False
+    shown.viewer.look()
+    assert shown.viewer._glance[-1] is False
 
 
 def test_a_view_that_is_opened_anew_gets_everything(shown):
