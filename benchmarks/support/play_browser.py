@@ -219,7 +219,7 @@ class SimulatedBrowser:
         """
         await self.until(lambda: self.phase in ("ready", "paused", "running"))
         number = int(self.last["state"]["input"])
-        self.say(type="run", **({"until": 0} if self.draws else {}))
+        self._say_run()
         await self.until(lambda: self.phase == "running")
         self.next = max([number, *(new["number"] for new in self._waiting)]) + 1
         for first in range(0, len(self._waiting), MAX_INPUTS):
@@ -236,6 +236,9 @@ class SimulatedBrowser:
         self.say(type="leave")
         await self.until(lambda: "saved" in self.last)
         await self.close()
+
+    def _say_run(self) -> None:
+        self.say(type="run", **({"until": 0} if self.draws else {}))
 
     def _send_inputs(self, inputs: list[dict[str, Any]], **promise: int) -> None:
         now = time.perf_counter()
@@ -303,6 +306,8 @@ class SimulatedBrowser:
             self._step = content["step"] if self._step is None else self._step
         if content["type"] == "state" and content["phase"] != "running":
             self._step = None
+            if content["reason"] == "silent":
+                self._say_run()
         if content["type"] == "taken":
             now, before = time.perf_counter(), self.acknowledged
             self.acknowledged = max(before, content["input"])

@@ -16,6 +16,7 @@ from experiments.record.phases import TASK
 
 PERIOD = 0.25  # s between two inputs
 MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
+AT_ONCE = 2  # sessions that are opened at the same time
 SETTLING = 2.0  # s before a session is measured
 SETTLING_TOGETHER = 8.0  # s in which sessions find the size of their frames that leaves room for the others
 MIN_FPS, MAX_MS = (
@@ -93,7 +94,9 @@ def measure_capacity(
 async def _sessions_at_once(
     server: PlayProcess, browsers: Sequence[SimulatedBrowser], seconds: float, settling: float
 ) -> dict[str, float]:
-    await asyncio.gather(*(_show_something(browser, settling) for browser in browsers))
+    opening = asyncio.Semaphore(AT_ONCE)
+    await asyncio.gather(*(_show_something(browser, opening) for browser in browsers))
+    await asyncio.gather(*(_turn(browser, settling) for browser in browsers))
     workers = [worker_of(server.journal(browser.address, TASK)) for browser in browsers]
     processes = [*workers, server.process.pid, os.getpid()]
     before = [processor_time(pid) for pid in processes]
@@ -128,12 +131,12 @@ def median_width(browsers: Sequence[SimulatedBrowser]) -> float:
     return float(np.median([browser.frames[-1].width if browser.frames else 0 for browser in browsers]))
 
 
-async def _show_something(browser: SimulatedBrowser, settling: float) -> None:
-    """Start the task of a visit that has no other phase, and turn until the size of its frames is found."""
-    await browser.open(TASK)
-    await browser.run()
-    await browser.until(lambda: bool(browser.frames))
-    await _turn(browser, settling)
+async def _show_something(browser: SimulatedBrowser, opening: asyncio.Semaphore) -> None:
+    """Start the task of a visit that has no other phase."""
+    async with opening:
+        await browser.open(TASK)
+        await browser.run()
+        await browser.until(lambda: bool(browser.frames))
 
 
 async def _turn(browser: SimulatedBrowser, seconds: float) -> list[float]:

@@ -70,7 +70,9 @@ class Clock:
         self._acknowledger.check()
         live.step(self._control.take_inputs(step))
         schedule.take(promise.came)
-        self._show()
+        promised = self._control.wait_for_promise(session.record.step, 0.0)
+        if promised.came is None or schedule.wait(time.monotonic(), promised=True) > 0.0:
+            self._show()  # else the next step follows at once, and the state after it is shown
         self._acknowledger.request(live.input, session.record.step)
 
     def _note_lateness(self, promise: Promise) -> None:
