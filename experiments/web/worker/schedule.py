@@ -1,8 +1,8 @@
 """When control steps are taken: in real time, and not before the inputs that a page has promised for them."""
 
 PATIENCE = 0.75  # s after its time at which a control step is taken without the inputs that were promised
-WINDOW = 50  # control steps after which the clock follows that of the page
-PULL = 0.01  # share by which it may run faster for that
+WINDOW = 25  # control steps after which the clock follows that of the page
+PULL = 0.05  # share by which it may run faster for that
 
 
 class Schedule:
