@@ -60,6 +60,9 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--user", default=HUMAN, metavar="NAME", help="name of the participant")
     add_trial_options(parser, phases=",".join(PHASES))
     add_setting(parser, "draw")
+    parser.add_argument(
+        "--xr", action="store_true", help="offer a button for a headset, where there is one (experimental)"
+    )
     group = parser.add_argument_group("server")
     group.add_argument(
         "--port", type=_number(0, 65535), default=PORT, help="TCP port; 0 for any that is free"
@@ -201,6 +204,7 @@ def _serve(
         minimum=arguments.minimum,
         questions=questions,
         proxies=arguments.trusted_proxy,
+        xr=arguments.xr,
     )
     logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
     logging.getLogger("mjsim.play").setLevel(logging.INFO)

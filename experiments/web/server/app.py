@@ -59,6 +59,7 @@ class PlayConfig:
     minimum: Mapping[str, float] = field(default_factory=dict)  # s by phase before which it cannot be ended
     questions: Sequence[Question] = ()  # about the story
     proxies: Sequence[Network] = ()  # whose word about the address of a person is believed
+    xr: bool = False  # whether a page offers a headset
 
 
 class PlayServer:
@@ -196,7 +197,15 @@ class PlayServer:
         if visit.phase in PLAYED:
             settings = visit.settings(visit.phase)
             objects, draw = settings["objects"], settings["draw"]
-            return page(request, "play", trial=visit.phase, objects=objects, draw=draw, wait=wait)
+            return page(
+                request,
+                "play",
+                trial=visit.phase,
+                objects=objects,
+                draw=draw,
+                wait=wait,
+                xr=self._config.xr,
+            )
         again = visit.settings(TASK)["episode"] is None  # else there is but one, whose best way was shown
         return page(
             request, "result", metrics=visit.metrics(TASK), again=again, token=request.path_params["token"]
