@@ -61,7 +61,7 @@ examples:
   mjsim study analyze runs/study
       analyse a study between subjects: figures, tests, a report in one file
   mjsim house --objects 12 --seed 3 --out house.xml
-      write a disorganized house as MJCF for stock MuJoCo
+      write a disorganized house as MJCF for stock MuJoCo, or (house.glb) as glTF
   mjsim check my_house/catalogue.toml --picture faults.png
       say what is wrong with a house, an object or an episode, and what to change
   mjsim plan problem.json

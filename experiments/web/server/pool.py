@@ -77,17 +77,12 @@ class WorkerPool:
 
     def __init__(self, house: str) -> None:
         os.environ.update({**SETTINGS, HOUSE: house})  # of the processes that this one starts
-        self._house = house
         self._ending: set[asyncio.Future[None]] = set()
 
     def warm_up(self) -> None:
-        """Start the fork server, unless it runs; it then has the scene made from which browsers draw."""
+        """Start the fork server, unless it runs."""
         multiprocessing.set_forkserver_preload([PRELOADED])
         forkserver.ensure_running()
-        process = multiprocessing.get_context("forkserver").Process(
-            target=_make_scene, args=(self._house,), daemon=True
-        )
-        threading.Thread(target=process.start, daemon=True).start()  # it waits until all is loaded
 
     async def start(self) -> WorkerProcess:
         """A new worker. A fork server that was just killed still takes connections, until another one replaces it."""
@@ -115,11 +110,3 @@ def _run_worker(connection: Connection) -> None:
     from experiments.web.worker.main import Worker  # the server never loads it
 
     Worker(connection).run()
-
-
-def _make_scene(house: str) -> None:
-    from experiments.web.worker.houses import house as loaded
-    from experiments.web.worker.houses import scene_files
-
-    with suppress(Exception):  # a worker that needs it tries again and reports it
-        scene_files(loaded(house))

@@ -2,6 +2,8 @@
 
 import functools
 import gc
+import os
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing import get_context
 
@@ -56,13 +58,27 @@ def scene_files(house: House) -> tuple[str, str]:
 def preload(name: str) -> None:
     """Load a house, its pictures and the kernels before workers are forked; they retry and report what fails here.
 
-    It uses one thread and no OpenGL, neither of which survives a fork: a process of its own draws the pictures.
+    It uses one thread and no OpenGL, neither of which survives a fork: a process of its own draws the pictures. Another
+    one makes the files from which browsers draw.
     """
     with suppress(Exception):
         loaded = house(name)
+        _begin(scene_files, loaded)
         with get_context("fork").Pool(1) as drawing:
             drawn = drawing.apply_async(render_pictures, (loaded.catalogue,))
             warmup.plan()
             warmup.act(loaded)
             _pictures[name] = drawn.get(DRAWING_TIMEOUT)
     gc.freeze()  # collecting garbage would copy what is shared
+
+
+def _begin(work: Callable[[House], object], house: House) -> None:
+    """Have work done by a process that nobody waits for. The fork server may have no children but its workers."""
+    between = os.fork()
+    if not between:
+        try:
+            if not os.fork():
+                work(house)
+        finally:  # whatever comes: who needs the result tries again and reports it
+            os._exit(0)
+    os.waitpid(between, 0)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import mujoco
 import pytest
+from glb_files import File
 
 from experiments.cli.main import COMMANDS, main, parser
 from experiments.cli.options import frame_size, int_list, seconds, text_list
@@ -79,6 +80,7 @@ def test_the_overview_names_every_command():
         (["run", "--profile", "sepia"], "no render profile 'sepia'"),
         (["run", "--profile", "ultra", "--no-video"], "no render profile 'ultra'"),
         (["run", "--user", "x" * 100_000, "--no-video"], "x ... "),
+        (["house"], "name a file that ends in .xml (MJCF, for MuJoCo) or .glb (glTF)"),
         ([*PLAY, "--user", "follower"], "belongs to `mjsim run`"),
         ([*PLAY, "--assistance", "nonsense"], "no assistance condition"),
         ([*PLAY, "--objects", "0"], "objects is 0"),
@@ -111,6 +113,15 @@ def test_a_house_for_stock_mujoco(tmp_path, capsys):
         address = model.joint(f"{placed.name}/free").qposadr[0]
         assert model.qpos0[address : address + 3] == pytest.approx(placed.position)
     assert f"{len(episode.objects)} misplaced objects" in capsys.readouterr().out
+
+
+def test_a_house_for_other_programs(tmp_path, capsys):
+    assert main(["house", "--objects", "3", "--seed", "3", "--out", str(tmp_path / "house.glb")]) == 0
+    names = {node["name"] for node in File((tmp_path / "house.glb").read_bytes()).gltf["nodes"]}
+    episode = Episode.load(tmp_path / "house.episode.json")
+    assert {placed.name for placed in episode.objects} <= names
+    assert "3 misplaced objects" in capsys.readouterr().out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["house.episode.json", "house.glb"]
 
 
 def test_regrets_that_nobody_worked_out_are_unknown(tmp_path, capsys):
