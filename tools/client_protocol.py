@@ -13,8 +13,8 @@ from experiments.web import protocol
 from experiments.web.state import TRANSITIONS, SessionPhase
 
 PATH = Path(__file__).parents[1] / "experiments" / "web" / "client" / "static" / "protocol.js"
-CONSTANTS: tuple[str, ...] = ("MAX_INPUTS", "BEAT_PERIOD", "MAX_SILENCE", "DISPLAY_PERIOD", "KEY_FLAG")
-CONSTANTS += ("REFUSED", "REPLACED", "IDLE", "TOO_MUCH", "SLOW")
+CONSTANTS: tuple[str, ...] = ("MAX_INPUTS", "BEAT_PERIOD", "MAX_SILENCE", "MAX_STEPS_AHEAD")
+CONSTANTS += ("DISPLAY_PERIOD", "KEY_FLAG", "REFUSED", "REPLACED", "IDLE", "TOO_MUCH", "SLOW")
 ALIASES = {"Codec": protocol.Codec, "PauseReason": protocol.PauseReason, "Phase": SessionPhase}
 UNIONS = {"FromBrowser": protocol.FromBrowser, "ToBrowser": protocol.ToBrowser}
 _SCALARS: dict[type[inspect.Type], str] = {

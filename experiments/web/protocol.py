@@ -20,6 +20,7 @@ FRAME_HEAD = struct.Struct("<BBBBHHIIQf")
 CODECS = {"jpeg": 1, "h264": 2}
 BEAT_PERIOD = 0.5  # s between two signs of life, both ways
 MAX_SILENCE = 1.0  # s without a message after which the link counts as lost
+MAX_STEPS_AHEAD = 25  # control steps by which inputs and promises may be ahead of the last one taken: 1 s
 DISPLAY_PERIOD = 5.0  # s between two messages `display`
 KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # codes with which the server closes

@@ -37,7 +37,6 @@ LOG = logging.getLogger("mjsim.play")
 MAX_CRASHES = 3  # of workers in a row, without an input taken in between, after which a session fails
 QUEUE_TIMEOUT = 10.0  # s that a place in the queue is kept without a connection
 MAX_AHEAD = 1000  # inputs that may wait to be taken
-MAX_STEPS_AHEAD = 25  # control steps by which inputs and promises may be ahead of the last one taken: 1 s
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
 
@@ -147,7 +146,7 @@ class PlayedSession:
             return Error("out of order", "numbers of inputs must ascend")
         if numbers and numbers[-1] > self._taken + MAX_AHEAD:
             return Error("out of order", f"input {numbers[-1]} comes while {self._taken} was taken last")
-        if (latest := max(latest, message.until or 0)) > self._step + MAX_STEPS_AHEAD:
+        if (latest := max(latest, message.until or 0)) > self._step + protocol.MAX_STEPS_AHEAD:
             return Error("out of order", f"control step {latest} comes while {self._step} is the next one")
         return None
 

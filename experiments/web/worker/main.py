@@ -108,8 +108,8 @@ class Worker:
                     viewer.set_view(None)
                     if live.resumed:
                         reason = "restarted" if opened.restarted else "disconnected"
-                        control.apply(Trigger.RESTORED, reason, last=live.input)
                         self._send(Taken(live.input, live.session.record.step))
+                        control.apply(Trigger.RESTORED, reason, last=live.input)
                     else:
                         control.apply(Trigger.OPENED)
                     reason = Clock(live, control, journal.sync, self._send, viewer.look).run()

@@ -9,6 +9,7 @@ import { X, Y, eyeOf } from "./prediction/body.js";
 import { Poses } from "./prediction/poses.js";
 import { Predictor } from "./prediction/predictor.js";
 import { Walker } from "./prediction/walking.js";
+import { MAX_STEPS_AHEAD } from "./protocol.js";
 
 const MAX_LATE = 1000; // ms that control steps may be behind before they are left out: the page was asleep
 const SNAP = Math.PI / 8; // rad of a turn in calm pictures
@@ -135,12 +136,17 @@ export class DrawnView {
     this.#world.setOutline(reach?.instance ?? null);
   }
 
-  /** Takes the control steps that are due. @param {number} now ms */
+  /** Takes the control steps that are due, but for those that the server would refuse. @param {number} now ms */
   tick(now) {
     const predictor = this.#predictor;
     if (!predictor) return;
     if (now - this.#due > MAX_LATE) this.#due = now;
+    const last = (this.#newest?.step ?? 0) + MAX_STEPS_AHEAD;
     for (; this.#due <= now; this.#due += 1000 * this.#duration) {
+      if (predictor.step >= last) {
+        this.#due = now;
+        return;
+      }
       predictor.advance();
       this.#flush(predictor.step);
     }

@@ -51,6 +51,7 @@ export const CODECS = { 1: "jpeg", 2: "h264" };
 export const MAX_INPUTS = 64;
 export const BEAT_PERIOD = 0.5;
 export const MAX_SILENCE = 1.0;
+export const MAX_STEPS_AHEAD = 25;
 export const DISPLAY_PERIOD = 5.0;
 export const KEY_FLAG = 1;
 export const REFUSED = 4000;

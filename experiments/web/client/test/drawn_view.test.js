@@ -1,6 +1,7 @@
 import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import { DrawnView } from "../static/drawn_view.js";
+import { MAX_STEPS_AHEAD } from "../static/protocol.js";
 import { EMPTY, GAIT, SPEEDS } from "./walks.js";
 
 /** @import { Scene, Snapshot } from "../static/protocol.js" */
@@ -59,6 +60,16 @@ describe("a view that this browser draws", () => {
     expect(view.step).toBe(5);
     view.tick(1241);
     expect(sent.at(-1)).toBe(6);
+  });
+
+  test("waits for a server that is behind", () => {
+    view.begin(0);
+    view.take(state({}), 10);
+    for (let now = 10; now < 3000; now += 20) view.tick(now);
+    expect(sent.at(-1)).toBe(MAX_STEPS_AHEAD);
+    view.take(state({ step: 3 }), 3000);
+    for (let now = 3000; now < 4000; now += 20) view.tick(now);
+    expect(sent.at(-1)).toBe(3 + MAX_STEPS_AHEAD);
   });
 
   test("leaves out the steps in which the page was asleep", () => {
