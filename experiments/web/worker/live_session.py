@@ -61,6 +61,7 @@ class Human:
     Attributes:
         state: Its state.
         inputs: Inputs since the last control step; the next one takes them.
+        seen: The state of the world before the next control step.
     """
 
     needs: frozenset[str] = frozenset()
@@ -68,6 +69,7 @@ class Human:
     def __init__(self, world: World) -> None:
         self.state = PersonState()
         self.inputs: Sequence[Input] = ()
+        self.seen = world.observation()
         self._world = world
 
     def act(self, percept: Percept) -> Action:  # noqa: ARG002 - a person sees the frame
@@ -76,7 +78,7 @@ class Human:
         action, state.controls = control_step(
             state.controls,
             self.inputs,
-            world.observation(),
+            self.seen,
             world.answer,
             world.scene.person,
             world.control_timestep,
@@ -188,7 +190,7 @@ class LiveSession:
         for new in inputs:
             if new.scroll:
                 self.session.scroll(new.scroll)
-        self._human.inputs = inputs
+        self._human.inputs, self._human.seen = inputs, self.session.observation
         self.session.advance()
         self.session.record.commit(self._human.state)
 

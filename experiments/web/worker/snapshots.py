@@ -15,7 +15,7 @@ from mjsim.observation import Observation
 LOG = logging.getLogger("mjsim.play")
 HORIZON = 0.3  # s of walking and turning that may bring an object into view, from which on it is known
 LINGERING = 25  # control steps for which it stays known after it no longer can
-LOOK_EVERY = 2  # control steps after which it is found out anew what is known
+LOOK_EVERY = 3  # control steps after which it is found out anew what is known
 DECIMALS = 4  # of positions, m, and orientations
 
 

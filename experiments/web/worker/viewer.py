@@ -25,7 +25,7 @@ from mjsim.person_parameters import PICTURE_ASPECT
 from mjsim.world import World
 
 HUD_EVERY = (
-    3  # control steps after which a client that draws gets the HUD anew, if nothing is picked or placed
+    4  # control steps after which a client that draws gets the HUD anew; at once after a pick or place
 )
 HEIGHT = 480  # px of the picture for which things are projected; any will do
 
