@@ -23,6 +23,7 @@ export class Sounds {
 
   /** Browsers let a page sound only once the person has pressed something. */
   unlock() {
+    if (!("AudioContext" in window)) return; // switched off in this browser
     this.#audio ??= new AudioContext();
     this.#audio.resume();
   }

@@ -1,55 +1,11 @@
 import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import { Connection, readFrame } from "../static/connection.js";
-import { FRAME_HEAD_BYTES, MAX_INPUTS, REPLACED } from "../static/protocol.js";
+import { MAX_INPUTS, REPLACED } from "../static/protocol.js";
+import { FakeSocket, frame } from "./page.js";
 
 /** @import { Received } from "../static/connection.js" */
-/** @import { FromBrowser, Input, Phase } from "../static/protocol.js" */
-
-class FakeSocket {
-  static OPEN = 1;
-  /** @type {FakeSocket[]} */
-  static all = [];
-  readyState = 1;
-  /** @type {any[]} */
-  sent = [];
-  onopen = () => {};
-  /** @type {(event: { data: any }) => void} */
-  onmessage = () => {};
-  /** @type {(event: { code: number }) => void} */
-  onclose = () => {};
-
-  /** @param {string} url */
-  constructor(url) {
-    this.url = url;
-    FakeSocket.all.push(this);
-  }
-
-  /** @param {string} text */
-  send(text) {
-    this.sent.push(JSON.parse(text));
-  }
-
-  close() {
-    this.readyState = 3;
-  }
-
-  /** @param {object} message */
-  receive(message) {
-    this.onmessage({ data: JSON.stringify(message) });
-  }
-
-  /** @param {Phase} phase @param {number} input */
-  state(phase, input = 0) {
-    this.receive({ type: "state", phase, reason: "", input });
-  }
-
-  /** Numbers of the inputs that were sent. */
-  get numbers() {
-    const batches = this.sent.filter(({ type }) => type === "inputs");
-    return batches.flatMap(({ inputs }) => inputs.map((/** @type {Input} */ input) => input.number));
-  }
-}
+/** @import { FromBrowser } from "../static/protocol.js" */
 
 /** @returns {{ connection: Connection, socket: FakeSocket, received: Received[] }} */
 function connected() {
@@ -59,14 +15,11 @@ function connected() {
   const hello = () => ({ type: "leave" });
   const connection = new Connection(hello, (message) => received.push(message));
   connection.open();
-  return { connection, socket: latest(), received };
+  return { connection, socket: FakeSocket.latest(), received };
 }
 
-function latest() {
-  const socket = FakeSocket.all.at(-1);
-  if (!socket) throw new Error("no socket was opened");
-  return socket;
-}
+/** @param {FakeSocket} socket */
+const numbers = (socket) => socket.inputs.map((input) => input.number);
 
 beforeEach(() => {
   FakeSocket.all = [];
@@ -81,10 +34,10 @@ describe("inputs", () => {
     expect(connection.input({ forward: 1 }).number).toBe(1);
     socket.state("loading");
     socket.state("ready");
-    expect(socket.numbers).toEqual([]);
+    expect(numbers(socket)).toEqual([]);
     socket.state("running");
     connection.input({});
-    expect(socket.numbers).toEqual([1, 2]);
+    expect(numbers(socket)).toEqual([1, 2]);
   });
 
   test("are kept until they are taken", () => {
@@ -104,16 +57,16 @@ describe("inputs", () => {
     socket.onclose({ code: 1006 });
     connection.input({});
     vi.runAllTimers();
-    latest().state("paused", 2);
-    expect(latest().numbers).toEqual([2, 3]);
-    latest().state("loading");
-    latest().state("paused", 1);
-    expect(latest().numbers).toEqual([2, 3, 2, 3]);
+    FakeSocket.latest().state("paused", "", 2);
+    expect(numbers(FakeSocket.latest())).toEqual([2, 3]);
+    FakeSocket.latest().state("loading");
+    FakeSocket.latest().state("paused", "", 1);
+    expect(numbers(FakeSocket.latest())).toEqual([2, 3, 2, 3]);
   });
 
   test("of a page that was loaded again continue the numbers of the session", () => {
     const { connection, socket } = connected();
-    socket.state("running", 41);
+    socket.state("running", "", 41);
     expect(connection.input({}).number).toBe(42);
   });
 
@@ -141,7 +94,7 @@ describe("a connection", () => {
     socket.onclose({ code: 1006 });
     vi.runAllTimers();
     expect(FakeSocket.all).toHaveLength(2);
-    latest().onclose({ code: REPLACED });
+    FakeSocket.latest().onclose({ code: REPLACED });
     vi.runAllTimers();
     expect(FakeSocket.all).toHaveLength(2);
     expect(received).toEqual([
@@ -162,19 +115,9 @@ describe("a connection", () => {
 });
 
 test("the head of a frame is read", () => {
-  const buffer = new ArrayBuffer(FRAME_HEAD_BYTES + 3);
-  const head = new DataView(buffer);
-  head.setUint8(1, 2);
-  head.setUint8(2, 1);
-  head.setUint16(4, 640, true);
-  head.setUint16(6, 480, true);
-  head.setUint32(8, 7, true);
-  head.setUint32(12, 8, true);
-  head.setBigUint64(16, 2n ** 40n, true);
-  head.setFloat32(24, 12.5, true);
-  const frame = readFrame(buffer);
-  expect(frame).toMatchObject({
+  const found = readFrame(frame({ number: 7, step: 8, input: 2 ** 40, codec: 2, key: true }));
+  expect(found).toMatchObject({
     type: "frame", codec: "h264", key: true, width: 640, height: 480, number: 7, step: 8, input: 2 ** 40, milliseconds: 12.5,
   });
-  expect(frame.data).toHaveLength(3);
+  expect(found.data).toHaveLength(3);
 });

@@ -228,6 +228,31 @@ describe("markers", () => {
   });
 });
 
+test("what a scene has of sky and spots is loaded, and the sky fills what is left of the picture", async () => {
+  const pictures = vi.fn(async () => ({ width: 4, height: 24, close() {} }));
+  vi.stubGlobal("createImageBitmap", pictures);
+  const picture = url("image/webp", new Uint8Array([1]));
+  const scene = { ...JSON.parse(atob((FILES["scene.json"] ?? "").split(",")[1] ?? "")), sky: "sky.webp",
+    contact_shadow: { rgba: [0, 0, 0, 0.8], border: 0.05, lift: 0.006, reach: 0.3, texture: "spot.webp" } };
+  const files = { ...FILES, "scene.json": url("application/json", new TextEncoder().encode(JSON.stringify(scene))), "sky.webp": picture, "spot.webp": picture };
+  await world.load((name) => files[/** @type {keyof typeof files} */ (name)] ?? "data:,");
+  const calls = /** @type {unknown[][]} */ (pictures.mock.calls);
+  const faces = calls.filter((call) => call.length > 2).map((call) => call.slice(1));
+  expect(faces).toEqual([0, 4, 8, 12, 16, 20].map((top) => [0, top, 4, 4])); // of the strip
+  await world.setObjects({ object_00: { model: "mug", pose: [1, 2, 0, 1, 0, 0, 0] } });
+  world.draw();
+  const shown = /** @type {any[]} */ ([]);
+  drawn.at(-1)?.scene.traverse((child) => shown.push(child));
+  expect(shown.find((child) => child instanceof ContactShadows)?.count).toBe(1);
+  expect(shown.filter((child) => child.material?.uniforms?.faces).map((sky) => sky.renderOrder)).toEqual([100]);
+});
+
+test("a file that cannot be read is named", async () => {
+  vi.stubGlobal("fetch", async () => new Response("", { status: 404, statusText: "Not Found" }));
+  await expect(world.load((name) => `/scene/${name}`)).rejects.toThrow("/scene/scene.json cannot be read: 404 Not Found");
+  vi.unstubAllGlobals();
+});
+
 test("a contact shadow is as wide as the object's boxes and fades as that is lifted", () => {
   const settings = { rgba: [0, 0, 0, 0.8], border: 0.05, lift: 0.006, reach: 0.3, texture: "" };
   const shadows = new ContactShadows(lighting([], HEADLIGHT), settings, new Texture());

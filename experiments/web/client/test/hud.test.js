@@ -64,4 +64,36 @@ describe("the display", () => {
     vi.runAllTimers(); // no frame comes where nothing has moved
     expect([part("reach").hidden, part("room").textContent, part("clock").textContent]).toEqual([true, "Hall", "1:23"]);
   });
+
+  test("shows pictures that come later, and keeps the current row of a long list in sight", () => {
+    const rows = Array.from({ length: 9 }, (_, i) => item({ picture: "mug", current: i === 6 }));
+    vi.spyOn(HTMLElement.prototype, "offsetTop", "get").mockImplementation(/** @this {Element} */ function () {
+      return 10 * [...part("list").children].indexOf(this);
+    });
+    hud.show(state({ checklist: rows, bins: [{ label: "Bin", place: "Kitchen\nleft", picture: "bin" }] }));
+    expect(part("list").querySelectorAll("img")).toHaveLength(0);
+    hud.learn({ type: "pictures", pictures: { mug: "data:,mug", bin: "data:,bin" } });
+    expect([part("list").querySelectorAll("img").length, part("bins").textContent]).toEqual([9, "BinKitchen left"]);
+    expect(part("list").scrollTop).toBe(50); // two rows above it, and the list itself is at -10
+    hud.show(state({ checklist: rows, scroll: -3 }));
+    expect(part("list").scrollTop).toBe(20);
+    vi.restoreAllMocks();
+  });
+
+  test("has a map with north up, on which the person looks where they go", () => {
+    /** @type {[string, ...number[]][]} */
+    const calls = [];
+    const noted = (/** @type {string} */ name) => (/** @type {number[]} */ ...values) => calls.push([name, ...values]);
+    const names = ["beginPath", "arc", "fill", "translate", "rotate", "lineTo", "closePath", "stroke", "drawImage"];
+    const map = /** @type {HTMLCanvasElement} */ (part("map"));
+    map.getContext = /** @type {any} */ (() => Object.fromEntries(names.map((name) => [name, noted(name)])));
+    const minimap = { picture: "house", bounds: [-2, 0, 8, 5], position: [0, 1], heading: Math.PI / 2, path: [[1, 1]], objects: [[2, 2]], goal: [8, 5] };
+    hud.showMoment(moment({ minimap: /** @type {Moment["minimap"]} */ (minimap) }));
+    expect([map.hidden, map.width, map.height]).toEqual([false, 400, 200]);
+    const discs = calls.filter(([name]) => name === "arc").map(([, x, y]) => [x, y]);
+    expect(discs).toEqual([[120, 160], [120, 160], [160, 120], [160, 120], [400, 0], [400, 0]]);
+    expect(calls.filter(([name]) => name === "translate" || name === "rotate")).toEqual([["translate", 80, 160], ["rotate", -Math.PI / 2]]);
+    hud.showMoment(moment({}));
+    expect(map.hidden).toBe(true);
+  });
 });

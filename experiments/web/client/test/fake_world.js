@@ -1,0 +1,19 @@
+// Stands for static/drawing/world.js where there is no WebGL: remembers what it was told to draw.
+
+import { vi } from "vitest";
+
+import { Group } from "../static/vendor/three.js";
+
+export const world = {
+  onLost: () => {},
+  load: vi.fn(async () => ({ objects: { mug: {} } })),
+  loadModels: vi.fn(), resize: vi.fn(), setFieldOfView: vi.fn(), setObjects: vi.fn(), setPose: vi.fn(), setPerson: vi.fn(),
+  setEye: vi.fn(), setCamera: vi.fn(), setMarkers: vi.fn(), setOutline: vi.fn(), showCeilings: vi.fn(), draw: vi.fn(),
+  project: vi.fn(() => ({ x: 0.25, y: 0.5, inView: true })),
+  info: () => ({ renderer: "a card" }),
+  stage: { renderer: {}, scene: new Group(), camera: new Group() },
+};
+
+export const World3D = vi.fn(function () {
+  return world;
+});

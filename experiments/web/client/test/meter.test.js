@@ -1,0 +1,39 @@
+import { beforeEach, expect, test, vi } from "vitest";
+
+import { Meter } from "../static/meter.js";
+
+/** @import { Frame } from "../static/protocol.js" */
+
+/** @type {Meter} */
+let meter;
+beforeEach(() => {
+  vi.useFakeTimers();
+  meter = new Meter();
+});
+
+/** @param {number} input */
+const frame = (input) => /** @type {Frame} */ ({ input, data: new Uint8Array(1000) });
+
+test("frames are counted: how many a second, the times between them, those that came and were not shown", () => {
+  for (let i = 0; i < 100; i++) {
+    vi.advanceTimersByTime(i % 10 === 9 ? 140 : 40);
+    meter.came(frame(0));
+    if (i < 98) meter.shown(frame(0));
+  }
+  expect(meter.take()).toEqual({ frames_per_s: 19.6, frame_ms: 40, frame_ms_95: 140, dropped: 2, latency_ms: null, kilobits: 160 });
+  expect(meter.take()).toMatchObject({ frames_per_s: 0, dropped: 0, kilobits: 0 });
+});
+
+test("the latency is from an input to what shows it, and each input counts once", () => {
+  meter.sent(1);
+  vi.advanceTimersByTime(10);
+  meter.sent(2);
+  vi.advanceTimersByTime(50);
+  meter.answered(1);
+  meter.answered(1);
+  vi.advanceTimersByTime(100);
+  meter.shown(frame(2));
+  expect(meter.take().latency_ms).toBe(60);
+  meter.answered(2);
+  expect(meter.take().latency_ms).toBeNull();
+});

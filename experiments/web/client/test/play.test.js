@@ -1,0 +1,375 @@
+// @vitest-environment happy-dom
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+
+import { TOO_MUCH } from "../static/protocol.js";
+import { FakeSocket, frame, showPage, watchListeners } from "./page.js";
+import { EMPTY, GAIT, SPEEDS } from "./walks.js";
+
+// Every test loads the page anew, but not these.
+const { fake, three } = await vi.hoisted(async () => ({ fake: await import("./fake_world.js"), three: await import("../static/vendor/three.js") }));
+vi.mock("../static/drawing/world.js", () => fake);
+vi.mock("../static/vendor/three.js", () => three);
+const { World3D, world } = fake;
+
+const SCENE = { type: "scene", path: "/scene/1/", floor: "/floor.json", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, step_duration: 0.04 };
+const STATE = {
+  type: "snapshot", step: 0, input: 0, time: 0, busy: false, body: new Array(16).fill(0), eye: [],
+  hands: [[0.3, 0.2, 1], [0.3, -0.2, 1]], held: [null, null], objects: {}, models: {}, gone: [],
+};
+const REACH = { object: "Mug", receptacle: null, at: [0.5, 0.5], instance: "object_00", place: [1, 2, 0] };
+const HUD = {
+  checklist_title: "Objects to find", checklist: [], bins: [], inventory: [null, { label: null, picture: null }],
+  message: null, markers: [], rerouted: false, delivered: 2, total: 6, clock: null, pointer: null, minimap: null, scroll: 0,
+};
+
+/** @param {string} id */
+const part = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+const title = () => (/** @type {HTMLDialogElement} */ (part("panel")).open ? part("panel-title").textContent : null);
+/** Chooses a button of the dialog. @param {string} label */
+const choose = (label) => [...part("panel-actions").querySelectorAll("button")].find((button) => button.textContent === label)?.click();
+/** @param {string} code @param {string} [type] */
+const key = (code, type = "keydown") => document.activeElement?.dispatchEvent(new KeyboardEvent(type, { code, bubbles: true }));
+const socket = () => FakeSocket.latest();
+const settled = () => vi.advanceTimersByTimeAsync(0);
+
+/** Opens the page of a trial. @param {Record<string, string>} [data] */
+async function opened(data = {}) {
+  showPage("play", { trial: "task", objects: "6", wait: "0", draw: "server", ...data });
+  await import("../static/play.js");
+  if (FakeSocket.all.length) socket().onopen();
+}
+
+/** Opens the page and starts the clock. @param {Record<string, string>} [data] */
+async function running(data = {}) {
+  await opened(data);
+  socket().state("ready");
+  if (data.draw) socket().receive(SCENE);
+  else socket().onmessage({ data: frame({ number: 1 }) });
+  await settled();
+  choose("Start");
+  socket().state("running");
+}
+
+beforeEach(watchListeners);
+beforeEach(() => {
+  vi.useFakeTimers();
+  vi.resetModules();
+  vi.clearAllMocks();
+  FakeSocket.all = [];
+  localStorage.clear();
+  history.replaceState({}, "", `/play/${"x".repeat(43)}`);
+  vi.stubGlobal("WebSocket", FakeSocket);
+  vi.stubGlobal("createImageBitmap", async () => ({ close() {} }));
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify(EMPTY)));
+  vi.spyOn(location, "reload").mockImplementation(() => {});
+});
+afterEach(() => {
+  vi.clearAllTimers();
+  vi.restoreAllMocks();
+});
+
+describe("a trial", () => {
+  test("goes from loading over instructions to the task and its end", async () => {
+    await opened();
+    expect(title()).toBe("One moment");
+    expect(socket().sent).toMatchObject([{ type: "hello", trial: "task", view: { codec: "jpeg" } }]);
+    socket().state("ready");
+    expect(title()).toBe("One moment"); // there is nothing to see yet
+    socket().onmessage({ data: frame({ number: 1 }) });
+    await settled();
+    expect(part("panel-text").textContent).toContain("all 6 objects");
+    expect(socket().all("seen")).toEqual([{ type: "seen", frame: 1 }]);
+    choose("Start");
+    expect(socket().all("run")).toEqual([{ type: "run", until: null }]);
+    expect([title(), part("play").dataset.phase, document.activeElement?.id]).toEqual([null, "running", "screen"]);
+    socket().state("over", "all delivered");
+    expect(title()).toBe("All done");
+    socket().receive({ type: "saved" });
+    vi.advanceTimersByTime(2000);
+    expect(location.reload).toHaveBeenCalledOnce();
+  });
+
+  test("explains the keys in the training, which may be skipped", async () => {
+    await opened({ trial: "training" });
+    socket().state("ready");
+    socket().onmessage({ data: frame({ number: 1 }) });
+    expect(part("panel-text").textContent).toContain("Walk with W or ↑, A, S or ↓, D");
+    choose("Skip the training");
+    expect(socket().all("leave")).toHaveLength(1);
+  });
+
+  test("is ended by hand after its time only", async () => {
+    await running({ wait: "60" });
+    part("end-button").click();
+    expect(part("panel-text").textContent).toContain("in 60 s");
+    choose("Continue");
+    expect(title()).toBeNull();
+    vi.advanceTimersByTime(60_000);
+    part("end-button").click();
+    choose("End the task");
+    expect(socket().all("leave")).toHaveLength(1);
+  });
+
+  test("is offered again on the first page of this browser", async () => {
+    await opened();
+    showPage("story");
+    vi.resetModules();
+    await import("../static/start.js");
+    expect(part("continue").hidden).toBe(false);
+    expect(part("continue").querySelector("a")?.pathname).toBe(location.pathname);
+    await import("../static/end.js");
+    showPage("story");
+    vi.resetModules();
+    await import("../static/start.js");
+    expect(part("continue").hidden).toBe(true);
+  });
+});
+
+describe("while the clock runs", () => {
+  test("keys are sent, and nothing is held once the page is left", async () => {
+    await running();
+    key("KeyW");
+    window.dispatchEvent(new Event("blur"));
+    window.dispatchEvent(new Event("focus"));
+    expect(socket().inputs.slice(-2)).toMatchObject([{ forward: 1 }, {}]);
+    expect(socket().inputs.at(-1)).not.toHaveProperty("forward");
+    expect(socket().all("blur")).toEqual([{ type: "blur", away: true }, { type: "blur", away: false }]);
+  });
+
+  test("the display shows what the server tells", async () => {
+    await running();
+    socket().receive({ type: "pictures", pictures: {} });
+    socket().receive({ type: "hud", state: HUD });
+    socket().receive({ type: "moment", step: 5, clock: 61, room: "Kitchen", reach: REACH, pointer: { angle: Math.PI / 2 }, minimap: null });
+    expect(part("room").textContent).toBe("");
+    socket().onmessage({ data: frame({ number: 2, step: 5 }) });
+    await settled();
+    expect(part("progress").textContent).toBe("2 / 6 put away");
+    expect([part("room").textContent, part("clock").textContent]).toEqual(["Kitchen", "1:01"]);
+    expect([part("pointer").hidden, part("pointer").style.left, part("pointer").style.top]).toEqual([false, "50%", "6%"]);
+    socket().receive({ type: "busy", busy: true });
+    expect([part("busy").hidden, part("busy").textContent]).toEqual([false, "Busy: your hands are moving"]);
+    socket().receive({ type: "busy", busy: false });
+    expect(part("busy").hidden).toBe(true);
+    part("reach").click();
+    expect(socket().inputs.at(-1)).toMatchObject({ press: "act" });
+  });
+
+  test("how well it was seen is told, and shown where that is asked for", async () => {
+    history.replaceState({}, "", "/play/token?debug");
+    await running();
+    for (let number = 2; number < 152; number++) {
+      vi.advanceTimersByTime(33);
+      socket().onmessage({ data: frame({ number }) });
+      await settled();
+    }
+    vi.advanceTimersByTime(5000 - 150 * 33);
+    expect(socket().all("display")).toMatchObject([{ draw: "server", frame_ms: 33, renderer: "frames of the server, jpeg, 640x480" }]);
+    expect([part("debug").hidden, part("debug").textContent]).toEqual([false, expect.stringContaining("fps")]);
+  });
+
+  test("P pauses and continues, also while a dialog says so", async () => {
+    await running();
+    key("KeyP");
+    expect(socket().all("pause")).toEqual([{ type: "pause", reason: "asked" }]);
+    socket().state("paused", "asked");
+    expect(title()).toBe("Paused");
+    key("KeyP");
+    expect(title()).toBeNull();
+    expect(socket().all("run")).toHaveLength(2);
+    part("pause-button").click();
+    expect(socket().all("pause")).toHaveLength(2);
+  });
+
+  test("a page that is hidden for long is paused", async () => {
+    await running();
+    const hide = (/** @type {boolean} */ hidden) => {
+      vi.spyOn(document, "hidden", "get").mockReturnValue(hidden);
+      document.dispatchEvent(new Event("visibilitychange"));
+    };
+    hide(true);
+    vi.advanceTimersByTime(900);
+    socket().receive({ type: "beat" });
+    hide(false);
+    vi.advanceTimersByTime(900);
+    socket().receive({ type: "beat" });
+    expect(socket().all("pause")).toEqual([]);
+    hide(true);
+    for (let second = 0; second < 10; second++) {
+      vi.advanceTimersByTime(500);
+      socket().receive({ type: "beat" });
+    }
+    expect(socket().all("pause")).toEqual([{ type: "pause", reason: "hidden" }]);
+    expect(socket().all("beat")).toHaveLength(12);
+  });
+
+  test("H opens and closes the table of controls, under which no key walks", async () => {
+    await running();
+    const help = /** @type {HTMLDialogElement} */ (part("help"));
+    key("KeyH");
+    expect([help.open, part("keys").children.length]).toEqual([true, 15]);
+    key("KeyW");
+    expect(socket().inputs.some((input) => input.forward)).toBe(false);
+    key("KeyH");
+    expect([help.open, document.activeElement?.id]).toEqual([false, "screen"]);
+    part("help-button").click();
+    expect(help.open).toBe(true);
+  });
+
+  test("a new size of the window is told once it stays", async () => {
+    await running();
+    part("screen").getBoundingClientRect = () => new DOMRect(0, 0, 320, 240);
+    window.dispatchEvent(new Event("resize"));
+    window.dispatchEvent(new Event("resize"));
+    vi.advanceTimersByTime(500);
+    expect(socket().all("view")).toEqual([{ type: "view", width: 320, height: 240, codec: "jpeg" }]);
+  });
+
+  test("settings change mouse and text", async () => {
+    await running();
+    const text = /** @type {HTMLSelectElement} */ (document.querySelector("[name=text]"));
+    text.value = "1.5";
+    text.dispatchEvent(new Event("change"));
+    expect(document.documentElement.style.fontSize).toBe("150%");
+  });
+});
+
+describe("a lost link", () => {
+  test("pauses, and the clock runs again by itself when it is back", async () => {
+    await running();
+    socket().onclose({ code: 1006 });
+    expect([title(), part("play").dataset.phase]).toEqual(["No connection", "loading"]);
+    vi.advanceTimersByTime(900);
+    expect(FakeSocket.all).toHaveLength(2);
+    socket().onopen();
+    socket().state("paused", "disconnected");
+    expect(title()).toBeNull();
+    expect(socket().all("run")).toHaveLength(1);
+  });
+
+  test("is noticed although nothing closed it", async () => {
+    await running();
+    vi.advanceTimersByTime(2000);
+    expect(title()).toBe("No connection");
+    socket().receive({ type: "beat" });
+    expect(socket().all("pause")).toEqual([{ type: "pause", reason: "silent" }]);
+    socket().state("paused", "silent");
+    expect(socket().all("run")).toHaveLength(2);
+  });
+
+  test("does not let the clock run while the page is hidden", async () => {
+    await running();
+    vi.spyOn(document, "hidden", "get").mockReturnValue(true);
+    socket().onclose({ code: 1006 });
+    vi.advanceTimersByTime(900);
+    socket().state("paused", "disconnected");
+    expect([title(), socket().all("run")]).toEqual(["Paused", []]);
+  });
+});
+
+test.each([
+  [{ type: "queue", position: 3 }, "All places are taken", null],
+  [{ type: "occupied" }, "This session is open in another page", "Continue here"],
+  [{ type: "replaced" }, "This session continues in another page", "Continue here"],
+  [{ type: "error", code: "idle", message: "" }, "You were away for a long time", "Continue"],
+  [{ type: "state", phase: "failed", reason: "The disk is full", input: 0 }, "Something went wrong", "Try again"],
+  [{ type: "state", phase: "paused", reason: "taken over", input: 0 }, "Paused", "Continue"],
+])("the page says what it waits for: %o", async (message, expected, label) => {
+  await opened();
+  socket().receive(message);
+  expect(title()).toBe(expected);
+  expect(part("panel-actions").querySelector("button")?.textContent ?? null).toBe(label);
+});
+
+test("a session that is open in another page can be taken over", async () => {
+  await opened();
+  socket().receive({ type: "occupied" });
+  choose("Continue here");
+  expect(socket().all("takeover")).toHaveLength(1);
+  socket().onclose({ code: TOO_MUCH });
+  expect(title()).toBe("The connection was closed");
+  choose("Reconnect");
+  expect(location.reload).toHaveBeenCalledOnce();
+});
+
+test("a message that the server refused is left in the console, for those who look for a fault", async () => {
+  const warned = vi.spyOn(console, "warn").mockImplementation(() => {});
+  await opened();
+  socket().receive({ type: "error", code: "malformed", message: "no such key" });
+  expect(warned.mock.lastCall?.[0]).toContain("no such key");
+});
+
+describe("a browser that draws", () => {
+  test("walks ahead of the server, and tells the steps of its inputs", async () => {
+    await running({ draw: "auto" });
+    expect(socket().sent[0].view.codec).toBe("none");
+    expect(socket().all("run")).toEqual([{ type: "run", until: 0 }]);
+    expect(part("world").hidden).toBe(false);
+    socket().receive(STATE);
+    key("KeyW");
+    vi.advanceTimersByTime(200);
+    expect(world.setEye.mock.lastCall?.[0].position[0]).toBeGreaterThan(0.1);
+    expect(socket().inputs.find((input) => input.forward)).toMatchObject({ step: 0 });
+    expect(socket().all("inputs").at(-1).until).toBeGreaterThanOrEqual(4);
+  });
+
+  test("says that a pick waits for the server", async () => {
+    await running({ draw: "auto" });
+    socket().receive(STATE);
+    socket().receive({ type: "moment", step: 0, clock: null, room: "", reach: REACH, pointer: null, minimap: null });
+    socket().receive({ type: "markers", markers: [] });
+    key("KeyE");
+    expect([part("busy").textContent, part("busy").className]).toEqual(["One moment", "asked"]);
+    vi.advanceTimersByTime(100);
+    const press = socket().inputs.find((input) => input.press === "act");
+    expect(part("reach").style.left).toBe("25%"); // where the object is drawn
+    socket().receive({ ...STATE, step: 2, busy: true });
+    expect(part("busy").textContent).toBe("Busy: your hands are moving");
+    socket().receive({ ...STATE, step: 14, input: press.number });
+    expect(part("busy").hidden).toBe(true);
+  });
+
+  test.each([
+    ["context lost", () => world.onLost()],
+    ["slow", () => vi.advanceTimersByTime(1)],
+  ])("lets the server draw where it cannot: %s", async (reason, happens) => {
+    await running({ draw: "auto" });
+    if (reason === "slow") {
+      // The state comes, but there are no pictures.
+      vi.stubGlobal("requestAnimationFrame", () => 0);
+      for (let second = 0; second < 5; second += 0.5) {
+        vi.advanceTimersByTime(500);
+        socket().receive({ type: "beat" });
+      }
+    }
+    happens();
+    expect(socket().all("draw")).toEqual([{ type: "draw", draw: "server", reason }]);
+    expect(socket().all("view")).toMatchObject([{ codec: "jpeg" }]);
+    expect(part("world").hidden).toBe(true);
+  });
+
+  test("lets the server draw a house that it cannot load", async () => {
+    world.load.mockRejectedValueOnce(new Error("house.glb: 404"));
+    await opened({ draw: "auto" });
+    socket().receive(SCENE);
+    await settled();
+    expect(socket().all("draw")).toMatchObject([{ reason: "house not loaded: house.glb: 404" }]);
+  });
+
+  test("is not replaced where the study wants the browser to draw", async () => {
+    await running({ draw: "browser" });
+    world.onLost();
+    expect([title(), socket().all("draw")]).toEqual(["This browser cannot draw the apartment", []]);
+  });
+
+  test.each([["browser", 0, "This browser cannot draw the apartment"], ["auto", 1, "One moment"]])(
+    "without WebGL 2 there is a reason or frames: %s", async (draw, sockets, expected) => {
+      World3D.mockImplementationOnce(function () {
+        throw new Error("no WebGL 2");
+      });
+      await opened({ draw });
+      expect([FakeSocket.all.length, title()]).toEqual([sockets, expected]);
+      if (sockets) expect(socket().sent[0].view.codec).toBe("jpeg");
+    },
+  );
+});

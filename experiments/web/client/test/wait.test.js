@@ -1,0 +1,15 @@
+// @vitest-environment happy-dom
+import { expect, test, vi } from "vitest";
+
+test("a button waits, says how long, and has the focus then", async () => {
+  vi.useFakeTimers();
+  document.body.innerHTML = '<button data-wait="2">Begin</button><button data-wait="0">Continue</button>';
+  const [begin, go] = document.querySelectorAll("button");
+  if (begin) begin.autofocus = true;
+  await import("../static/start.js");
+  expect([begin?.disabled, begin?.textContent, go?.disabled, go?.textContent]).toEqual([true, "Begin (in 2 s)", false, "Continue"]);
+  vi.advanceTimersByTime(1250);
+  expect(begin?.textContent).toBe("Begin (in 1 s)");
+  vi.advanceTimersByTime(750);
+  expect([begin?.disabled, begin?.textContent, document.activeElement]).toEqual([false, "Begin", begin]);
+});
