@@ -141,8 +141,10 @@ describe("while the clock runs", () => {
     socket().receive({ type: "pictures", pictures: {} });
     socket().receive({ type: "hud", state: HUD });
     socket().receive({ type: "moment", step: 5, clock: 61, room: "Kitchen", reach: REACH, pointer: { angle: Math.PI / 2 }, minimap: null });
-    expect(part("room").textContent).toBe("");
-    socket().onmessage({ data: frame({ number: 2, step: 5 }) });
+    socket().onmessage({ data: frame({ number: 2, step: 4 }) });
+    await settled();
+    expect(part("room").textContent).toBe(""); // its frame is not on show yet
+    socket().onmessage({ data: frame({ number: 3, step: 5 }) });
     await settled();
     expect(part("progress").textContent).toBe("2 / 6 put away");
     expect([part("room").textContent, part("clock").textContent]).toEqual(["Kitchen", "1:01"]);
@@ -187,20 +189,26 @@ describe("while the clock runs", () => {
       vi.spyOn(document, "hidden", "get").mockReturnValue(hidden);
       document.dispatchEvent(new Event("visibilitychange"));
     };
+    const wait = (/** @type {number} */ seconds) => {
+      for (let beat = 0; beat < 2 * seconds; beat++) {
+        vi.advanceTimersByTime(500);
+        socket().receive({ type: "beat" });
+      }
+    };
     hide(true);
-    vi.advanceTimersByTime(900);
-    socket().receive({ type: "beat" });
+    wait(4);
     hide(false);
-    vi.advanceTimersByTime(900);
-    socket().receive({ type: "beat" });
+    wait(6);
     expect(socket().all("pause")).toEqual([]);
     hide(true);
-    for (let second = 0; second < 10; second++) {
-      vi.advanceTimersByTime(500);
-      socket().receive({ type: "beat" });
-    }
+    wait(6);
     expect(socket().all("pause")).toEqual([{ type: "pause", reason: "hidden" }]);
-    expect(socket().all("beat")).toHaveLength(12);
+    expect(socket().all("beat")).toHaveLength(32);
+    socket().state("paused", "hidden");
+    hide(false);
+    hide(true);
+    wait(6);
+    expect(socket().all("pause")).toHaveLength(1);
   });
 
   test("H opens and closes the table of controls, under which no key walks", async () => {
@@ -323,10 +331,22 @@ describe("a browser that draws", () => {
     vi.advanceTimersByTime(100);
     const press = socket().inputs.find((input) => input.press === "act");
     expect(part("reach").style.left).toBe("25%"); // where the object is drawn
+    socket().receive({ ...STATE, step: 1 }); // of before the press
+    expect(part("busy").textContent).toBe("One moment");
     socket().receive({ ...STATE, step: 2, busy: true });
     expect(part("busy").textContent).toBe("Busy: your hands are moving");
     socket().receive({ ...STATE, step: 14, input: press.number });
     expect(part("busy").hidden).toBe(true);
+  });
+
+  test("goes on drawing while it is fast enough", async () => {
+    await running({ draw: "auto" });
+    for (let step = 0; step < 250; step++) {
+      vi.advanceTimersByTime(40);
+      socket().receive({ ...STATE, step });
+    }
+    expect(socket().all("display")).toMatchObject([{ draw: "browser" }, { draw: "browser", renderer: "a card" }]);
+    expect(socket().all("draw")).toEqual([]);
   });
 
   test.each([
