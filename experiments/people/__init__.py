@@ -1,0 +1,1 @@
+"""Studies with people: the study file, phases, the store, the server, recruitment."""

@@ -1,0 +1,41 @@
+"""What a participant is asked: items of a form, as files of texts describe them."""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+Kind = Literal["scale", "choice", "several", "number", "line", "text"]
+MAX_LINE, MAX_TEXT = 200, 2000  # characters of an answer
+NAME = r"^[a-z][a-z0-9_]{0,39}$"
+
+
+class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A question and how it is answered.
+
+    Attributes:
+        name: Of its column in tables.
+        kind: `scale`, one of the points of the page's scale, kept as 1 and up; `choice` and `several`, of `choices`;
+            `number`, a whole one; `line` and `text`, written freely.
+        right: The answer that shows attention or comprehension; of a scale the number of its point.
+    """
+
+    name: Annotated[str, msgspec.Meta(pattern=NAME)]
+    kind: Kind
+    text: str
+    choices: list[str] = []
+    low: int = 0
+    high: int = 1_000_000
+    required: bool = True
+    right: str | int | None = None
+
+    def __post_init__(self) -> None:
+        """Check that it can be answered."""
+        chosen = self.kind in ("choice", "several")
+        if chosen and len(set(self.choices)) < max(2, len(self.choices)):
+            raise ValueError(f"item {self.name!r} needs two choices or more, all different")
+        if not chosen and self.choices:
+            raise ValueError(f"item {self.name!r} is a {self.kind} and has choices; make it a choice")
+        if self.kind == "choice" and self.right is not None and self.right not in self.choices:
+            raise ValueError(f"the right answer {self.right!r} of item {self.name!r} is none of its choices")
+        if self.low > self.high:
+            raise ValueError(f"item {self.name!r} has low {self.low} above high {self.high}")

@@ -1,0 +1,130 @@
+"""What all phases share: the interface, and phases that are a text with a form."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol, runtime_checkable
+
+from starlette.datastructures import ImmutableMultiDict
+
+from experiments.people.forms import form_of
+from experiments.people.items import Item
+from experiments.people.study_file import Study
+from experiments.people.texts import Section
+
+Outcome = Literal["next", "no_consent", "screened_out"]
+Answers = Mapping[str, Any]
+FormData = ImmutableMultiDict[str, str]
+
+
+@dataclass(frozen=True)
+class Visitor:
+    """What a phase may know of the person in it.
+
+    Attributes:
+        answers: Given in this phase so far.
+        shown_s: How long ago the phase was shown first, s.
+        attempts: How many answers of it were refused.
+        path: Of the person's pages.
+        assistance: Of the person's cell, or None before the assignment.
+    """
+
+    answers: Answers
+    shown_s: float
+    attempts: int
+    path: str
+    assistance: str | None = None
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page: a template by name, and its values."""
+
+    template: str
+    values: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Done:
+    """The phase is over: what was answered, and what follows."""
+
+    answers: Answers = field(default_factory=dict)
+    outcome: Outcome = "next"
+
+
+@dataclass(frozen=True)
+class Again:
+    """The phase is shown again with a note."""
+
+    note: str
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+
+@runtime_checkable
+class Phase(Protocol):
+    """A phase of a study."""
+
+    name: str
+
+    def page(self, visitor: Visitor, refused: Again | None = None) -> Page:
+        """What the person sees; `refused` is what was wrong with what was sent."""
+        ...
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """Check what the person sent."""
+        ...
+
+
+class FormPhase:
+    """A text, the items of a form, and a button.
+
+    Args:
+        study: The study.
+        name: Of the phase, and of the section of its texts.
+        template: Of its page.
+    """
+
+    def __init__(self, study: Study, name: str, template: str = "form") -> None:
+        self.name, self._template = name, template
+        self._study = study
+        self.texts: Section = study.texts[name]
+
+    @property
+    def items(self) -> Sequence[Item]:
+        """What is asked."""
+        return self.texts.items
+
+    def page(self, visitor: Visitor, refused: Again | None = None) -> Page:
+        """The text and the form, with the answers so far."""
+        form = refused.values.get("form") if refused else None
+        return Page(
+            self._template,
+            {
+                "section": self.texts,
+                "form": form or self._form(None, visitor.answers),
+                "note": refused.note if refused else "",
+                "saves": bool(self.items),
+                **self.values(visitor),
+            },
+        )
+
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - of subclasses
+        """Further values of the template."""
+        return {}
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """The answers, if all are there."""
+        form = self._form(sent, visitor.answers)
+        if not form.validate():
+            return Again(self._study.texts["common"]["faults"], {"form": form})
+        return Done(
+            {
+                item.name: form[item.name].data
+                for item in self.items
+                if form[item.name].data not in (None, "", [])
+            }
+        )
+
+    def _form(self, sent: FormData | None, answers: Answers) -> Any:
+        form = form_of(self.items, self.texts.scale, self._study.texts["common"])
+        form.process(sent, data=dict(answers))
+        return form

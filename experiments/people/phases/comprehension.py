@@ -1,0 +1,33 @@
+"""Whether the task was understood: questions with one right answer each, a number of attempts."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from experiments.people.phases.base import Again, Done, FormData, FormPhase, Visitor
+from experiments.people.study_file import COMPREHENSION, Study
+
+
+class Comprehension(FormPhase):
+    """Questions about the story, which can be read again on the same page."""
+
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
+        """The story, to be read again."""
+        return {"story": [part for part in self._study.story.split("\n\n") if part.strip()]}
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """The answers, if all are right; after the last attempt the person is screened out."""
+        read = super().read(visitor, sent)
+        if isinstance(read, Again):
+            return read
+        wrong = [i.name for i in self.items if i.right is not None and read.answers.get(i.name) != i.right]
+        answers = {**read.answers, "attempts": visitor.attempts + 1}
+        if not wrong:
+            return Done(answers)
+        if visitor.attempts + 1 >= self._study.settings.limits.attempts:
+            return Done(answers, "screened_out")
+        return Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
+
+
+def build(study: Study) -> Comprehension:
+    """The phase."""
+    return Comprehension(study, COMPREHENSION)

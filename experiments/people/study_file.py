@@ -1,0 +1,215 @@
+"""The file of a study with people: a design (docs/designs.md) with a table `[study]`."""
+
+import hashlib
+import itertools
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from experiments.errors import ConfigError
+from experiments.people.file_lines import at_line
+from experiments.people.texts import Texts, read_texts
+from experiments.procedure.story import story_text
+from experiments.record.origin import HUMAN
+from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
+from experiments.trials.design import read_design
+from experiments.trials.exclusions import Exclusions
+from experiments.trials.trial_config import SEEDS, TrialConfig
+from mjsim.files import read_bytes
+
+CONSENT, DEVICE, COMPREHENSION, SURVEY = "consent", "device", "comprehension", "survey"
+DEBRIEFING, COMPLETION = "debriefing", "completion"
+PHASES = (CONSENT, DEVICE, STORY, FLYTHROUGH, COMPREHENSION, TRAINING, TASK, SURVEY, DEBRIEFING, COMPLETION)
+PLAYED = (TRAINING, TASK)
+PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
+
+Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=86400.0)]
+Count = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
+Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
+
+
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    pass
+
+
+class Pay(_Table, frozen=True):
+    """What people receive; amounts in units of the currency."""
+
+    currency: Annotated[str, msgspec.Meta(pattern="^[A-Z]{3}$")] = "USD"
+    reward: Money = 0.0  # for the whole study
+    screen_out: Money = 0.0  # for who is screened out
+    bonus_for_all: Money = 0.0  # for putting everything away
+    partial: bool = False  # whether who leaves after the task has begun receives a share, by phases
+
+
+class Device(_Table, frozen=True):
+    """What a participant's computer has to have."""
+
+    frames_per_s: Annotated[float, msgspec.Meta(ge=0.0, le=240.0)] = 20.0
+    latency_ms: Annotated[float, msgspec.Meta(ge=1.0)] = 500.0
+    width: Annotated[int, msgspec.Meta(ge=0)] = 800  # px of the window
+    height: Annotated[int, msgspec.Meta(ge=0)] = 500
+    keyboard: bool = True
+
+
+class Recruitment(_Table, frozen=True):
+    """Where people come from, and the codes that the platform expects back."""
+
+    platform: Literal["link", "lab", "prolific", "connect", "external-question"] = "link"
+    completed: str = ""
+    screened_out: str = ""
+    no_consent: str = ""
+    study_id: str = ""  # the platform's own
+
+
+class Limits(_Table, frozen=True):
+    """What ends a participation, and how many play at a time."""
+
+    sessions: Count = 20  # trials at a time; others wait
+    idle: Seconds = 1800.0  # without a sign of the person, after which a trial gives its place away
+    abandoned_after: Seconds = 1800.0  # without a sign of the person, after which the assignment is released
+    attempts: Count = 3  # at the comprehension check
+    keep_days: Count | None = None  # after which personal data are deleted
+
+
+class Settings(_Table, frozen=True):
+    """The table `[study]`."""
+
+    name: Annotated[str, msgspec.Meta(pattern="^[a-z0-9][a-z0-9-]{0,39}$")]
+    title: str
+    institution: str
+    contact: str
+    minutes: Count = 25
+    language: str = "en"
+    texts: str | None = None
+    phases: tuple[str, ...] = PHASES
+    assignment: Literal["balanced", "uniform"] = "balanced"
+    minimum: dict[str, Seconds] = {}
+    optional: tuple[str, ...] = ()
+    pay: Pay = Pay()
+    device: Device = Device()
+    recruitment: Recruitment = Recruitment()
+    limits: Limits = Limits()
+
+    def __post_init__(self) -> None:
+        """Check what belongs together."""
+        usual = [name for name in self.phases if name in PHASES]
+        if usual != [name for name in PHASES if name in usual] or len(set(self.phases)) < len(self.phases):
+            raise ValueError(
+                f"phases are {', '.join(self.phases)}; each at most once, in the order {', '.join(PHASES)}"
+            )
+        for name in (TASK, COMPLETION):
+            if name not in self.phases:
+                raise ValueError(f"a study needs the phase {name}; add it to phases")
+        if unknown := [name for name in self.phases if name not in PHASES and ":" not in name]:
+            raise ValueError(
+                f"no phase {unknown[0]!r}; there are {', '.join(PHASES)}, or package.module:attribute"
+            )
+        if unknown := [name for name in (*self.minimum, *self.optional) if name not in self.phases]:
+            raise ValueError(f"minimum or optional names {unknown[0]!r}, which is not among the phases")
+        if played := [name for name in self.optional if name in (*PLAYED, CONSENT, COMPLETION)]:
+            raise ValueError(f"{played[0]} cannot be optional")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of the design: the trial of each place in it."""
+
+    trials: Sequence[TrialConfig]
+
+    @property
+    def label(self) -> str:
+        """Its condition, such as `optimal, 6 objects`."""
+        return f"{self.trials[0].assistance}, {self.trials[0].objects} objects"
+
+    def trial(self, place: int) -> TrialConfig:
+        """The trial of a place, counted from 0; places beyond the last take the trials again."""
+        return self.trials[place % len(self.trials)]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study with people."""
+
+    path: Path
+    sha256: str  # of the file
+    settings: Settings
+    cells: Sequence[Cell]
+    texts: Texts
+    story: str
+    exclusions: Exclusions | None
+
+    @property
+    def people(self) -> int:
+        """How many are wanted."""
+        return sum(len(cell.trials) for cell in self.cells)
+
+
+def read_people_study(path: Path) -> Study:
+    """Read the file of a study with people.
+
+    Raises:
+        ConfigError: It cannot be read or used; the message names the file, the line and the value.
+    """
+    design = read_design(path)
+    content = read_bytes(path)
+    table = tomllib.loads(content.decode()).get("study")
+    if table is None:
+        raise ConfigError(
+            f"{path} has no table [study], which a study with people needs; `mjsim study init` writes one"
+        )
+    try:
+        settings = msgspec.convert({"study": table}, _File).study
+    except msgspec.ValidationError as error:
+        raise ConfigError(at_line(path, content.decode(), str(error))) from error
+    trials = [_of_a_person(trial, settings.phases) for trial in design.trials]
+    cells = [Cell(tuple(group)) for _, group in itertools.groupby(trials, _without_seeds)]
+    for name in ("house", "story", "training_assistance"):
+        if len(values := {getattr(cell.trials[0], name) for cell in cells}) > 1:
+            raise ConfigError(
+                f"{path}: cells differ in {name} ({', '.join(map(str, values))}); it is one for all"
+            )
+    story = design.trials[0].story
+    return Study(
+        path,
+        hashlib.sha256(content).hexdigest(),
+        settings,
+        cells,
+        read_texts(
+            settings.language, path.parent / settings.texts if settings.texts else None, _values(settings)
+        ),
+        story_text(None if story is None else Path(story)),
+        design.exclusions,
+    )
+
+
+class _File(msgspec.Struct):
+    study: Settings
+
+
+def _of_a_person(trial: TrialConfig, phases: Sequence[str]) -> TrialConfig:
+    """The trial of a real person in place of a simulated one."""
+    before = [name for name in (STORY, FLYTHROUGH, TRAINING) if name in phases]
+    settings: dict[str, Any] = {**trial.settings(), "user": HUMAN, "live": True, "behaviour": {}}
+    return TrialConfig.of({**settings, "phases": ",".join([*before, TASK])})
+
+
+def _without_seeds(trial: TrialConfig) -> str:
+    return repr({name: value for name, value in trial.settings().items() if name not in SEEDS})
+
+
+def _values(settings: Settings) -> Mapping[str, str]:
+    """What stands for places in texts."""
+    pay = settings.pay
+    return {
+        "title": settings.title,
+        "institution": settings.institution,
+        "contact": settings.contact,
+        "minutes": str(settings.minutes),
+        "pay": f"{Decimal(str(pay.reward)):.2f} {pay.currency}" if pay.reward else "no payment",
+    }

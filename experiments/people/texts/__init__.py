@@ -1,0 +1,106 @@
+"""Texts that participants read: one TOML file for each language."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from experiments.errors import ConfigError
+from experiments.people.items import Item
+from mjsim.files import read_bytes
+
+FOLDER = Path(__file__).parent
+_PLACE = re.compile(r"\{(\w+)\}")
+# Places of texts that pages fill in themselves.
+_LATER = frozenset({"step", "steps"})
+
+
+class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The texts of a page by name, and the items of its form."""
+
+    words: dict[str, str]
+    items: tuple[Item, ...] = ()
+    scale: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> str:
+        return self.words[name]
+
+    def paragraphs(self, name: str = "text") -> list[str]:
+        """The paragraphs of a text."""
+        return [part.strip() for part in self.words.get(name, "").split("\n\n") if part.strip()]
+
+
+class _Items(msgspec.Struct):
+    item: list[Item] = []
+    scale: Annotated[list[str], msgspec.Meta(min_length=2)] | None = None
+
+
+Texts = Mapping[str, Section]
+
+
+def languages() -> tuple[str, ...]:
+    """Languages of this package's files."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> Texts:
+    """The texts of a language, with those of a file in place of some of them.
+
+    Args:
+        language: Of one of this package's files.
+        path: A file with some sections; a section's items replace all of the original ones.
+        values: What stands for `{name}` in texts.
+
+    Raises:
+        ConfigError: A file cannot be read, or names something that does not exist; it names the file and the value.
+    """
+    if language not in languages():
+        raise ConfigError(f"no texts in language {language!r}; there are {', '.join(languages())}")
+    usual = _tables(FOLDER / f"{language}.toml")
+    own = _tables(path) if path else {}
+    for name, table in own.items():
+        if name not in usual:
+            raise ConfigError(f"{path}: no section [{name}]; there are {', '.join(usual)}")
+        if unknown := sorted(set(table) - set(usual[name]) - {"item", "scale"}):
+            raise ConfigError(
+                f"{path}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}"
+            )
+    return {
+        name: _section(name, {**table, **own.get(name, {})}, values, path) for name, table in usual.items()
+    }
+
+
+def _tables(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        return msgspec.toml.decode(read_bytes(path), type=dict[str, dict[str, Any]])
+    except OSError as error:
+        raise ConfigError(f"cannot read texts {path}: {error.strerror}") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: {error}") from error
+
+
+def _section(name: str, table: dict[str, Any], values: Mapping[str, str], path: Path | None) -> Section:
+    where = f"{path}: " if path else ""
+    try:
+        form = msgspec.convert({key: table[key] for key in ("item", "scale") if key in table}, _Items)
+        words = {key: value for key, value in table.items() if key not in ("item", "scale")}
+        words = msgspec.convert(words, dict[str, str])
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"{where}[{name}]: {error}") from error
+    if len({item.name for item in form.item}) < len(form.item):
+        raise ConfigError(f"{where}[{name}] has two items of one name")
+    filled = {key: _filled(text, values, f"{where}[{name}] {key}") for key, text in words.items()}
+    return Section(filled, tuple(form.item), tuple(form.scale or ()))
+
+
+def _filled(text: str, values: Mapping[str, str], where: str) -> str:
+    def value(found: re.Match[str]) -> str:
+        if found[1] in values or found[1] in _LATER:
+            return values.get(found[1], found[0])
+        raise ConfigError(
+            f"{where} has a place {found[0]}; there are {', '.join(sorted({*values, *_LATER}))}"
+        )
+
+    return _PLACE.sub(value, text)
