@@ -1,19 +1,10 @@
 """`mjsim play`: a person at the keyboard, in a browser."""
 
 import argparse
-import fcntl
-import logging
-import os
-import resource
 import socket
-import threading
-import webbrowser
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from ipaddress import IPv4Network, IPv6Network, ip_network
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import msgspec
 
@@ -26,7 +17,16 @@ from experiments.cli.options import (
     seconds,
     trial_options,
 )
-from experiments.errors import ConfigError, RecordError
+from experiments.cli.server import (
+    add_server_options,
+    check_public_url,
+    listen,
+    locked,
+    number,
+    prepare_process,
+    serve,
+)
+from experiments.errors import ConfigError
 from experiments.procedure.comprehension import Question, read_questions
 from experiments.procedure.story import story_text
 from experiments.record.origin import HUMAN
@@ -36,8 +36,6 @@ from hud.conditions import condition
 from planner.solver import SOLVERS, solver
 
 OBJECTS = 6
-PORT = 8000
-MAX_FILES = 16384  # open files, sockets included
 TRAINING_LIMIT = 24 * 3600.0  # s; as good as none
 
 DESCRIPTION = """\
@@ -64,27 +62,13 @@ def add_parser(commands: Any) -> None:
         "--xr", action="store_true", help="offer a button for a headset, where there is one (experimental)"
     )
     group = parser.add_argument_group("server")
-    group.add_argument(
-        "--port", type=_number(0, 65535), default=PORT, help="TCP port; 0 for any that is free"
-    )
-    group.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at")
-    group.add_argument(
-        "--public-url", metavar="URL", help="URL under which a proxy makes the server public (docs/play.md)"
-    )
-    group.add_argument(
-        "--trusted-proxy",
-        type=_networks,
-        default=(),
-        metavar="ADDRESS,..",
-        help="addresses or networks of proxies whose X-Forwarded-For tells who asks (docs/play.md)",
-    )
-    group.add_argument("--no-open", action="store_true", help="open no browser")
+    add_server_options(group)
     group.add_argument(
         "--out", type=Path, default=Path("runs/play"), metavar="DIR", help="folder of visits and their runs"
     )
     group.add_argument(
         "--sessions",
-        type=_number(1, 1000),
+        type=number(1, 1000),
         default=1,
         metavar="N",
         help="how many people can play at a time; others wait",
@@ -117,9 +101,9 @@ def run(arguments: argparse.Namespace) -> int:
     trials = _trials(arguments)
     if arguments.film is not None and not arguments.film.is_file():
         raise ConfigError(f"there is no film {arguments.film}; leave out --film, or name an MP4 file")
-    _check_public(arguments.public_url)
+    check_public_url(arguments.public_url)
     questions = _questions(arguments)
-    with _listen(arguments.host, arguments.port) as listener, _locked(arguments.out):
+    with listen(arguments.host, arguments.port) as listener, locked(arguments.out):
         _serve(arguments, trials, questions, listener)
     return 0
 
@@ -177,18 +161,11 @@ def _serve(
 ) -> None:
     from experiments.web.server.pool import WorkerPool  # imported here, so that other commands start fast
 
-    os.umask(0o077)  # what people did is nobody else's business
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, MAX_FILES) if most > 0 else MAX_FILES, most))
-
+    prepare_process()
     pool = WorkerPool(trials[TASK]["house"])
     pool.warm_up()  # in parallel to the imports that follow
 
-    import uvicorn
-
-    from experiments.web.protocol import MAX_TEXT
     from experiments.web.server.app import PlayConfig, PlayServer
-    from experiments.web.server.connections import QuickConnection
 
     phases = _phases(arguments)
     config = PlayConfig(
@@ -206,78 +183,8 @@ def _serve(
         proxies=arguments.trusted_proxy,
         xr=arguments.xr,
     )
-    logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
-    logging.getLogger("mjsim.play").setLevel(logging.INFO)
-    server = uvicorn.Server(
-        uvicorn.Config(
-            PlayServer(config, pool).app(arguments.host, arguments.public_url),
-            log_config=None,
-            access_log=False,  # paths hold tokens
-            log_level="warning",
-            server_header=False,
-            proxy_headers=False,  # the guards believe those that are named
-            http=QuickConnection,
-            ws="websockets-sansio",
-            ws_max_size=MAX_TEXT,
-            ws_ping_interval=5.0,
-            ws_ping_timeout=10.0,
-            ws_per_message_deflate=True,
-            timeout_graceful_shutdown=3,
-            limit_concurrency=4000,
-        )
-    )
-    url = arguments.public_url or _url(*listener.getsockname()[:2])
-    print(url, flush=True)
-    if not arguments.no_open:
-        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-    server.run(sockets=[listener])
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    """A socket that listens."""
-    try:
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        return socket.create_server((host, port), family=family, backlog=100)
-    except OSError as error:
-        place = f"cannot listen at {host}, port {port}"
-        raise OSError(
-            error.errno, f"{place}: {error.strerror}; name another --port (0 for any) or --host"
-        ) from error
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Keep other servers away from the folder of visits."""
-    folder.mkdir(parents=True, exist_ok=True)
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    except BlockingIOError as error:
-        raise RecordError(f"{folder} is in use by another `mjsim play`; choose another --out") from error
-    finally:
-        os.close(handle)
-
-
-def _check_public(url: str | None) -> None:
-    if url is None:
-        return
-    parts = urlsplit(url)
-    if parts.scheme not in ("http", "https") or not parts.netloc or parts.path not in ("", "/"):
-        raise ConfigError(f"public URL {url!r} must be of the form https://play.example.org")
-
-
-def _url(host: str, port: int) -> str:
-    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
-    return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
-
-
-def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
-    """Addresses and networks, joined by commas."""
-    try:
-        return tuple(ip_network(part.strip()) for part in text.split(","))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    app = PlayServer(config, pool).app(arguments.host, arguments.public_url)
+    serve(app, listener, arguments)
 
 
 def _minimum(text: str) -> dict[str, float]:
@@ -286,14 +193,3 @@ def _minimum(text: str) -> dict[str, float]:
     if unknown := [name for name in parts if name not in PHASES or name == TASK]:
         raise argparse.ArgumentTypeError(f"no phase {unknown[0]!r} before the task in {text!r}")
     return {name: seconds(value) for name, value in parts.items()}
-
-
-def _number(smallest: int, largest: int) -> Callable[[str], int]:
-    """Parser of a whole number in a range."""
-
-    def parse(text: str) -> int:
-        if not text.isdecimal() or not smallest <= int(text) <= largest:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a number from {smallest} to {largest}")
-        return int(text)
-
-    return parse

@@ -159,13 +159,20 @@ class PlayServer:
         return RedirectResponse(f"/play/{token}", 303)
 
     def _trials(self, after: str) -> Mapping[str, dict[str, Any]]:
-        """Settings of the trials; who has seen the best way through an episode gets the next one."""
-        before = self._visits.find(after)
+        """Settings of a visit's trials: the order seed of the settings or, for later visits, a following one.
+
+        Who has seen the best way through an episode gets the next one.
+        """
+        number, before = self._visits.number(), self._visits.find(after)
+        trials = {
+            name: {**trial, "order_seed": following(trial["order_seed"], number)}
+            for name, trial in self._config.trials.items()
+        }
         if before is None or before.phase != RESULT:
-            return self._config.trials
+            return trials
         return {
             name: {**trial, "house_seed": following(before.settings(name)["house_seed"])}
-            for name, trial in self._config.trials.items()
+            for name, trial in trials.items()
         }
 
     def _ended(self, reading: Ended | None) -> Ended:

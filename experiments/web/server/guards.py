@@ -59,8 +59,10 @@ class Guards:
     What a request that comes from one of the `proxies` says about its sender is believed as far as the proxy wrote it.
     """
 
-    def __init__(self, app: ASGIApp, public: str | None, proxies: Sequence[Network] = ()) -> None:
-        self._app, self._proxies = app, proxies
+    def __init__(
+        self, app: ASGIApp, public: str | None, proxies: Sequence[Network] = (), max_body: int = MAX_BODY
+    ) -> None:
+        self._app, self._proxies, self._max_body = app, proxies, max_body
         self._public = urlsplit(public or "")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -70,7 +72,7 @@ class Guards:
             return
         headers = Headers(scope=scope)
         origin = self._origin(headers.get("host", ""))
-        refusal = _refusal(scope, headers, origin)
+        refusal = _refusal(scope, headers, origin, self._max_body)
         if scope["type"] == "websocket" and refusal is not None:
             await receive()
             await send({"type": "websocket.close", "code": 1008})
@@ -155,7 +157,7 @@ async def _whole(receive: Receive) -> Receive | None:
     return receive_whole
 
 
-def _refusal(scope: Scope, headers: Mapping[str, str], origin: str) -> tuple[int, str] | None:
+def _refusal(scope: Scope, headers: Mapping[str, str], origin: str, max_body: int) -> tuple[int, str] | None:
     """Status and text where a request is refused."""
     if not origin:
         return 400, "Invalid host header"
@@ -163,8 +165,8 @@ def _refusal(scope: Scope, headers: Mapping[str, str], origin: str) -> tuple[int
     if changes and headers.get("origin") != origin:
         return 403, "This request does not come from a page of this server."
     length = headers.get("content-length", "0")
-    if "transfer-encoding" in headers or not length.isdecimal() or int(length) > MAX_BODY:
-        return 413, f"At most {MAX_BODY} bytes are accepted."
+    if "transfer-encoding" in headers or not length.isdecimal() or int(length) > max_body:
+        return 413, f"At most {max_body} bytes are accepted."
     return None
 
 

@@ -6,6 +6,7 @@ A link holds a token that cannot be guessed. Only its SHA-256 is kept, as the na
 import hashlib
 import re
 import secrets
+import shutil
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -134,33 +135,47 @@ class Visits:
         self._lock = threading.Lock()
         self._begun = sum(1 for _ in folder.glob(f"*/{VISIT}"))
 
+    def number(self) -> int:
+        """Numbers visits from 0, those of earlier servers included; each call is another visit."""
+        with self._lock:
+            number, self._begun = self._begun, self._begun + 1
+        return number
+
     def create(
-        self, phases: Sequence[str], trials: Mapping[str, dict[str, Any]], ended: Sequence[Ended] = ()
+        self,
+        phases: Sequence[str],
+        trials: Mapping[str, dict[str, Any]],
+        ended: Sequence[Ended] = (),
+        token: str | None = None,
     ) -> str:
         """Start a visit with the phases to come, settings of their trials, and phases that are over; its token.
 
-        The first visit has the order seed of the settings, each later one the next.
+        Where there is a visit with `token`, it stays as it is.
         """
-        token = secrets.token_urlsafe(32)
+        token = token or new_token()
         folder = self._folder / token_hash(token)
-        folder.mkdir(0o700)
-        with self._lock:
-            later, self._begun = self._begun, self._begun + 1
-        own = {
-            name: {**trial, "order_seed": following(trial["order_seed"], later)}
-            for name, trial in trials.items()
-        }
-        visit = Visit(folder, _Stored(phases[0], list(phases), own, list(ended)))
+        if self.named(folder.name) is not None:
+            return token
+        folder.mkdir(0o700, exist_ok=True)
+        visit = Visit(folder, _Stored(phases[0], list(phases), dict(trials), list(ended)))
         visit._save()
         sync_folder(self._folder)
         self._known[visit.name] = visit
         return token
 
+    def remove(self, name: str) -> None:
+        """Delete a visit with all that was played in it."""
+        with self._lock:
+            self._known.pop(name, None)
+        shutil.rmtree(self._folder / name, ignore_errors=True)
+        sync_folder(self._folder)
+
     def find(self, token: str) -> Visit | None:
         """The visit that a token belongs to; a RecordError where its file is damaged."""
-        if not TOKEN.fullmatch(token):
-            return None
-        name = token_hash(token)
+        return self.named(token_hash(token)) if TOKEN.fullmatch(token) else None
+
+    def named(self, name: str) -> Visit | None:
+        """The visit with a name; a RecordError where its file is damaged."""
         path = self._folder / name / VISIT
         with self._lock:
             if name not in self._known and path.is_file():
@@ -171,6 +186,11 @@ class Visits:
                 except msgspec.DecodeError as error:
                     raise RecordError(f"{path} is damaged: {error}") from error
             return self._known.get(name)
+
+
+def new_token() -> str:
+    """A token that cannot be guessed."""
+    return secrets.token_urlsafe(32)
 
 
 def following(seed: int, by: int = 1) -> int:

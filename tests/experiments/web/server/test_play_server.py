@@ -481,8 +481,8 @@ def test_who_answers_occupied_with_nothing_is_sent_away(client, monkeypatch):
         assert until(second, "error")[-1]["code"] == "idle"
 
 
-def test_visits_have_orders_of_their_own_and_folders_that_nobody_else_reads(tmp_path):
-    tokens = [Visits(tmp_path).create(["training", "task"], TRIALS) for _ in range(3)]
+def test_visits_have_orders_of_their_own_and_folders_that_nobody_else_reads(client, tmp_path):
+    tokens = [new_visit(client)[6:] for _ in range(3)]
     assert [Visits(tmp_path).find(token).settings("task")["order_seed"] for token in tokens] == [0, 1, 2]
     assert all((tmp_path / token_hash(token)).stat().st_mode & 0o077 == 0 for token in tokens)
 

@@ -1,0 +1,139 @@
+"""What the commands that serve pages share: where they listen, who may reach them, how they run."""
+
+import argparse
+import fcntl
+import logging
+import os
+import resource
+import socket
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from ipaddress import IPv4Network, IPv6Network, ip_network
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from experiments.errors import ConfigError, RecordError
+
+PORT = 8000
+MAX_FILES = 16384  # open files, sockets included
+
+
+def add_server_options(group: Any) -> None:
+    """Add the options of a server to a group of a parser."""
+    group.add_argument("--port", type=number(0, 65535), default=PORT, help="TCP port; 0 for any that is free")
+    group.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at")
+    group.add_argument(
+        "--public-url", metavar="URL", help="URL under which a proxy makes the server public (docs/play.md)"
+    )
+    group.add_argument(
+        "--trusted-proxy",
+        type=_networks,
+        default=(),
+        metavar="ADDRESS,..",
+        help="addresses or networks of proxies whose X-Forwarded-For tells who asks (docs/play.md)",
+    )
+    group.add_argument("--no-open", action="store_true", help="open no browser")
+
+
+def prepare_process() -> None:
+    """Let this process keep what it writes to itself, and open many sockets."""
+    os.umask(0o077)  # what people did is nobody else's business
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, MAX_FILES) if most > 0 else MAX_FILES, most))
+
+
+def serve(app: Any, listener: socket.socket, arguments: argparse.Namespace) -> None:
+    """Print the URL of an ASGI application, open it, and serve until a signal comes."""
+    import uvicorn  # imported here, so that other commands start fast
+
+    from experiments.web.protocol import MAX_TEXT
+    from experiments.web.server.connections import QuickConnection
+
+    logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
+    for name in ("mjsim.play", "mjsim.study"):
+        logging.getLogger(name).setLevel(logging.INFO)
+    server = uvicorn.Server(
+        uvicorn.Config(
+            app,
+            log_config=None,
+            access_log=False,  # paths hold tokens
+            log_level="warning",
+            server_header=False,
+            proxy_headers=False,  # the guards believe those that are named
+            http=QuickConnection,
+            ws="websockets-sansio",
+            ws_max_size=MAX_TEXT,
+            ws_ping_interval=5.0,
+            ws_ping_timeout=10.0,
+            ws_per_message_deflate=True,
+            timeout_graceful_shutdown=3,
+            limit_concurrency=4000,
+        )
+    )
+    url = arguments.public_url or _url(*listener.getsockname()[:2])
+    print(url, flush=True)
+    if not arguments.no_open:
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+    server.run(sockets=[listener])
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket that listens."""
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        return socket.create_server((host, port), family=family, backlog=100)
+    except OSError as error:
+        place = f"cannot listen at {host}, port {port}"
+        raise OSError(
+            error.errno, f"{place}: {error.strerror}; name another --port (0 for any) or --host"
+        ) from error
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep other servers away from a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError as error:
+        raise RecordError(f"{folder} is in use by another server; choose another --out") from error
+    finally:
+        os.close(handle)
+
+
+def check_public_url(url: str | None) -> None:
+    """Raise a ConfigError unless a URL is that of a whole site; None is none."""
+    if url is None:
+        return
+    parts = urlsplit(url)
+    if parts.scheme not in ("http", "https") or not parts.netloc or parts.path not in ("", "/"):
+        raise ConfigError(f"public URL {url!r} must be of the form https://play.example.org")
+
+
+def _url(host: str, port: int) -> str:
+    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
+
+
+def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
+    """Addresses and networks, joined by commas."""
+    try:
+        return tuple(ip_network(part.strip()) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def number(smallest: int, largest: int) -> Callable[[str], int]:
+    """Parser of a whole number in a range."""
+
+    def parse(text: str) -> int:
+        if not text.isdecimal() or not smallest <= int(text) <= largest:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number from {smallest} to {largest}")
+        return int(text)
+
+    return parse
