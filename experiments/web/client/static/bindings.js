@@ -100,16 +100,3 @@ export async function learnLayout() {
 /** @param {string} code */
 export const keyName = (code) =>
   KEY_NAMES[code] ?? layout.get(code)?.toUpperCase() ?? code.replace(/^(Key|Digit)/, "");
-
-/**
- * The sum of what is held on each axis.
- * @param {Axes[]} all
- */
-export function summed(all) {
-  /** @type {Axes} */
-  const sum = {};
-  for (const axes of all) {
-    for (const axis of /** @type {(keyof Axes)[]} */ (Object.keys(axes))) sum[axis] = (sum[axis] ?? 0) + (axes[axis] ?? 0);
-  }
-  return sum;
-}

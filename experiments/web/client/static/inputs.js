@@ -3,8 +3,6 @@
 /** @import { Input } from "./protocol.js" */
 /** @import { Axes } from "./bindings.js" */
 
-import { summed } from "./bindings.js";
-
 const PERIOD = 20; // ms between two inputs of mouse and wheel
 /** @type {(keyof Axes)[]} */
 const AXES = ["forward", "left", "turn", "look"];
@@ -12,41 +10,36 @@ const MAX_ANGLE = 7; // rad
 const MAX_SCROLL = 100; // rows
 
 export class Inputs {
-  #send;
+  #on;
   /** @type {Map<string, Axes>} */
-  #held = new Map(); // source -> axes
+  #held = new Map(); // source, as a key or a stick -> axes
   #yaw = 0;
   #pitch = 0;
   #rows = 0;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   #timer;
 
-  /** @param {(input: Omit<Input, "number">) => void} send */
-  constructor(send) {
-    this.#send = send;
+  /** @param {(input: Omit<Input, "number">) => void} on is called with every input */
+  constructor(on) {
+    this.#on = on;
   }
 
   /**
    * Sets what a source holds down from now on.
-   * @param {string} source
+   * @param {string} source a key, a stick or a button on the screen
    * @param {Axes} axes
    */
   hold(source, axes) {
     const before = JSON.stringify(this.#axes());
     this.#held.set(source, axes);
-    if (JSON.stringify(this.#axes()) !== before) this.#flush();
-  }
-
-  /** Sends what is held down, to a session that may still have the state of an earlier page. */
-  repeat() {
-    this.#flush();
+    if (JSON.stringify(this.#axes()) !== before) this.send();
   }
 
   /** Releases everything. */
   release() {
     const some = Object.keys(this.#axes()).length > 0;
     this.#held.clear();
-    if (some) this.#flush();
+    if (some) this.send();
   }
 
   /**
@@ -54,7 +47,7 @@ export class Inputs {
    * @param {NonNullable<Input["press"]>} press
    */
   press(press) {
-    this.#flush({ press });
+    this.send({ press });
   }
 
   /**
@@ -78,11 +71,11 @@ export class Inputs {
   }
 
   #soon() {
-    this.#timer ??= setTimeout(() => this.#flush(), PERIOD);
+    this.#timer ??= setTimeout(() => this.send(), PERIOD);
   }
 
-  /** @param {Pick<Input, "press">} more */
-  #flush(more = {}) {
+  /** Sends what is held down, and what was collected. @param {Pick<Input, "press">} more */
+  send(more = {}) {
     clearTimeout(this.#timer);
     this.#timer = undefined;
     /** @type {Omit<Input, "number">} */
@@ -91,14 +84,15 @@ export class Inputs {
     if (this.#pitch) input.pitch = limited(this.#pitch, MAX_ANGLE);
     if (this.#rows) input.scroll = limited(this.#rows, MAX_SCROLL);
     this.#yaw = this.#pitch = this.#rows = 0;
-    this.#send(input);
+    this.#on(input);
   }
 
   #axes() {
-    const sum = summed([...this.#held.values()]);
+    /** @type {Axes} */
+    const sum = {};
     for (const axis of AXES) {
-      if (sum[axis]) sum[axis] = limited(sum[axis], 1);
-      else delete sum[axis];
+      const all = [...this.#held.values()].reduce((total, axes) => total + (axes[axis] ?? 0), 0);
+      if (all) sum[axis] = limited(all, 1);
     }
     return sum;
   }

@@ -12,7 +12,7 @@ import { HeadsetPage } from "./headset.js";
 import { Help } from "./help.js";
 import { Hud } from "./hud.js";
 import { Inputs } from "./inputs.js";
-import { Keyboard } from "./keyboard.js";
+import { connectKeyboard } from "./keyboard.js";
 import { watchPage } from "./page_events.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
@@ -73,7 +73,6 @@ const commands = {
   confirm: () => /** @type {HTMLElement | null} */ (document.querySelector("dialog[open] .button"))?.click(),
 };
 const listens = () => session.phase === "running" && !panel.open && !help.open;
-const keyboard = new Keyboard(bindings, inputs, commands, listens);
 
 /** @param {Received} message */
 function take(message) {
@@ -171,7 +170,7 @@ function showState() {
       panel.show(dialogs.loading(session.interrupted));
       break;
     case "running":
-      inputs.repeat();
+      inputs.send(); // the session may have the state of an earlier page
       panel.hide();
       break;
     case "paused":
@@ -191,7 +190,7 @@ function showState() {
 }
 
 function lose() {
-  release();
+  inputs.release();
   session.lose();
   showState();
   panel.show(dialogs.OFFLINE);
@@ -232,24 +231,19 @@ function run() {
 /** @param {PauseReason} reason */
 function pause(reason) {
   if (session.phase !== "running") return;
-  release();
+  inputs.release();
   connection.send({ type: "pause", reason });
 }
 
 function askToEnd() {
-  release();
+  inputs.release();
   panel.show(dialogs.ending(trial, Math.ceil((endable - performance.now()) / 1000)));
 }
 
 function openHelp() {
-  release();
+  inputs.release();
   if (document.pointerLockElement) document.exitPointerLock();
   help.show();
-}
-
-function release() {
-  keyboard.release();
-  inputs.release();
 }
 
 byId("panel", HTMLDialogElement).addEventListener("keydown", (event) => {
@@ -270,11 +264,12 @@ full.addEventListener("click", () => {
   if (document.fullscreenElement) document.exitFullscreen();
   else document.documentElement.requestFullscreen();
 });
+connectKeyboard(bindings, inputs, commands, listens);
 const mouse = connectMouse(canvas, inputs, listens, () => hud.reach);
 connectTouch(canvas, byId("touch", HTMLElement), inputs, listens);
 connectGamepad(inputs, commands, listens);
 watchPage({
-  release,
+  release: () => inputs.release(),
   hidden: () => pause("hidden"),
   blur: (away) => connection.send({ type: "blur", away }),
   close: () => connection.close(),

@@ -2,7 +2,7 @@
 
 /** @import { Inputs } from "./inputs.js" */
 
-import { ACTIONS, summed } from "./bindings.js";
+import { ACTIONS } from "./bindings.js";
 
 const TURN_PER_PIXEL = 0.0025; // rad
 const TURN_PER_TOUCHED_PIXEL = 0.006; // rad
@@ -68,11 +68,6 @@ export function connectTouch(canvas, buttons, inputs, listens) {
     );
     last = event;
   });
-  /** @type {Set<string>} */
-  const held = new Set();
-  const hold = () => {
-    inputs.hold("touch", summed(ACTIONS.filter((action) => held.has(action.name)).map((action) => action.axes ?? {})));
-  };
   for (const button of buttons.querySelectorAll("button")) {
     const { hold: name, press, scroll } = button.dataset;
     if (!name) {
@@ -88,13 +83,10 @@ export function connectTouch(canvas, buttons, inputs, listens) {
       event.preventDefault();
       if (!listens()) return;
       button.setPointerCapture(event.pointerId);
-      held.add(name);
-      hold();
+      inputs.hold(name, ACTIONS.find((action) => action.name === name)?.axes ?? {});
     });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
-      button.addEventListener(end, () => {
-        if (held.delete(name)) hold();
-      });
+      button.addEventListener(end, () => inputs.hold(name, {}));
     }
   }
 }

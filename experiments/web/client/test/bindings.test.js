@@ -1,7 +1,7 @@
 // @vitest-environment happy-dom
 import { beforeEach, describe, expect, test } from "vitest";
 
-import { ACTIONS, Bindings, keyName, summed } from "../static/bindings.js";
+import { ACTIONS, Bindings, keyName } from "../static/bindings.js";
 
 beforeEach(() => localStorage.clear());
 
@@ -48,8 +48,4 @@ test.each(["{", "[]", '{"act":"KeyQ"}', '{"act":[1]}', "null"])("a damaged store
 
 test("keys have names", () => {
   expect(["KeyQ", "Digit4", "ArrowLeft", "Space"].map(keyName)).toEqual(["Q", "4", "←", "Space"]);
-});
-
-test("axes are summed", () => {
-  expect(summed([{ forward: 1 }, {}, { forward: -1, turn: 0.5 }])).toEqual({ forward: 0, turn: 0.5 });
 });

@@ -4,7 +4,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 import { Bindings } from "../static/bindings.js";
 import { connectGamepad } from "../static/gamepad.js";
 import { Inputs } from "../static/inputs.js";
-import { Keyboard } from "../static/keyboard.js";
+import { connectKeyboard } from "../static/keyboard.js";
 import { connectMouse, connectTouch } from "../static/pointer.js";
 import { showPage, watchListeners } from "./page.js";
 
@@ -37,9 +37,7 @@ beforeEach(() => {
 });
 
 describe("the keyboard", () => {
-  /** @type {Keyboard} */
-  let keyboard;
-  beforeEach(() => (keyboard = new Keyboard(new Bindings(), inputs, { pause }, listens)));
+  beforeEach(() => connectKeyboard(new Bindings(), inputs, { pause }, listens));
   const key = (/** @type {string} */ code, type = "keydown", more = {}) =>
     send(window, new KeyboardEvent(type, { code, cancelable: true, ...more }));
 
@@ -50,7 +48,7 @@ describe("the keyboard", () => {
     key("KeyA");
     key("KeyW", "keyup");
     key("ArrowUp", "keyup");
-    keyboard.release();
+    key("KeyA", "keyup");
     expect(sent).toEqual([{ forward: 1 }, { forward: 1, left: 1 }, { left: 1 }, {}]);
   });
 

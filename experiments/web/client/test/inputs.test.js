@@ -36,7 +36,7 @@ describe("what is held", () => {
 
   test("is repeated for a session that may have another state", () => {
     inputs.hold("touch", { look: -1 });
-    inputs.repeat();
+    inputs.send();
     expect(sent).toEqual([{ look: -1 }, { look: -1 }]);
   });
 });
