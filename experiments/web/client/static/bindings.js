@@ -2,7 +2,7 @@
 
 /** @import { Input } from "./protocol.js" */
 
-import { load, remove, save } from "./store.js";
+import { load, save } from "./store.js";
 
 /**
  * @typedef {Partial<Record<"forward" | "left" | "turn" | "look", number>>} Axes from -1 to 1
@@ -84,7 +84,7 @@ export class Bindings {
 
   reset() {
     for (const action of ACTIONS) this.#keys.set(action.name, action.keys);
-    remove(NAME);
+    save(NAME, null);
   }
 }
 

@@ -12,20 +12,11 @@ export function load(name) {
   }
 }
 
-/** @param {string} name @param {unknown} value */
+/** @param {string} name @param {unknown} value null to forget it */
 export function save(name, value) {
   try {
     localStorage.setItem(name, JSON.stringify(value));
   } catch {
     // Nothing is kept.
-  }
-}
-
-/** @param {string} name */
-export function remove(name) {
-  try {
-    localStorage.removeItem(name);
-  } catch {
-    // Nothing was kept.
   }
 }

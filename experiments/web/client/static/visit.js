@@ -1,11 +1,11 @@
 // The link of the visit that was started in this browser, kept in this browser only.
 
-import { load, remove, save } from "./store.js";
+import { load, save } from "./store.js";
 
 const NAME = "mjsim-visit";
 
 export const rememberVisit = () => save(NAME, location.pathname);
-export const forgetVisit = () => remove(NAME);
+export const forgetVisit = () => save(NAME, null);
 
 /** The link, or null. */
 export function lastVisit() {

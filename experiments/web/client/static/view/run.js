@@ -25,31 +25,31 @@ export class Run {
 
   /** The control step under way at a time, and the share of it that is over. @param {number} time s */
   at(time) {
-    const step = Math.max(0, before(this.recorded.time, time));
-    const [start, end] = [of(this.recorded.time, step), this.recorded.time[step + 1]];
-    return { step, share: end === undefined ? 0 : Math.min(1, Math.max(0, (time - start) / (end - start))) };
+    const times = this.recorded.time;
+    const step = Math.max(0, lastUpTo(time, times.length, (i) => times[i]));
+    const [start = 0, end = Infinity] = times.slice(step, step + 2);
+    return { step, share: Math.min(1, Math.max(0, (time - start) / (end - start))) };
   }
 
   /** Position, heading and pitch of the body. @param {number} step @param {number} share */
   body(step, share) {
     const [a, b] = this.#pair(this.recorded.body, BODY, step);
-    const turn = of(b, 2) - of(a, 2);
-    const between = a.map((value, i) => value + share * (of(b, i) - value));
-    between[2] = of(a, 2) + share * Math.atan2(Math.sin(turn), Math.cos(turn));
+    const [from = 0, to = 0] = [a[2], b[2]];
+    const between = blended(a, b, share);
+    between[2] = from + share * Math.atan2(Math.sin(to - from), Math.cos(to - from));
     return between;
   }
 
   /** Both hands in the frame of the body, m. @param {number} step @param {number} share */
   hands(step, share) {
-    const [a, b] = this.#pair(this.recorded.hands, HANDS, step);
-    const between = a.map((value, i) => value + share * (of(b, i) - value));
+    const between = blended(...this.#pair(this.recorded.hands, HANDS, step), share);
     return [between.slice(0, 3), between.slice(3)];
   }
 
   /** Where objects are: position, m, and quaternion wxyz. @param {number} step @param {number} share */
   *poses(step, share) {
     for (const [name, rows] of Object.entries(this.recorded.objects)) {
-      const row = lastRow(rows, step);
+      const row = POSE * Math.max(0, lastUpTo(step, rows.length / POSE, (i) => rows[POSE * i]));
       const pose = rows.slice(row + 1, row + POSE);
       const next = rows.slice(row + POSE, row + 2 * POSE);
       yield { name, pose: next[0] === step + 1 ? mixed(pose, next.slice(1), share) : pose };
@@ -85,34 +85,23 @@ export class Run {
   }
 }
 
-/** Index of the last value that is not above a limit. @param {number[]} values ascending @param {number} limit */
-function before(values, limit) {
-  let [low, high] = [0, values.length];
+/** Index of the last of `count` ascending values that is not above a limit, or -1. @param {number} limit @param {number} count @param {(index: number) => number | undefined} value */
+function lastUpTo(limit, count, value) {
+  let [low, high] = [0, count];
   while (low < high) {
     const middle = (low + high) >> 1;
-    if (of(values, middle) <= limit) low = middle + 1;
+    if ((value(middle) ?? Infinity) <= limit) low = middle + 1;
     else high = middle;
   }
   return low - 1;
 }
 
-/** Where the row that holds at a step begins. @param {number[]} rows @param {number} step */
-function lastRow(rows, step) {
-  let [low, high] = [0, rows.length / POSE];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (of(rows, POSE * middle) <= step) low = middle + 1;
-    else high = middle;
-  }
-  return POSE * Math.max(0, low - 1);
-}
-
 /** The value that holds at a step. @template T @param {[number, T][]} changes @param {number} step @returns {T} */
 function valueAt(changes, step) {
-  const found = changes[before(changes.map(([at]) => at), step)] ?? changes[0];
+  const found = changes[Math.max(0, lastUpTo(step, changes.length, (i) => changes[i]?.[0]))];
   if (!found) throw new Error("the run shows nothing");
   return found[1];
 }
 
-/** @param {number[]} values @param {number} index @returns {number} */
-const of = (values, index) => /** @type {number} */ (values[index]);
+/** @param {number[]} a @param {number[]} b @param {number} share of b */
+const blended = (a, b, share) => a.map((value, i) => value + share * ((b[i] ?? value) - value));
