@@ -105,40 +105,35 @@ export class Hud {
 
   /** @param {ChecklistItem} item */
   #row(item) {
-    const row = document.createElement("li");
-    const words = document.createElement("span");
-    words.append(made("b", item.text), made("small", item.carried ? "In your hand" : item.detail.replace("\n", " ")));
-    if (item.number !== null) row.append(made("i", `${item.number}`));
-    row.append(...this.#picture(item.picture), words, ...this.#picture(item.target_picture));
-    if (item.carried) row.className = "carried";
-    else if (item.done) {
-      row.className = "done";
-      words.prepend(hidden("Done: "));
-    }
+    const words = [made("b", item.text), made("small", item.carried ? "In your hand" : item.detail.replace("\n", " "))];
+    if (item.done && !item.carried) words.unshift(hidden("Done: "));
+    const row = this.#listed(item.picture, words);
+    if (item.number !== null) row.prepend(made("i", `${item.number}`));
+    row.append(...this.#picture(item.target_picture));
+    row.className = item.carried ? "carried" : item.done ? "done" : "";
     if (item.current) row.setAttribute("aria-current", "step");
     return row;
   }
 
   /** @param {BinEntry} bin */
   #bin(bin) {
-    const row = document.createElement("li");
-    const words = document.createElement("span");
-    words.append(made("b", bin.label), made("small", bin.place.replace("\n", " ")));
-    row.append(...this.#picture(bin.picture), words);
-    return row;
+    return this.#listed(bin.picture, [made("b", bin.label), made("small", bin.place.replace("\n", " "))]);
   }
 
   /** @param {(InventorySlot | null)[]} slots */
   #hands(slots) {
     const names = slots[0] ? ["Left hand", "Right hand"] : ["", "Hand"];
-    return slots.flatMap((slot, i) => {
-      if (!slot) return [];
-      const row = document.createElement("li");
-      const words = document.createElement("span");
-      words.append(made("small", names[i] ?? ""), made("b", slot.label ?? "empty"));
-      row.append(...this.#picture(slot.picture), words);
-      return [row];
-    });
+    return slots.flatMap((slot, i) =>
+      slot ? [this.#listed(slot.picture, [made("small", names[i] ?? ""), made("b", slot.label ?? "empty")])] : [],
+    );
+  }
+
+  /** A row of a list. @param {string | null} picture @param {HTMLElement[]} words */
+  #listed(picture, words) {
+    const [row, text] = [made("li", ""), made("span", "")];
+    text.append(...words);
+    row.append(...this.#picture(picture), text);
+    return row;
   }
 
   /** @param {string | null} key */

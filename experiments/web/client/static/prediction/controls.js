@@ -3,7 +3,7 @@
 /** @import { Input } from "../protocol.js" */
 /** @import { Move } from "./walking.js" */
 
-import { IDLE } from "./walking.js";
+import { IDLE, within } from "./walking.js";
 
 const MAX_PITCH = 1.2; // rad that the mouse can look up or down
 const MAX_TURN_AHEAD = 2.8; // rad that the mouse can be ahead of the body
@@ -72,6 +72,3 @@ function gap(angle, start) {
   const turns = angle - start + Math.PI;
   return turns - 2 * Math.PI * Math.floor(turns / (2 * Math.PI)) - Math.PI;
 }
-
-/** @param {number} value @param {number} limit */
-const within = (value, limit) => Math.min(limit, Math.max(-limit, value));

@@ -60,7 +60,7 @@ export class Predictor {
     this.#kept.delete(this.step - KEPT);
     this.#controls = this.#apply(this.#body, this.#controls, inputs);
     this.step++;
-    for (let i = 0; i < POSE; i++) this.#fading[i] = (this.#fading[i] ?? 0) * Math.exp(-this.#duration / FADING);
+    this.#fading = this.#fading.map((value) => value * Math.exp(-this.#duration / FADING));
   }
 
   /** The state with which the next control step begins. */
@@ -90,7 +90,7 @@ export class Predictor {
       kept.controls = this.#controls;
       this.#controls = this.#apply(this.#body, this.#controls, kept.inputs);
     }
-    if (step > this.step) this.#restart(step);
+    if (step > this.step) [this.step, this.#kept] = [step, new Map()]; // the server is ahead
     this.#fading.fill(0);
     const now = this.drawn(0);
     const error = Math.hypot((shown[X] ?? 0) - (now[X] ?? 0), (shown[Y] ?? 0) - (now[Y] ?? 0));
@@ -113,12 +113,6 @@ export class Predictor {
       drawn[i] = from + share * (to - from) + left * (this.#fading[i] ?? 0);
     }
     return drawn;
-  }
-
-  /** Continues at the server's control step, which is ahead. @param {number} step */
-  #restart(step) {
-    this.step = step;
-    this.#kept.clear();
   }
 
   /** @param {Float64Array} body @param {Controls} controls @param {readonly Input[]} inputs */

@@ -12,7 +12,6 @@ const TOUCHING = 1e-7; // m
 export class Trunk {
   #floor;
   #radius;
-  #gap = new Float64Array(3); // signed distance, and the unit vector away from what is near
   #start = 0; // entries of `near` for the cell looked up last
   #end = 0;
 
@@ -66,14 +65,13 @@ export class Trunk {
   /** @param {Float64Array} body */
   #pushOut(body) {
     const { boxes, near, first } = this.#floor;
-    const [radius, gap] = [this.#radius, this.#gap];
+    const radius = this.#radius;
     for (let round = 0; round < MAX_ROUNDS; round++) {
       let free = true;
       for (let entry = this.#start; entry < this.#end; entry++) {
         const polygon = at(near, entry);
         if (!meets(boxes, polygon, at(body, X), at(body, Y), radius, radius)) continue;
-        this.#gapTo(at(body, X), at(body, Y), at(first, polygon), at(first, polygon + 1));
-        const [distance, nx, ny] = [at(gap, 0), at(gap, 1), at(gap, 2)];
+        const [distance, nx, ny] = this.#gapTo(at(body, X), at(body, Y), at(first, polygon), at(first, polygon + 1));
         if (distance >= radius - TOUCHING) continue;
         free = false;
         body[X] = at(body, X) + nx * (radius - distance);
@@ -90,8 +88,9 @@ export class Trunk {
   }
 
   /**
-   * Writes the signed distance to a convex polygon, negative inside, and the unit vector away from it.
+   * The signed distance to a convex polygon, negative inside, and the unit vector away from it.
    * @param {number} x @param {number} y @param {number} from its first edge @param {number} to after its last
+   * @returns {[number, number, number]}
    */
   #gapTo(x, y, from, to) {
     const { edges } = this.#floor;
@@ -109,11 +108,7 @@ export class Trunk {
       if (distance < nearest) [nearest, nearX, nearY] = [distance, dx, dy];
     }
     nearest = Math.sqrt(nearest);
-    if (depth <= 0 || nearest < 1e-12) [nearest, nearX, nearY] = [depth, outX, outY];
-    else [nearX, nearY] = [nearX / nearest, nearY / nearest];
-    this.#gap[0] = nearest;
-    this.#gap[1] = nearX;
-    this.#gap[2] = nearY;
+    return depth <= 0 || nearest < 1e-12 ? [depth, outX, outY] : [nearest, nearX / nearest, nearY / nearest];
   }
 }
 

@@ -3,21 +3,7 @@
 
 /** @import { Floor } from "./trunk.js" */
 
-import {
-  FORWARD,
-  HEADING,
-  LEFT,
-  LOOK,
-  PITCH,
-  PITCH_RATE,
-  SERVO,
-  TURN,
-  TURN_RATE,
-  VX,
-  VY,
-  X,
-  Y,
-} from "./body.js";
+import { FORWARD, HEADING, LEFT, LOOK, PITCH, PITCH_RATE, SERVO, TURN, TURN_RATE, VX, VY, X, Y } from "./body.js";
 import { Trunk } from "./trunk.js";
 
 /** @typedef {{ max_speed: number, max_turn: number, max_look: number, acceleration: number, turn_acceleration: number, dt: number, substeps: number, mass: number, walk_gain: number, walk_force: number, inertia: number, turn_gain: number, turn_force: number, head_inertia: number, head_stiffness: number, head_damping: number, head_force: number, lowest: number, highest: number, radius: number }} Gait as in Python */
@@ -114,8 +100,8 @@ function driven(speed, push, damping, limit, [keep, damped, undamped]) {
   return keep * speed + damped * push;
 }
 
-/** @param {number} value @param {number} limit */
-const within = (value, limit) => Math.min(limit, Math.max(-limit, value));
+/** The nearest value in -limit to limit. @param {number} value @param {number} limit */
+export const within = (value, limit) => Math.min(limit, Math.max(-limit, value));
 
 /** @param {Float64Array} body @param {number} index @returns {number} */
 const of = (body, index) => /** @type {number} */ (body[index]);
