@@ -2,7 +2,7 @@
 
 /** @import { HeadsetPage } from "./headset.js" */
 /** @import { Thing } from "./drawing/things.js" */
-/** @import { Input, Markers, Moment, Scene, Snapshot } from "./protocol.js" */
+/** @import { Input, Moment, Scene, Snapshot } from "./protocol.js" */
 
 import { World3D } from "./drawing/world.js";
 import { X, Y, eyeOf } from "./prediction/body.js";
@@ -20,7 +20,7 @@ export class DrawnView {
   calm = false;
   /** @type {HeadsetPage | null} */
   headset = null;
-  #world;
+  world;
   #flush;
   /** @type {Scene | null} */
   #scene = null;
@@ -44,13 +44,9 @@ export class DrawnView {
    * @param {() => void} lost is called when nothing can be drawn any more
    */
   constructor(canvas, flush, lost) {
-    this.#world = new World3D(canvas);
-    this.#world.onLost = lost;
+    this.world = new World3D(canvas);
+    this.world.onLost = lost;
     this.#flush = flush;
-  }
-
-  get world() {
-    return this.#world;
   }
 
   /** Which way the person looks, rad. */
@@ -58,33 +54,19 @@ export class DrawnView {
     return this.#body[2] ?? 0;
   }
 
-  /** Whether there is something to see. */
-  get loaded() {
-    return this.#scene !== null;
-  }
-
-  /** What draws, in words. */
-  get renderer() {
-    return this.#world.info().renderer;
-  }
-
   /** Loads a house; a page that reconnects has it. @param {Scene} message */
   async load(message) {
     const { path } = message;
     if (path === null) throw new Error("the server has no files of it");
     if (this.#scene?.path !== path) {
-      const { objects } = await this.#world.load((name) => path + name);
-      this.#world.loadModels(Object.keys(objects)); // now, so that an object that comes into view is there
+      const { objects } = await this.world.load((name) => path + name);
+      this.world.loadModels(Object.keys(objects)); // now, so that an object that comes into view is there
     }
     const floor = message.floor === null ? null : await fetch(message.floor);
     if (floor && !floor.ok) throw new Error(`${message.floor}: ${floor.status}`);
     this.#walker = floor && new Walker(message.gait, await floor.json());
-    this.#world.setFieldOfView(message.field_of_view);
+    this.world.setFieldOfView(message.field_of_view);
     this.#scene = message;
-  }
-
-  resize() {
-    this.#world.resize();
   }
 
   /** The clock runs from now on. @param {number} now ms */
@@ -121,19 +103,14 @@ export class DrawnView {
     }
     for (const name of state.gone) delete this.#things[name];
     for (const [name, model] of Object.entries(state.models)) this.#things[name] = { model, pose: state.objects[name] ?? [] };
-    if (state.gone.length || Object.keys(state.models).length) this.#world.setObjects(this.#things);
+    if (state.gone.length || Object.keys(state.models).length) this.world.setObjects(this.#things);
     this.#poses.take(state, now / 1000, this.#body);
-  }
-
-  /** @param {Markers} message */
-  show({ markers }) {
-    this.#world.setMarkers(markers);
   }
 
   /** @param {Moment["reach"]} reach */
   outline(reach) {
     this.#reach = reach;
-    this.#world.setOutline(reach?.instance ?? null);
+    this.world.setOutline(reach?.instance ?? null);
   }
 
   /** Takes the control steps that are due, but for those that the server would refuse. @param {number} now ms */
@@ -163,20 +140,20 @@ export class DrawnView {
     const [x = 0, y = 0, heading = 0] = this.#body;
     for (const name of this.#poses.names()) {
       const pose = this.#poses.at(name, now / 1000, this.#body);
-      if (pose) this.#world.setPose(name, pose);
+      if (pose) this.world.setPose(name, pose);
     }
-    this.#world.setPerson({ x, y, heading, hands: state.hands });
+    this.world.setPerson({ x, y, heading, hands: state.hands });
     const eye = eyeOf(this.#body, scene.gait);
     if (this.calm) eye.heading = SNAP * Math.round(heading / SNAP);
-    if (!this.headset?.place(eye.position)) this.#world.setEye(eye);
-    this.#world.draw();
+    if (!this.headset?.place(eye.position)) this.world.setEye(eye);
+    this.world.draw();
     return { body: this.#body, moving, reach: this.#reachAt() };
   }
 
   /** @returns {[number, number] | null} */
   #reachAt() {
     const place = this.#reach?.place;
-    const at = place && this.#world.project(place);
+    const at = place && this.world.project(place);
     return at?.inView ? [at.x, at.y] : null;
   }
 

@@ -28,18 +28,17 @@ export class HeadsetPage {
    * Shows a button where there is a headset.
    * @param {HTMLElement} button
    * @param {() => number} heading of the person, rad
-   * @param {(now: number) => void} frame is called for every picture
    */
-  async offer(button, heading, frame) {
+  async offer(button, heading) {
     button.hidden = !(await hasHeadset());
-    button.addEventListener("click", () => this.#enter(heading(), frame));
+    button.addEventListener("click", () => this.#enter(heading()));
   }
 
-  /** @param {number} heading @param {(now: number) => void} frame */
-  async #enter(heading, frame) {
+  /** @param {number} heading */
+  async #enter(heading) {
     const headset = new Headset(this.#world, this.#panel);
     [this.#heading, this.#pitch] = [heading, 0];
-    await headset.enter(heading, () => frame(performance.now()), () => {
+    await headset.enter(heading, () => {
       this.#headset = null;
       this.#inputs?.hold("headset", {});
     });

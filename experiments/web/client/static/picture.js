@@ -45,7 +45,7 @@ export class Picture {
       },
       () => {
         this.#codec = "jpeg";
-        this.#sendView();
+        this.tellSize();
       },
     );
   }
@@ -57,7 +57,7 @@ export class Picture {
     try {
       this.#show(true);
       this.drawn = new DrawnView(byId("world", HTMLCanvasElement), this.#events.flush, () => this.fallBack("context lost"));
-      this.drawn.resize();
+      this.drawn.world.resize();
       return null;
     } catch (error) {
       this.#show(false);
@@ -74,7 +74,7 @@ export class Picture {
 
   /** What draws, in words; empty before there is anything to see. */
   get renderer() {
-    return this.drawn ? this.drawn.renderer : this.#frame;
+    return this.drawn ? this.drawn.world.info().renderer : this.#frame;
   }
 
   /** @param {Received} message */
@@ -95,10 +95,13 @@ export class Picture {
         this.#events.shown(message.step);
         break;
       case "markers":
-        drawn?.show(message);
+        drawn?.world.setMarkers(message.markers);
         break;
       case "moment":
         drawn?.outline(message.reach);
+        break;
+      case "closed":
+        this.#screen.reset();
     }
   }
 
@@ -136,27 +139,13 @@ export class Picture {
     this.drawn = null;
     this.#show(false);
     this.#events.send({ type: "draw", draw: "server", reason });
-    this.#sendView();
+    this.tellSize();
   }
 
-  /** Forgets frames of an earlier connection. */
-  reset() {
-    this.#screen.reset();
-  }
-
-  /** The window has another size. */
-  resize() {
-    this.drawn?.resize();
-  }
-
-  #sendView() {
-    this.reset();
-    this.#events.send(this.view);
-  }
-
-  /** The server has to know the size. */
+  /** Tells the server in which size it draws, and whether it does. */
   tellSize() {
-    this.#sendView();
+    this.#screen.reset();
+    this.#events.send(this.view);
   }
 
   /** @param {boolean} drawn whether this browser draws */

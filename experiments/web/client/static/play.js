@@ -80,6 +80,7 @@ function take(message) {
     silent = false;
     connection.send({ type: "pause", reason: "silent" }); // the state that follows lets the clock run again
   }
+  picture.take(message);
   switch (message.type) {
     case "state":
       session.take(message);
@@ -95,17 +96,10 @@ function take(message) {
       break;
     case "moment":
       hud.expect(message);
-      picture.take(message);
       break;
     case "snapshot":
       if (message.busy) showBusy(BUSY);
       else if (message.input >= pressed) showBusy("");
-      picture.take(message);
-      break;
-    case "frame":
-    case "markers":
-    case "scene":
-      picture.take(message);
       break;
     case "beat":
       if (session.phase === "running") connection.send({ type: "beat" }); // not by a timer: those of hidden pages are slow
@@ -132,7 +126,6 @@ function take(message) {
       else console.warn(`the server refused a message (${message.code}): ${message.message}`);
       break;
     case "closed":
-      picture.reset();
       silent = false;
       if (!message.final) lose();
       else if (message.code === TOO_MUCH) panel.show(dialogs.CLOSED);
@@ -145,12 +138,6 @@ function showBusy(text) {
   mark.hidden = !text;
   mark.textContent = text;
   mark.classList.toggle("asked", text !== BUSY);
-}
-
-/** @param {number} now ms */
-function drawFrame(now) {
-  requestAnimationFrame(drawFrame); // of which there are none while a headset is worn
-  drawPicture(now);
 }
 
 /** @param {number} now ms */
@@ -273,7 +260,7 @@ watchPage({
   hidden: () => pause("hidden"),
   blur: (away) => connection.send({ type: "blur", away }),
   close: () => connection.close(),
-  resize: () => picture.resize(),
+  resize: () => picture.drawn?.world.resize(),
   resized: () => picture.tellSize(),
 });
 setInterval(watchLink, 1000 * BEAT_PERIOD);
@@ -285,9 +272,10 @@ panel.show(dialogs.loading(false));
 learnLayout();
 const lack = await picture.prepare();
 const { drawn: view } = picture;
+view?.world.onFrame(drawPicture);
 if (view && "headset" in page.dataset) {
   view.headset = new HeadsetPage(view.world, inputs);
-  view.headset.offer(byId("headset-button", HTMLElement), () => view.heading, drawPicture);
+  view.headset.offer(byId("headset-button", HTMLElement), () => view.heading);
 }
 new Settings(byId("settings", HTMLFormElement), ({ sensitivity, inverted, sounds: audible, calm, text }) => {
   Object.assign(mouse, { sensitivity, inverted });
@@ -297,4 +285,3 @@ new Settings(byId("settings", HTMLFormElement), ({ sensitivity, inverted, sounds
   document.documentElement.style.fontSize = `${100 * text}%`;
 });
 if (!lack || draw !== "browser") connection.open();
-requestAnimationFrame(drawFrame);

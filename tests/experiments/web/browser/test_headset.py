@@ -28,7 +28,8 @@ START = """async ([position, heading]) => {
   const headset = new Headset(world, panel);
   const found = await hasHeadset();
   Object.assign(window, { device, headset, frames: 0, over: false });
-  await headset.enter(heading, () => { headset.place(position); world.draw(); frames++; }, () => { over = true; });
+  world.onFrame(() => { headset.place(position); world.draw(); frames++; });
+  await headset.enter(heading, () => { over = true; });
   return found;
 }"""
 PATIENCE = 60_000  # ms

@@ -193,13 +193,13 @@ export class World3D {
     return { calls, triangles, textures, milliseconds: this.#milliseconds, renderer };
   }
 
+  /** Calls a function for every picture, of the page or of the headset that is worn. @param {(now: number) => void} frame takes ms */
+  onFrame(frame) {
+    this.#renderer.setAnimationLoop((now, xr) => frame(xr ? performance.now() : now));
+  }
+
   /** What a headset draws with. */
   get stage() {
     return { renderer: this.#renderer, scene: this.#scene, camera: this.#camera };
-  }
-
-  /** Frees what the graphics card holds. */
-  close() {
-    this.#renderer.dispose();
   }
 }

@@ -45,10 +45,9 @@ export class Headset {
   /**
    * Opens the headset; call it from a click.
    * @param {number} heading of the person, rad
-   * @param {() => void} frame is called for every picture, and calls `World3D.draw`
    * @param {() => void} ended
    */
-  async enter(heading, frame, ended) {
+  async enter(heading, ended) {
     if (!navigator.xr) throw new Error("this browser has no WebXR");
     const { renderer, scene, camera } = this.#world.stage;
     const session = await navigator.xr.requestSession("immersive-vr");
@@ -57,7 +56,6 @@ export class Headset {
       this.#session = null;
       this.#rig.removeFromParent();
       camera.removeFromParent();
-      renderer.setAnimationLoop(null);
       renderer.xr.enabled = false;
       this.#world.resize();
       ended();
@@ -69,7 +67,6 @@ export class Headset {
     renderer.xr.enabled = true;
     renderer.xr.setReferenceSpaceType("local");
     await renderer.xr.setSession(session);
-    renderer.setAnimationLoop(frame);
   }
 
   /** Puts the person's eye somewhere. @param {Point} eye */

@@ -44,12 +44,6 @@ async function unpacked(id) {
 }
 
 /** @param {number} now ms */
-function frame(now) {
-  requestAnimationFrame(frame); // of which there are none while a headset is worn
-  show(now);
-}
-
-/** @param {number} now ms */
 function show(now) {
   if (playing) {
     time = Math.min(run.duration, time + (Number(speed.value) * (now - last)) / 1000);
@@ -168,5 +162,5 @@ world.setFieldOfView(recorded.person.field_of_view);
 byId("debug", HTMLElement).textContent = "";
 setCamera("person");
 world.resize();
-headset.offer(byId("headset-button", HTMLElement), () => run.body(run.at(time).step, 0)[2] ?? 0, show);
-requestAnimationFrame(frame);
+headset.offer(byId("headset-button", HTMLElement), () => run.body(run.at(time).step, 0)[2] ?? 0);
+world.onFrame(show);
