@@ -1,18 +1,8 @@
 // World-locked markers, as mjsim draws them: mostly emitted colour, dark outlines of spheres, and x-ray ones that show
 // faintly where something hides them.
 
-import {
-  BoxGeometry,
-  CylinderGeometry,
-  GreaterDepth,
-  Group,
-  Matrix4,
-  NotEqualStencilFunc,
-  Quaternion,
-  ReplaceStencilOp,
-  SphereGeometry,
-  Vector3,
-} from "../vendor/three.js";
+import { BoxGeometry, CylinderGeometry, Group, Matrix4, Quaternion, SphereGeometry, Vector3 } from "../vendor/three.js";
+import { GreaterDepth, NotEqualStencilFunc, ReplaceStencilOp } from "../vendor/three.js";
 import { houseMaterial } from "./house_material.js";
 import { Instances } from "./instances.js";
 

@@ -1,17 +1,7 @@
 // A line around the object that the action key would take: yellow within dark, so that it shows on any ground.
 
-import {
-  AlwaysStencilFunc,
-  Group,
-  InstancedBufferGeometry,
-  KeepStencilOp,
-  Mesh,
-  NotEqualStencilFunc,
-  ReplaceStencilOp,
-  ShaderMaterial,
-  Vector2,
-  Vector3,
-} from "../vendor/three.js";
+import { Group, InstancedBufferGeometry, Mesh, ShaderMaterial, Vector2, Vector3 } from "../vendor/three.js";
+import { AlwaysStencilFunc, KeepStencilOp, NotEqualStencilFunc, ReplaceStencilOp } from "../vendor/three.js";
 
 /** @import { BufferGeometry, Object3D } from "../vendor/three.js" */
 

@@ -21,9 +21,6 @@ import { Things } from "./things.js";
  *   last frame: draw calls, triangles, textures in use, time of the main thread; and what draws
  */
 
-/** There is no WebGL 2: the page has to show streamed frames. */
-export class NoWebGL extends Error {}
-
 export class World3D {
   /** Is called when the context is lost: nothing can be drawn any more. */
   onLost = () => {};
@@ -45,11 +42,11 @@ export class World3D {
   /** @type {Markers | null} */
   #markers = null;
 
-  /** @param {HTMLCanvasElement} canvas one that has no other context @throws {NoWebGL} */
+  /** @param {HTMLCanvasElement} canvas one that has no other context @throws {Error} where there is no WebGL 2: the page has to show streamed frames */
   constructor(canvas) {
     const options = { alpha: false, antialias: true, stencil: true };
     const context = canvas.getContext("webgl2", { ...options, powerPreference: "high-performance" });
-    if (!context) throw new NoWebGL("this browser has no WebGL 2");
+    if (!context) throw new Error("this browser has no WebGL 2");
     this.#canvas = canvas;
     this.#renderer = new WebGLRenderer({ ...options, canvas, context });
     this.#renderer.outputColorSpace = LinearSRGBColorSpace; // shaders give colours as the display takes them

@@ -56,16 +56,9 @@ function taken(before, inputs, heading, pitch) {
   return { held: inputs.at(-1) ?? before.held, heading: toHeading, pitch: toPitch };
 }
 
-/** @param {readonly Input[]} inputs @param {"forward" | "left" | "turn" | "look"} name */
-function fastest(inputs, name) {
-  let found = 0;
-  let size = -1;
-  for (const input of inputs) {
-    const value = input[name] ?? 0;
-    if (Math.abs(value) > size) [found, size] = [value, Math.abs(value)];
-  }
-  return found;
-}
+/** The value that is furthest from 0. @param {readonly Input[]} inputs @param {"forward" | "left" | "turn" | "look"} name */
+const fastest = (inputs, name) =>
+  inputs.map((input) => input[name] ?? 0).reduce((most, value) => (Math.abs(value) > Math.abs(most) ? value : most), 0);
 
 /** The shorter turn from one heading to another, rad. @param {number} angle @param {number} start */
 function gap(angle, start) {

@@ -73,9 +73,7 @@ export class Run {
 
   /** Floor points that were walked up to a step, flat, m. @param {number} step */
   walked(step) {
-    const points = [];
-    for (let k = 0; k <= step; k++) points.push(...this.recorded.body.slice(BODY * k, BODY * k + 2));
-    return points;
+    return this.recorded.body.slice(0, BODY * (step + 1)).filter((_, i) => i % BODY < 2);
   }
 
   /** @param {number[]} values @param {number} size @param {number} step @returns {[number[], number[]]} */
