@@ -6,6 +6,7 @@ ExperimentError
 ├── RecordError     a run directory is missing, incomplete or in the way
 ├── UserCodeError   a user-supplied participant, condition or planner raised, or returned something unusable
 ├── StatisticsError the data do not allow a statistical test
+├── StoreError      the database of a study cannot be used, or what is asked contradicts what it holds
 └── ReplayError     a recorded run cannot be replayed, or differs from its record
 """
 
@@ -34,6 +35,10 @@ class UserCodeError(ExperimentError):
 
 class StatisticsError(ExperimentError):
     """The data do not allow a statistical test; the message says why."""
+
+
+class StoreError(ExperimentError):
+    """The database of a study cannot be used, or what is asked contradicts what it holds; says what to do."""
 
 
 class ReplayError(ExperimentError):

@@ -1,0 +1,154 @@
+"""The connection to the database: short transactions, repeated where that is safe, and errors with a remedy."""
+
+import asyncio
+import random
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+from sqlalchemy import URL, Connection, event, make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, SQLAlchemyError
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
+
+from experiments.errors import StoreError
+from experiments.people.store.failures import advice, passes
+
+T = TypeVar("T")
+
+DRIVERS = {
+    "sqlite": "sqlite+aiosqlite",
+    "mysql": "mysql+aiomysql",
+    "mariadb": "mysql+aiomysql",
+    "postgresql": "postgresql+psycopg",
+}
+PRAGMAS = (
+    "PRAGMA journal_mode = WAL",
+    "PRAGMA synchronous = FULL",  # a commit is on the disk before it returns
+    "PRAGMA foreign_keys = ON",
+    "PRAGMA secure_delete = ON",  # what is deleted is overwritten
+)
+PATIENCE_S = 20  # for locks and for connections
+TRIES = 8
+PAUSE_S = 0.02  # before the second try; doubles with each try
+
+
+class Database:
+    """One database: SQLite, MariaDB or PostgreSQL."""
+
+    def __init__(self, url: str) -> None:
+        """Nothing is connected yet. Raises StoreError for a URL that names no database that is known."""
+        self.url = _parsed(url)
+        self._engine = _engine(self.url)
+        self._sqlite = self.kind == "sqlite"
+        # Writers of SQLite that wait for its lock sleep, and whoever wakes first goes on; here they queue.
+        self._turn = asyncio.Lock()
+
+    @property
+    def kind(self) -> str:
+        """`sqlite`, `mysql` (MariaDB as well) or `postgresql`."""
+        return self.url.get_backend_name()
+
+    @property
+    def name(self) -> str:
+        """The URL without its password."""
+        return self.url.render_as_string(hide_password=True)
+
+    async def close(self) -> None:
+        """Close all connections."""
+        await self._engine.dispose()
+
+    @asynccontextmanager
+    async def reading(self) -> AsyncIterator[AsyncConnection]:
+        """A connection to read from; what is read is of one moment in SQLite and PostgreSQL."""
+        try:
+            async with self._engine.connect() as connection:
+                yield connection
+        except SQLAlchemyError as error:
+            raise StoreError(advice(error, self.name)) from error
+
+    async def write(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
+        """Do work in one transaction; its result, once it is committed.
+
+        The work is done again after a deadlock, a conflict or a lost connection, so it must do nothing but use the
+        connection. A connection that is lost while committing is an error: whether it is saved is not known.
+
+        Raises StoreError where the database cannot do it.
+        """
+        for attempt in range(1, TRIES + 1):
+            try:
+                return await self._transaction(work)
+            except SQLAlchemyError as error:
+                if attempt == TRIES or not _again(error, attempt):
+                    raise StoreError(advice(error, self.name)) from error
+            await asyncio.sleep(PAUSE_S * 2**attempt * random.random())
+        raise AssertionError
+
+    async def _transaction(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
+        async with self._alone(), self._engine.connect() as connection:
+            await connection.execution_options(writes=True)
+            result = await work(connection)
+            try:
+                await connection.commit()
+            except DBAPIError as error:
+                raise StoreError(
+                    f"{advice(error, self.name)} Whether the last change was saved is unknown."
+                ) from error
+            return result
+
+    @asynccontextmanager
+    async def _alone(self) -> AsyncIterator[None]:
+        if not self._sqlite:
+            yield
+            return
+        async with self._turn:
+            yield
+
+
+def _parsed(url: str) -> URL:
+    try:
+        parsed = make_url(url)
+        return parsed.set(drivername=DRIVERS[parsed.get_backend_name()])
+    except (ArgumentError, KeyError, NoSuchModuleError) as error:
+        raise StoreError(
+            f"{url.partition('://')[0]!r} begins no database URL that is known. Use sqlite:///FILE, "
+            "mysql://USER:PASSWORD@HOST/NAME or postgresql://USER:PASSWORD@HOST/NAME."
+        ) from error
+
+
+def _engine(url: URL) -> AsyncEngine:
+    if url.get_backend_name() == "sqlite":
+        if not url.database or url.database == ":memory:":
+            raise StoreError("A study's database must be kept: name a file, as in sqlite:///study.db.")
+        engine = create_async_engine(url, connect_args={"timeout": PATIENCE_S})
+        event.listen(engine.sync_engine, "connect", _prepare)
+        event.listen(engine.sync_engine, "begin", _begin)
+        return engine
+    # Every statement sees what is committed; rows that must not change meanwhile are locked by name.
+    return create_async_engine(
+        url, isolation_level="READ COMMITTED", pool_pre_ping=True, pool_timeout=PATIENCE_S, pool_size=10
+    )
+
+
+def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
+    connection.isolation_level = None  # the driver begins no transactions by itself
+    cursor = connection.cursor()
+    for pragma in PRAGMAS:
+        cursor.execute(pragma)
+    cursor.close()
+
+
+def _begin(connection: Connection) -> None:
+    """A transaction that will write takes the lock at once: one that reads first might have to give up later."""
+    writes = connection.get_execution_options().get("writes", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _again(error: SQLAlchemyError, attempt: int) -> bool:
+    """Whether the same work may succeed now; after a conflict of two writers it does at the second try."""
+    return passes(error) or (isinstance(error, IntegrityError) and attempt == 1)
+
+
+def sqlite_file(url: URL) -> Path | None:
+    """The file of a SQLite database, None for others."""
+    return Path(url.database) if url.get_backend_name() == "sqlite" and url.database else None

@@ -1,0 +1,27 @@
+"""What every part of the store has: the database and the study."""
+
+from typing import Any
+
+from sqlalchemy import CursorResult, select
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.people.store import tables
+from experiments.people.store.engine import Database
+
+
+class Part:
+    """Rows of one study in a database."""
+
+    def __init__(self, database: Database, study_id: int) -> None:
+        self._database, self._study_id = database, study_id
+
+
+def new_id(inserted: CursorResult[Any]) -> int:
+    """The id of a row that was inserted."""
+    key = inserted.inserted_primary_key
+    return int(key[0]) if key else 0
+
+
+async def lock_study(connection: AsyncConnection, study_id: int) -> None:
+    """Let others who lock the study wait until this transaction ends; SQLite has locked the whole database."""
+    await connection.execute(select(tables.study.c.id).where(tables.study.c.id == study_id).with_for_update())

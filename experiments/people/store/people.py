@@ -1,0 +1,124 @@
+"""Who takes part: arrivals, signs of life, and who somebody is on their platform."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import ColumnElement, insert, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.people.store.part import Part, new_id
+from experiments.people.store.tables import identity as ids
+from experiments.people.store.tables import person
+from experiments.people.store.values import Person, Status, utc_now
+
+_FIELDS = (
+    person.c.id,
+    person.c.token_hash,
+    person.c.platform,
+    person.c.status,
+    person.c.phase,
+    person.c.created,
+    person.c.seen,
+    person.c.delete_wanted,
+)
+
+
+class People(Part):
+    """Rows of `person` and `identity`."""
+
+    async def arrive(
+        self,
+        platform: str,
+        key: str | None,
+        identity: Mapping[str, str],
+        token_hash: str,
+        phase: str,
+        now: datetime | None = None,
+    ) -> Person:
+        """The person who comes with a link: a new one, or the one who came before.
+
+        A person who comes back keeps the token hash of the first arrival, so make the token from what makes the key.
+
+        Args:
+            platform: Where the person comes from, such as `prolific`; at most 20 characters.
+            key: HMAC-SHA-256 of the platform's id with the study's secret, hexadecimal; None for links without an id.
+            identity: The platform's own ids. They are kept apart, and never exported.
+            token_hash: SHA-256 of the link's token, hexadecimal.
+            phase: The first phase of the study.
+            now: The time, with its zone.
+        """
+        now = now or utc_now()
+        same = person.c.token_hash == token_hash if key is None else person.c.platform_key == key
+
+        async def work(connection: AsyncConnection) -> Person:
+            known = (await connection.execute(self._select(same))).first()
+            if known is not None:
+                return replace(_person(known), returning=True)
+            made = await connection.execute(
+                insert(person).values(
+                    study_id=self._study_id,
+                    token_hash=token_hash,
+                    platform=platform,
+                    platform_key=key,
+                    status="arrived",
+                    phase=phase,
+                    created=now,
+                    seen=now,
+                    delete_wanted=False,
+                )
+            )
+            number = new_id(made)
+            await connection.execute(insert(ids).values(person_id=number, ids=dict(identity)))
+            return Person(number, token_hash, platform, "arrived", phase, now, now, False)
+
+        return await self._database.write(work)
+
+    async def find(self, token_hash: str) -> Person | None:
+        """The person whom a link belongs to."""
+        return await self._one(person.c.token_hash == token_hash)
+
+    async def person(self, person_id: int) -> Person:
+        """A person by number; a StoreError if there is none."""
+        found = await self._one(person.c.id == person_id)
+        if found is None:
+            raise StoreError(
+                f"There is no person {person_id} in this study; `mjsim study` shows the numbers."
+            )
+        return found
+
+    async def people(self, status: Status | None = None) -> tuple[Person, ...]:
+        """Everybody, or those of one status, in order of arrival."""
+        query = self._select() if status is None else self._select(person.c.status == status)
+        async with self._database.reading() as connection:
+            return tuple(_person(row) for row in await connection.execute(query.order_by(person.c.id)))
+
+    async def identity(self, person_id: int) -> dict[str, str]:
+        """The platform's own ids of a person, for paying alone; empty if they are erased."""
+        query = select(ids.c.ids).where(ids.c.person_id == person_id)
+        async with self._database.reading() as connection:
+            return dict((await connection.execute(query)).scalar() or {})
+
+    async def beat(self, person_id: int, now: datetime | None = None) -> None:
+        """Note a sign of life, which keeps the person's place."""
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            late = person.c.seen < now
+            await connection.execute(update(person).where(person.c.id == person_id, late).values(seen=now))
+
+        await self._database.write(work)
+
+    async def _one(self, which: ColumnElement[bool]) -> Person | None:
+        async with self._database.reading() as connection:
+            row = (await connection.execute(self._select(which))).first()
+            return None if row is None else _person(row)
+
+    def _select(self, *which: ColumnElement[bool]) -> Any:
+        return select(*_FIELDS).where(person.c.study_id == self._study_id, *which)
+
+
+def _person(row: Any) -> Person:
+    return Person(*row)

@@ -1,0 +1,114 @@
+"""The store of a study: who takes part, how far they are, what they answered, what they are paid."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any, Self
+
+from sqlalchemy import insert, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.people.store.endings import Endings
+from experiments.people.store.engine import Database
+from experiments.people.store.part import new_id
+from experiments.people.store.people import People
+from experiments.people.store.phases import Phases
+from experiments.people.store.tables import audit, study
+from experiments.people.store.upgrade import upgrade
+from experiments.people.store.values import AuditRow, StudyRow, StudyState, utc_now
+
+
+class Store(People, Endings, Phases):
+    """The database of one study. What a method has returned from is on the disk.
+
+    Every method raises :class:`~experiments.errors.StoreError` where the database cannot do it.
+    """
+
+    @classmethod
+    async def open(cls, url: str, study_name: str, file_hash: str) -> Self:
+        """Open a database, make or upgrade its tables, and find or add the study.
+
+        Args:
+            url: `sqlite:///FILE`, `mysql://USER:PASSWORD@HOST/NAME` or `postgresql://USER:PASSWORD@HOST/NAME`.
+            study_name: Name of the study; one database may hold several.
+            file_hash: SHA-256 of the study file, hexadecimal. Another one than before is noted in the audit log.
+        """
+        database = Database(url)
+        try:
+            await upgrade(database)
+            return cls(database, await _study_id(database, study_name, file_hash))
+        except BaseException:
+            await database.close()
+            raise
+
+    async def close(self) -> None:
+        """Close all connections."""
+        await self._database.close()
+
+    async def study(self) -> StudyRow:
+        """The study, with its state."""
+        async with self._database.reading() as connection:
+            row = (await connection.execute(select(study).where(study.c.id == self._study_id))).one()
+        quotas = {int(cell): wanted for cell, wanted in row.quotas.items()}
+        return StudyRow(row.id, row.name, row.file_hash, row.state, row.created, quotas)
+
+    async def set_state(self, state: StudyState, who: str, now: datetime | None = None) -> None:
+        """Open, pause or close the study, and note who did."""
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            await connection.execute(update(study).where(study.c.id == self._study_id).values(state=state))
+            await _note(connection, self._study_id, who, f"study {state}", {}, now)
+
+        await self._database.write(work)
+
+    async def audit(
+        self, who: str, action: str, details: Mapping[str, Any] | None = None, now: datetime | None = None
+    ) -> None:
+        """Note who did what. People are named by their number; never note a platform's id."""
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            await _note(connection, self._study_id, who, action, details or {}, now)
+
+        await self._database.write(work)
+
+    async def audit_log(self) -> tuple[AuditRow, ...]:
+        """Who did what, in order."""
+        columns = (audit.c.id, audit.c.at, audit.c.who, audit.c.action, audit.c.details)
+        query = select(*columns).where(audit.c.study_id == self._study_id).order_by(audit.c.id)
+        async with self._database.reading() as connection:
+            return tuple(AuditRow(*row) for row in await connection.execute(query))
+
+
+async def _study_id(database: Database, name: str, file_hash: str) -> int:
+    now = utc_now()
+
+    async def work(connection: AsyncConnection) -> int:
+        columns = (study.c.id, study.c.file_hash)
+        row = (
+            await connection.execute(select(*columns).where(study.c.name == name).with_for_update())
+        ).first()
+        if row is None:
+            made = await connection.execute(
+                insert(study).values(name=name, file_hash=file_hash, state="open", created=now, quotas={})
+            )
+            return new_id(made)
+        if row.file_hash != file_hash:
+            await connection.execute(update(study).where(study.c.id == row.id).values(file_hash=file_hash))
+            change = {"before": row.file_hash, "now": file_hash}
+            await _note(connection, row.id, "mjsim", "study file changed", change, now)
+        return int(row.id)
+
+    return await database.write(work)
+
+
+async def _note(
+    connection: AsyncConnection,
+    study_id: int,
+    who: str,
+    action: str,
+    details: Mapping[str, Any],
+    now: datetime,
+) -> None:
+    values = {"study_id": study_id, "at": now, "who": who, "action": action, "details": dict(details)}
+    await connection.execute(insert(audit).values(**values))

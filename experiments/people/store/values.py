@@ -1,0 +1,110 @@
+"""What the store takes and gives: plain frozen values; no row or connection leaves the store."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any, Literal
+
+Status = Literal["arrived", "assigned", "finished", "withdrawn", "screened_out", "no_consent", "timed_out"]
+StudyState = Literal["open", "paused", "closed"]
+PlaceState = Literal["held", "finished", "released"]
+Rule = Literal["uniform", "balanced"]
+
+ACTIVE: tuple[Status, ...] = ("arrived", "assigned")
+
+
+def utc_now() -> datetime:
+    """The time now, in UTC."""
+    return datetime.now(UTC)
+
+
+@dataclass(frozen=True)
+class StudyRow:
+    """The study that a store is open for.
+
+    Attributes:
+        file_hash: Hash of the study file that it was opened with last.
+        quotas: Wanted numbers of people that were changed since, by cell.
+    """
+
+    id: int
+    name: str
+    file_hash: str
+    state: StudyState
+    created: datetime
+    quotas: dict[int, int]
+
+
+@dataclass(frozen=True)
+class Person:
+    """A participant.
+
+    Attributes:
+        token_hash: SHA-256 of the link's token, hexadecimal; also the name of the visit's folder.
+        platform: Where the person comes from, such as `link` or `prolific`.
+        phase: Name of the phase that is under way.
+        seen: Last sign of life.
+        delete_wanted: Whether the person withdrew and wants the data deleted.
+        returning: Whether :meth:`Store.arrive` found the person instead of making one.
+    """
+
+    id: int
+    token_hash: str
+    platform: str
+    status: Status
+    phase: str
+    created: datetime
+    seen: datetime
+    delete_wanted: bool
+    returning: bool = False
+
+    @property
+    def active(self) -> bool:
+        """Whether the participation is under way."""
+        return self.status in ACTIVE
+
+
+@dataclass(frozen=True)
+class PhaseRow:
+    """A phase of a person: when it was shown first, and how it ended (None while it is under way)."""
+
+    person_id: int
+    name: str
+    shown: datetime
+    ended: datetime | None
+    duration_s: float | None
+    attempts: int | None
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a person answered to an item of a phase; `final` once the phase has ended."""
+
+    person_id: int
+    phase: str
+    item: str
+    value: Any
+    given: datetime
+    final: bool
+
+
+@dataclass(frozen=True)
+class TrialRow:
+    """A trial that a person played, and its run directory, relative to the study's folder."""
+
+    person_id: int
+    phase: str
+    folder: str
+    ended: str
+    finished: datetime
+
+
+@dataclass(frozen=True)
+class AuditRow:
+    """Who did what."""
+
+    id: int
+    at: datetime
+    who: str
+    action: str
+    details: dict[str, Any]

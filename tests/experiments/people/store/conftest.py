@@ -1,0 +1,78 @@
+"""Each test of the store runs on SQLite, and as a slow test on MariaDB and PostgreSQL."""
+
+import asyncio
+import uuid
+
+import pytest
+from database_servers import SERVERS, MissingProgramError
+from sqlalchemy import make_url, text
+from sqlalchemy.ext.asyncio import create_async_engine
+
+from experiments.people.store import Store
+from experiments.people.store.engine import DRIVERS
+
+HASH = "0" * 64
+
+
+@pytest.fixture
+def anyio_backend():
+    return "asyncio"
+
+
+def _server(kind):
+    try:
+        with SERVERS[kind]() as url:
+            yield url
+    except MissingProgramError as reason:
+        pytest.skip(str(reason))
+
+
+@pytest.fixture(scope="session")
+def mariadb():
+    yield from _server("mariadb")
+
+
+@pytest.fixture(scope="session")
+def postgresql():
+    yield from _server("postgresql")
+
+
+@pytest.fixture(
+    params=["sqlite", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("mariadb", "postgresql"))]
+)
+def url(request, tmp_path):
+    """URL of an empty database."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path}/study.db"
+    server = request.getfixturevalue(request.param)
+    name = f"study_{uuid.uuid4().hex}"
+    asyncio.run(_create(server, name))
+    return f"{server}/{name}"
+
+
+async def _create(server, name):
+    kind = make_url(server).get_backend_name()
+    home = make_url(server).set(
+        drivername=DRIVERS[kind], database="postgres" if kind == "postgresql" else None
+    )
+    engine = create_async_engine(home, isolation_level="AUTOCOMMIT")
+    async with engine.connect() as connection:
+        await connection.execute(text(f"CREATE DATABASE {name}"))
+    await engine.dispose()
+
+
+@pytest.fixture
+async def store(url):
+    opened = await Store.open(url, "pilot", HASH)
+    yield opened
+    await opened.close()
+
+
+@pytest.fixture
+def arrive(store):
+    """Lets somebody arrive, by number."""
+
+    async def somebody(number=1, key=None, now=None, phase="consent"):
+        return await store.arrive("link", key, {"participant": f"p{number}"}, f"{number:064x}", phase, now)
+
+    return somebody
