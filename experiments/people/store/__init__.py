@@ -1,25 +1,39 @@
 """The database of a study with people. Nothing outside of this package speaks to the database."""
 
+from experiments.people.store.choice import choose
 from experiments.people.store.store import Store
 from experiments.people.store.values import (
     Answer,
+    Assignment,
     AuditRow,
+    CellCount,
+    CellQuota,
+    Counts,
     Person,
     PhaseRow,
+    Rule,
     Status,
     StudyRow,
     StudyState,
     TrialRow,
+    utc_now,
 )
 
 __all__ = [
     "Answer",
+    "Assignment",
     "AuditRow",
+    "CellCount",
+    "CellQuota",
+    "Counts",
     "Person",
     "PhaseRow",
+    "Rule",
     "Status",
     "Store",
     "StudyRow",
     "StudyState",
     "TrialRow",
+    "choose",
+    "utc_now",
 ]

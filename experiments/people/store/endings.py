@@ -3,11 +3,12 @@
 from datetime import datetime
 
 from sqlalchemy import delete as delete_rows
-from sqlalchemy import select, update
+from sqlalchemy import update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store.part import Part, lock_study
-from experiments.people.store.tables import answer, assignment, person
+from experiments.people.store.places import place_of, set_place, take_back
+from experiments.people.store.tables import answer, person
 from experiments.people.store.values import ACTIVE, Status, utc_now
 
 
@@ -29,7 +30,7 @@ class Endings(Part):
             )
             if not ended.rowcount:
                 return False
-            await end(connection, person_id, status)
+            await end(connection, self._study_id, person_id, status)
             return True
 
         return await self._database.write(work)
@@ -51,7 +52,7 @@ class Endings(Part):
             values = {"seen": now, "delete_wanted": True} if delete else {"seen": now}
             if not (await connection.execute(update(person).where(mine, may).values(**values))).rowcount:
                 return False
-            await end(connection, person_id, "withdrawn", keep_finished=not delete)
+            await end(connection, self._study_id, person_id, "withdrawn", keep_finished=not delete)
             if delete:
                 await connection.execute(delete_rows(answer).where(answer.c.person_id == person_id))
             return True
@@ -60,27 +61,17 @@ class Endings(Part):
 
 
 async def end(
-    connection: AsyncConnection, person_id: int, status: Status, *, keep_finished: bool = True
+    connection: AsyncConnection, study_id: int, person_id: int, status: Status, *, keep_finished: bool = True
 ) -> None:
     """Give a person the last status, and finish or release the place; the study must be locked."""
     await connection.execute(update(person).where(person.c.id == person_id).values(status=status))
-    mine = assignment.c.person_id == person_id
-    place = (await connection.execute(select(assignment).where(mine))).first()
+    place = await place_of(connection, person_id)
     if place is None:
         return
-    if status == "finished":
-        if place.active or not await _taken(connection, place.study_id, place.cell, place.place):
-            await connection.execute(update(assignment).where(mine).values(state="finished", active=1))
-    elif place.state == "held" or not keep_finished:
-        await connection.execute(update(assignment).where(mine).values(state="released", active=None))
-
-
-async def _taken(connection: AsyncConnection, study_id: int, cell: int, place: int) -> bool:
-    """Whether somebody has a place that was released; then whoever had it before is one more than wanted."""
-    query = select(assignment.c.id).where(
-        assignment.c.study_id == study_id,
-        assignment.c.cell == cell,
-        assignment.c.place == place,
-        assignment.c.active == 1,
-    )
-    return (await connection.execute(query)).first() is not None
+    if status != "finished":
+        if place.state == "held" or not keep_finished:
+            await set_place(connection, person_id, "released")
+    elif place.state == "held":
+        await set_place(connection, person_id, "finished")
+    else:  # whoever comes back so late that the place is somebody else's is one more than wanted
+        await take_back(connection, study_id, place, "finished")

@@ -1,8 +1,10 @@
 """What every part of the store has: the database and the study."""
 
+from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
-from sqlalchemy import CursorResult, select
+from sqlalchemy import CursorResult, insert, select
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store import tables
@@ -25,3 +27,16 @@ def new_id(inserted: CursorResult[Any]) -> int:
 async def lock_study(connection: AsyncConnection, study_id: int) -> None:
     """Let others who lock the study wait until this transaction ends; SQLite has locked the whole database."""
     await connection.execute(select(tables.study.c.id).where(tables.study.c.id == study_id).with_for_update())
+
+
+async def note(
+    connection: AsyncConnection,
+    study_id: int,
+    who: str,
+    action: str,
+    details: Mapping[str, Any],
+    now: datetime,
+) -> None:
+    """Add to the audit log."""
+    values = {"study_id": study_id, "at": now, "who": who, "action": action, "details": dict(details)}
+    await connection.execute(insert(tables.audit).values(**values))

@@ -79,7 +79,7 @@ class Phases(Part):
             )
             await _end_phase(connection, person_id, name, now, duration_s, attempts=attempts, reason=reason)
             if status is not None:
-                await end(connection, person_id, status)
+                await end(connection, self._study_id, person_id, status)
             return True
 
         return await self._database.write(work)

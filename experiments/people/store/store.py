@@ -7,9 +7,10 @@ from typing import Any, Self
 from sqlalchemy import insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
+from experiments.people.store.assignments import Assignments
 from experiments.people.store.endings import Endings
 from experiments.people.store.engine import Database
-from experiments.people.store.part import new_id
+from experiments.people.store.part import new_id, note
 from experiments.people.store.people import People
 from experiments.people.store.phases import Phases
 from experiments.people.store.tables import audit, study
@@ -17,7 +18,7 @@ from experiments.people.store.upgrade import upgrade
 from experiments.people.store.values import AuditRow, StudyRow, StudyState, utc_now
 
 
-class Store(People, Endings, Phases):
+class Store(People, Assignments, Phases, Endings):
     """The database of one study. What a method has returned from is on the disk.
 
     Every method raises :class:`~experiments.errors.StoreError` where the database cannot do it.
@@ -57,7 +58,7 @@ class Store(People, Endings, Phases):
 
         async def work(connection: AsyncConnection) -> None:
             await connection.execute(update(study).where(study.c.id == self._study_id).values(state=state))
-            await _note(connection, self._study_id, who, f"study {state}", {}, now)
+            await note(connection, self._study_id, who, f"study {state}", {}, now)
 
         await self._database.write(work)
 
@@ -68,7 +69,7 @@ class Store(People, Endings, Phases):
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:
-            await _note(connection, self._study_id, who, action, details or {}, now)
+            await note(connection, self._study_id, who, action, details or {}, now)
 
         await self._database.write(work)
 
@@ -96,19 +97,7 @@ async def _study_id(database: Database, name: str, file_hash: str) -> int:
         if row.file_hash != file_hash:
             await connection.execute(update(study).where(study.c.id == row.id).values(file_hash=file_hash))
             change = {"before": row.file_hash, "now": file_hash}
-            await _note(connection, row.id, "mjsim", "study file changed", change, now)
+            await note(connection, row.id, "mjsim", "study file changed", change, now)
         return int(row.id)
 
     return await database.write(work)
-
-
-async def _note(
-    connection: AsyncConnection,
-    study_id: int,
-    who: str,
-    action: str,
-    details: Mapping[str, Any],
-    now: datetime,
-) -> None:
-    values = {"study_id": study_id, "at": now, "who": who, "action": action, "details": dict(details)}
-    await connection.execute(insert(audit).values(**values))

@@ -1,5 +1,6 @@
 """What the store takes and gives: plain frozen values; no row or connection leaves the store."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
@@ -108,3 +109,47 @@ class AuditRow:
     who: str
     action: str
     details: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class CellQuota:
+    """What a study wants of a cell: a number of people, and the seeds of their houses, gone through again for more."""
+
+    wanted: int
+    house_seeds: Sequence[int]
+
+    def house_seed(self, place: int) -> int:
+        """Seed of the house of a place, counted from 0."""
+        return self.house_seeds[place % len(self.house_seeds)]
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """The place of a person in a cell, both counted from 0, and the person's own seeds."""
+
+    person_id: int
+    cell: int
+    place: int
+    state: PlaceState
+    house_seed: int
+    person_seed: int
+    order_seed: int
+    created: datetime
+
+
+@dataclass(frozen=True)
+class CellCount:
+    """Places of a cell by state; `held` counts abandoned ones as well, until somebody else gets them."""
+
+    held: int = 0
+    finished: int = 0
+    released: int = 0
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many people there are, by status, by phase (of those who are under way) and by cell."""
+
+    statuses: Mapping[str, int]
+    phases: Mapping[str, int]
+    cells: Mapping[int, CellCount]

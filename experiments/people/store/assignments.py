@@ -1,0 +1,193 @@
+"""Cells and places: who gets which, in one transaction with a lock on the study."""
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+from sqlalchemy import ColumnElement, Select, func, insert, or_, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.people.store.choice import choose
+from experiments.people.store.part import Part, lock_study, note
+from experiments.people.store.places import FIELDS, place_of, set_place, take_back
+from experiments.people.store.tables import assignment, person, study
+from experiments.people.store.values import ACTIVE, Assignment, CellCount, CellQuota, Counts, Rule, utc_now
+
+SEEDS = 2**53  # exact as numbers of JavaScript as well
+
+
+class Assignments(Part):
+    """Rows of `assignment`."""
+
+    async def assign(
+        self,
+        person_id: int,
+        cells: Sequence[CellQuota],
+        rule: Rule,
+        rng: np.random.Generator,
+        now: datetime | None = None,
+        abandoned_after: timedelta = timedelta(minutes=30),
+    ) -> Assignment | None:
+        """The place of a person: the one they have, or a new one; None if the cells are full.
+
+        A place is held as long as its person gives signs of life. After `abandoned_after` without one it no longer
+        counts, and the next person of its cell gets it once no other is free. Whoever comes back after that gets it
+        again if it is free by then, else a new place in any cell, so ask for the place with :meth:`assignment`
+        instead where the trial has begun.
+
+        Args:
+            person_id: The person, whose participation must be under way.
+            cells: What the study file wants of each cell; :meth:`set_quota` may have changed the numbers.
+            rule: How a cell is chosen, see :func:`~experiments.people.store.choice.choose`.
+            rng: Source of the choice and of the person's own seeds.
+            now: The time, with its zone.
+            abandoned_after: How long a place is held without a sign of life.
+
+        Raises:
+            StoreError: The participation is over.
+        """
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> Assignment | None:
+            await lock_study(connection, self._study_id)
+            await self._check_active(connection, person_id, now)
+            before = await place_of(connection, person_id)
+            if before is not None:
+                if before.state != "released":
+                    return before
+                if await take_back(connection, self._study_id, before, "held"):
+                    return await place_of(connection, person_id)
+            fresh = or_(assignment.c.state == "finished", person.c.seen >= now - abandoned_after)
+            place = await self._free_place(connection, cells, rule, rng, fresh)
+            if place is None:
+                return None
+            await self._give(connection, person_id, place, cells, rng, now, new=before is None)
+            return await place_of(connection, person_id)
+
+        return await self._database.write(work)
+
+    async def assignment(self, person_id: int) -> Assignment | None:
+        """The place that a person has or had."""
+        async with self._database.reading() as connection:
+            return await place_of(connection, person_id)
+
+    async def assignments(self) -> tuple[Assignment, ...]:
+        """Places of everybody, in the order in which they were given first."""
+        query = select(*FIELDS).where(assignment.c.study_id == self._study_id).order_by(assignment.c.id)
+        async with self._database.reading() as connection:
+            return tuple(Assignment(*row) for row in await connection.execute(query))
+
+    async def set_quota(self, cell: int, wanted: int, who: str, now: datetime | None = None) -> None:
+        """Change how many people a cell shall have, in place of what the study file wants; nobody loses a place."""
+        if cell < 0 or wanted < 0:
+            raise StoreError(f"Cell {cell} cannot have {wanted} people; both are counted from 0.")
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            await lock_study(connection, self._study_id)
+            mine = study.c.id == self._study_id
+            quotas = (await connection.execute(select(study.c.quotas).where(mine))).scalar_one()
+            changed = {**quotas, str(cell): wanted}
+            await connection.execute(update(study).where(mine).values(quotas=changed))
+            await note(
+                connection, self._study_id, who, "quota changed", {"cell": cell, "wanted": wanted}, now
+            )
+
+        await self._database.write(work)
+
+    async def counts(self) -> Counts:
+        """How many people there are by status, by phase (of those who are under way) and by cell."""
+        mine = person.c.study_id == self._study_id
+        by_status = select(person.c.status, func.count()).where(mine).group_by(person.c.status)
+        by_phase = select(person.c.phase, func.count()).where(mine, person.c.status.in_(ACTIVE))
+        by_place = (
+            select(assignment.c.cell, assignment.c.state, func.count())
+            .where(assignment.c.study_id == self._study_id)
+            .group_by(assignment.c.cell, assignment.c.state)
+        )
+        async with self._database.reading() as connection:
+            statuses = await _tally(connection, by_status)
+            phases = await _tally(connection, by_phase.group_by(person.c.phase))
+            cells: dict[int, dict[str, int]] = {}
+            for cell, state, number in await connection.execute(by_place):
+                cells.setdefault(cell, {})[state] = number
+        return Counts(statuses, phases, {cell: CellCount(**states) for cell, states in sorted(cells.items())})
+
+    async def _check_active(self, connection: AsyncConnection, person_id: int, now: datetime) -> None:
+        active = await connection.execute(
+            update(person).where(person.c.id == person_id, person.c.status.in_(ACTIVE)).values(seen=now)
+        )
+        if not active.rowcount:
+            raise StoreError(
+                f"Person {person_id} has ended the participation, or does not exist: no place is given."
+            )
+
+    async def _free_place(
+        self,
+        connection: AsyncConnection,
+        cells: Sequence[CellQuota],
+        rule: Rule,
+        rng: np.random.Generator,
+        fresh: ColumnElement[bool],
+    ) -> tuple[int, int] | None:
+        """A cell and a place in it that nobody has; an abandoned one is released where no other is free."""
+        mine = (assignment.c.study_id == self._study_id, assignment.c.active == 1)
+        joined = select(assignment.c.cell, func.count()).join(person, person.c.id == assignment.c.person_id)
+        counts = await _tally(connection, joined.where(*mine, fresh).group_by(assignment.c.cell))
+        changed = await connection.execute(select(study.c.quotas).where(study.c.id == self._study_id))
+        quotas = {int(cell): wanted for cell, wanted in changed.scalar_one().items()}
+        wanted = [quotas.get(index, cell.wanted) for index, cell in enumerate(cells)]
+        cell = choose([counts.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
+        if cell is None:
+            return None
+        held = await connection.execute(
+            select(assignment.c.place, assignment.c.person_id, fresh.label("fresh"))
+            .join(person, person.c.id == assignment.c.person_id)
+            .where(*mine, assignment.c.cell == cell, assignment.c.place < wanted[cell])
+            .order_by(person.c.seen)
+        )
+        holders = held.all()
+        free = sorted(set(range(wanted[cell])) - {holder.place for holder in holders})
+        if free:
+            return cell, free[0]
+        abandoned = next(holder for holder in holders if not holder.fresh)
+        await set_place(connection, abandoned.person_id, "released")
+        return cell, abandoned.place
+
+    async def _give(
+        self,
+        connection: AsyncConnection,
+        person_id: int,
+        place: tuple[int, int],
+        cells: Sequence[CellQuota],
+        rng: np.random.Generator,
+        now: datetime,
+        *,
+        new: bool,
+    ) -> None:
+        values = {
+            "cell": place[0],
+            "place": place[1],
+            "active": 1,
+            "state": "held",
+            "house_seed": cells[place[0]].house_seed(place[1]),
+        }
+        if new:
+            own = {name: int(rng.integers(SEEDS)) for name in ("person_seed", "order_seed")}
+            await connection.execute(
+                insert(assignment).values(
+                    person_id=person_id, study_id=self._study_id, created=now, **own, **values
+                )
+            )
+        else:
+            await connection.execute(
+                update(assignment).where(assignment.c.person_id == person_id).values(**values)
+            )
+        await connection.execute(update(person).where(person.c.id == person_id).values(status="assigned"))
+
+
+async def _tally(connection: AsyncConnection, query: Select[Any]) -> dict[Any, int]:
+    """How many rows have each value."""
+    return {row[0]: row[1] for row in await connection.execute(query)}
