@@ -18,6 +18,8 @@ from benchmarks.support.play_server import PATIENCE
 from experiments.web.protocol import BEAT_PERIOD, FRAME_HEAD, MAX_INPUTS
 
 STEP = 0.04  # s of a control step
+# A text frame of 126 bytes, masked with zeros, that ends early.
+HALF_A_MESSAGE = b"\x81\xfe\x00\x7e" + bytes(4) + b'{"type": "inputs", "inputs": [{"num'
 RETRANSMISSION = 0.2  # s that a lost packet costs, as TCP sends it again
 
 
@@ -137,9 +139,11 @@ class SimulatedBrowser:
         doing += [self._take_steps()] if self.draws else []
         self._tasks = [asyncio.create_task(task) for task in doing]
 
-    async def cut(self) -> None:
-        """Lose the connection, without a word to the server."""
+    async def cut(self, *, amid_a_message: bool = False) -> None:
+        """Lose the connection, without a word to the server, or in the middle of one."""
         if self._socket is not None:
+            if amid_a_message:
+                self._socket.transport.write(HALF_A_MESSAGE)
             self._socket.transport.abort()
         await self._end()
 

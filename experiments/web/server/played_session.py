@@ -73,7 +73,7 @@ class PlayedSession:
         self._task: asyncio.Task[None] | None = None
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
-        self._taken = self._step = 0  # number of the last input that is safe, and the next control step then
+        self._taken = self._step = 0  # number of the last input that is safe, and the next control step
 
     def attach(self, browser: Browser, view: View) -> None:
         """Connect a browser; it replaces the one before."""
@@ -195,7 +195,7 @@ class PlayedSession:
 
     async def _play(self, trial: str) -> None:
         """Play a trial to its end, with another worker whenever one dies."""
-        visit, crashes = self.visit, 0
+        visit, crashes, safe = self.visit, 0, 0
         self._taken = self._step = 0
         opening = Open(
             str(visit.journal(trial)), str(visit.run(trial)), visit.settings(trial), visit.before(trial)
@@ -216,8 +216,8 @@ class PlayedSession:
                         message = msgspec.structs.replace(message, input=max(number, self.state.input))
                         self.state = message
                     case Taken(number, step):
-                        crashes = 0 if step > self._step else crashes
-                        self._taken, self._step = number, step
+                        crashes = 0 if step > safe else crashes
+                        self._taken, safe, self._step = number, step, max(self._step, step)
                     case Snapshot(step):
                         self._step = max(self._step, step)
                     case Saved():

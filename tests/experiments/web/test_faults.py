@@ -1,4 +1,4 @@
-"""Faults in sessions of `mjsim play`: every acknowledged input counts once, and the session continues."""
+"""Faults in sessions of a client that draws: every acknowledged input counts once, and the session continues."""
 
 import asyncio
 import os
@@ -53,6 +53,10 @@ class FaultyVisit:
 
     async def cut(self):
         await self._browser.cut()
+        return await self._open()
+
+    async def cut_amid_a_message(self):
+        await self._browser.cut(amid_a_message=True)
         return await self._open()
 
     async def reload(self):
@@ -110,6 +114,7 @@ class FaultyVisit:
 
 FAULTS = (
     FaultyVisit.cut,
+    FaultyVisit.cut_amid_a_message,
     FaultyVisit.reload,
     FaultyVisit.kill_worker,
     FaultyVisit.kill_fork_server,
@@ -121,7 +126,7 @@ FAULTS = (
 @pytest.mark.parametrize(
     ("count", "words"),
     [
-        (6, FAST),
+        (len(FAULTS), FAST),
         pytest.param(120, FAST, marks=pytest.mark.slow),
         pytest.param(80, (), marks=pytest.mark.slow),
     ],

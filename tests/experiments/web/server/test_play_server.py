@@ -19,7 +19,7 @@ from experiments.record import records
 from experiments.record.phases import PHASES
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
-from experiments.web.protocol import Frame, Inputs, Leave, Open, Pause, Run, Saved, State, Taken
+from experiments.web.protocol import Frame, Inputs, Leave, Open, Pause, Run, Saved, Snapshot, State, Taken
 from experiments.web.server.app import PlayConfig, PlayServer
 from experiments.web.server.guards import Guards, allowed_hosts
 from experiments.web.server.played_session import MAX_CRASHES
@@ -73,8 +73,11 @@ class ScriptedWorker:
         self._state = self._state.after(trigger, reason)
         self._answers.put_nowait(self._state)
 
+    def say(self, message):
+        self._loop.call_soon_threadsafe(self._answers.put_nowait, message)
+
     def die(self):
-        self._loop.call_soon_threadsafe(self._answers.put_nowait, None)
+        self.say(None)
 
     async def receive(self):
         return await self._answers.get()
@@ -656,6 +659,17 @@ def test_workers_that_die_again_and_again_are_not_replaced_for_ever(client, pool
                 pool.workers[-1].die()
             until_phase(socket, "loading" if len(pool.workers) < MAX_CRASHES else "failed")
             assert pool.discarded[crash] is pool.workers[crash]
+
+
+def test_workers_that_die_now_and_then_are_replaced_for_ever(client, pool):
+    seen = {"time": 0.0, "busy": False, "body": [], "eye": [], "hands": [], "held": (None, None)}
+    with connected(client, new_visit(client)) as socket:
+        started(socket)
+        for step in range(1, 3 * MAX_CRASHES):
+            pool.workers[-1].say(Snapshot(step=step, input=0, **seen, objects={}, models={}, gone=[]))
+            pool.workers[-1].say(Taken(0, step))
+            pool.workers[-1].die()
+            until_phase(socket, "ready")
 
 
 def test_a_fork_server_that_was_just_killed_costs_no_session(monkeypatch):
