@@ -119,7 +119,7 @@ def ssim(a: Image, b: Image) -> float:
     return float(np.mean(quality))
 
 
-def sampled_scene(objects: int = 12, seed: int = 0) -> Scene:
+def sampled_scene(objects: int = 24, seed: int = 0) -> Scene:
     """An episode of the apartment with its visuals."""
     catalogue = Catalogue.load("apartment")
     return compose(sample_episode(catalogue, objects=objects, seed=seed), catalogue)

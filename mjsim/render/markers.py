@@ -18,6 +18,7 @@ _EMITTED = 0.62
 _LIT = 0.32
 # Of an x-ray marker where something hides it.
 _HIDDEN_OPACITY = 0.3
+_AMBIENT = 0.3  # light that MuJoCo adds to a scene that has none
 # Both passes draw a visible marker at the same depth up to rounding.
 _DEPTH_TOLERANCE = 1e-4
 # Of the dark sphere behind a sphere that is outlined: its radius, in those of the other, and its colour.
@@ -62,7 +63,7 @@ class MarkerLike(Protocol):
 
 
 def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False) -> None:
-    """Append markers to a scene's geoms; `flat` gives their exact colour, opaque, without any light.
+    """Append markers to a scene's geoms; `flat` gives their exact colour, opaque, in a scene without lights.
 
     `RenderError` where there are too many markers, or one has an unknown shape or unusable numbers.
     """
@@ -75,7 +76,7 @@ def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False
             rgba[3] = 1.0
         size, position = geom_size(marker), np.array(_numbers(marker, "position", 3))
         geom = add_decorative_geom(scene, _SHAPES[marker.shape], size, position, rgba)
-        geom.emission = 1.0 if flat else _EMITTED / _LIT
+        geom.emission = 1.0 - _AMBIENT if flat else _EMITTED / _LIT
 
 
 def add_decorative_geom(

@@ -10,7 +10,7 @@ from mjsim.model.rooms import RoomMap
 from mjsim.scene_export.glb import Look
 from mjsim.scene_export.surfaces import Surface
 
-_HEAVY = 20_000  # triangles of a look from which it is worth a draw call in every room
+_HEAVY = 50_000  # triangles of a look from which it is worth a draw call in every room
 _CELL = 16.0  # m; its positions are quantised to 0.25 mm
 
 

@@ -203,6 +203,8 @@ def test_walls_hide_markers_and_show_them_faintly_in_x_ray(room, renderer):
     hidden = (x_ray != plain).any(axis=2) & (np.arange(160) > 80)
     assert hidden.sum() > 100
     np.testing.assert_allclose(x_ray[hidden], 0.7 * plain[hidden] + 0.3 * np.array([255, 0, 0]), atol=1.0)
+    dull = drawn((3, 0, 0.7), size=(0.25,), rgba=(0.6, 0.4, 0.2, 1.0), x_ray=True)
+    np.testing.assert_allclose(dull[hidden], 0.7 * plain[hidden] + 0.3 * np.array([153, 102, 51]), atol=1.0)
     np.testing.assert_array_equal(drawn((-3, 0, 1), (1, 40, 1), x_ray=True), plain)  # out of view
 
 

@@ -8,6 +8,7 @@ from tools.drawn_pairs import draw_pairs, sampled_scene, ssim, views
 LEAST, MEAN = 0.95, 0.97  # SSIM of a pair, and of all
 MAX_DRAWS = 80
 MAX_TRIANGLES = 150_000
+MAX_MILLISECONDS = 2.0  # of the main thread for a frame, median of all
 
 
 @pytest.fixture
@@ -24,6 +25,7 @@ def test_pictures_of_all_rooms_look_as_those_of_mjsim(pairs, record_property):
     assert len(pairs) == 21
     assert min(similar) >= LEAST
     assert np.mean(similar) >= MEAN
+    assert np.median(milliseconds) <= MAX_MILLISECONDS
     assert max(pair.calls for pair in pairs) <= MAX_DRAWS
     assert max(pair.triangles for pair in pairs) <= MAX_TRIANGLES
 

@@ -15,7 +15,6 @@ const CAPACITY = 1024;
 const EMITTED = 0.62;
 const LIT = 0.32;
 const HIDDEN_OPACITY = 0.3;
-const HIDDEN_GAIN = 1.3; // MuJoCo adds ambient light to a scene without lights, as that of hidden markers is
 const OUTLINE = 1.4; // radius of the dark sphere behind a sphere, in radii of that
 const OUTLINE_RGBA = [0.03, 0.06, 0.2, 1];
 const FIRST = 10; // in the order of drawing: after the house and what it contains
@@ -66,7 +65,7 @@ export class Markers extends Group {
     for (const set of this.#sets.values()) set.empty();
     for (const marker of markers) {
       this.#put(marker, marker.rgba[3] < 0.995 ? "clear" : marker.x_ray ? "x-ray" : "solid", marker.rgba, LIT);
-      if (marker.x_ray) this.#put(marker, "hidden", marker.rgba, HIDDEN_GAIN, HIDDEN_OPACITY);
+      if (marker.x_ray) this.#put(marker, "hidden", marker.rgba, 1, HIDDEN_OPACITY);
       if (marker.outlined && marker.shape === "sphere") this.#put(marker, "outline", OUTLINE_RGBA, LIT, 1, OUTLINE);
     }
     for (const set of this.#sets.values()) set.send();
