@@ -1,6 +1,7 @@
 """The database of a study with people. Nothing outside of this package speaks to the database."""
 
 from experiments.people.store.choice import choose
+from experiments.people.store.ledger import Ledger
 from experiments.people.store.store import Store
 from experiments.people.store.values import (
     Answer,
@@ -9,6 +10,8 @@ from experiments.people.store.values import (
     CellCount,
     CellQuota,
     Counts,
+    PaymentEvent,
+    PaymentKind,
     Person,
     PhaseRow,
     Rule,
@@ -26,6 +29,9 @@ __all__ = [
     "CellCount",
     "CellQuota",
     "Counts",
+    "Ledger",
+    "PaymentEvent",
+    "PaymentKind",
     "Person",
     "PhaseRow",
     "Rule",

@@ -10,6 +10,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection
 from experiments.people.store.assignments import Assignments
 from experiments.people.store.endings import Endings
 from experiments.people.store.engine import Database
+from experiments.people.store.ledger import Ledger
 from experiments.people.store.part import new_id, note
 from experiments.people.store.people import People
 from experiments.people.store.phases import Phases
@@ -22,7 +23,15 @@ class Store(People, Assignments, Phases, Endings):
     """The database of one study. What a method has returned from is on the disk.
 
     Every method raises :class:`~experiments.errors.StoreError` where the database cannot do it.
+
+    Attributes:
+        ledger: What people are paid.
     """
+
+    def __init__(self, database: Database, study_id: int) -> None:
+        """See :meth:`open`."""
+        super().__init__(database, study_id)
+        self.ledger = Ledger(database, study_id)
 
     @classmethod
     async def open(cls, url: str, study_name: str, file_hash: str) -> Self:

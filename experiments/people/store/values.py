@@ -8,6 +8,8 @@ from typing import Any, Literal
 Status = Literal["arrived", "assigned", "finished", "withdrawn", "screened_out", "no_consent", "timed_out"]
 StudyState = Literal["open", "paused", "closed"]
 PlaceState = Literal["held", "finished", "released"]
+PaymentKind = Literal["reward", "bonus", "screen_out", "partial", "rejection"]
+PaymentEventName = Literal["decided", "sending", "confirmed", "failed"]
 Rule = Literal["uniform", "balanced"]
 
 ACTIVE: tuple[Status, ...] = ("arrived", "assigned")
@@ -153,3 +155,32 @@ class Counts:
     statuses: Mapping[str, int]
     phases: Mapping[str, int]
     cells: Mapping[int, CellCount]
+
+
+@dataclass(frozen=True)
+class PaymentEvent:
+    """A line of the ledger.
+
+    Attributes:
+        key: Names the payment for ever.
+        attempt: Number of the attempt to send it; 0 when it is decided.
+        cents: Hundredths of the currency.
+        reference: The platform's own name for the payment, once it is confirmed.
+    """
+
+    id: int
+    person_id: int
+    key: str
+    attempt: int
+    event: PaymentEventName
+    kind: PaymentKind
+    cents: int
+    currency: str
+    reference: str
+    note: str
+    at: datetime
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether the platform may have paid without our knowing, if this is the last event of its key."""
+        return self.event == "sending"
