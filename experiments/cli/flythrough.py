@@ -13,6 +13,7 @@ from experiments.cli.options import (
     seconds,
 )
 from experiments.errors import ConfigError
+from experiments.session.film_config import FilmConfig
 
 DESCRIPTION = """\
 Film a tidy house as its guests see it before the task: a camera at eye height goes through all rooms, looks around each
@@ -36,20 +37,26 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Film, with a progress bar."""
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-
-    from experiments.cli.terminal import error_console, progress_bars
-    from experiments.house import House
-    from experiments.procedure.film import write_flythrough
     from experiments.record.run_directory import check_file
 
     if arguments.out.suffix != ".mp4":
         raise ConfigError(f"cannot film to {arguments.out}: name a file that ends in .mp4")
     check_file(arguments.out, replace=arguments.force)
-    film = film_config(arguments)
-    house = House.load(arguments.house)
+    frames = film_house(arguments.house, arguments.out, film_config(arguments), arguments.seconds)
+    print(f"{arguments.out} (frames {frames})")
+    return 0
+
+
+def film_house(name: str, path: Path, film: FilmConfig | None = None, seconds: float | None = None) -> str:
+    """Film the house with a name, with a progress bar; the SHA-256 of the frames."""
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
+    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.house import House
+    from experiments.procedure.film import write_flythrough
+
     columns = (
-        TextColumn("frames"),
+        TextColumn("frames of the film"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("left"),
@@ -57,12 +64,10 @@ def run(arguments: argparse.Namespace) -> int:
     )
     with progress_bars(error_console(), *columns) as bars:
         bar = bars.add_task("frames", total=None)
-        frames = write_flythrough(
-            house,
-            arguments.out,
-            film,
-            seconds=arguments.seconds,
+        return write_flythrough(
+            House.load(name),
+            path,
+            film or FilmConfig(),
+            seconds=seconds,
             on_progress=lambda done, total: bars.update(bar, completed=done, total=total),
         )
-    print(f"{arguments.out} (frames {frames})")
-    return 0

@@ -1,6 +1,7 @@
 """`mjsim play`: a person at the keyboard, in a browser."""
 
 import argparse
+import asyncio
 import socket
 from collections.abc import Sequence
 from pathlib import Path
@@ -184,7 +185,7 @@ def _serve(
         xr=arguments.xr,
     )
     app = PlayServer(config, pool).app(arguments.host, arguments.public_url)
-    serve(app, listener, arguments)
+    asyncio.run(serve(app, listener, arguments))
 
 
 def _minimum(text: str) -> dict[str, float]:

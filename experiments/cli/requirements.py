@@ -7,7 +7,10 @@ from typing import Any, NoReturn
 
 from experiments.errors import ConfigError
 
-EXTRAS = {"study": ("matplotlib", "statsmodels")}  # name of an extra -> modules that it brings
+EXTRAS = {
+    "study": ("matplotlib", "statsmodels"),
+    "people": ("wtforms", "sqlalchemy", "alembic"),
+}  # name of an extra -> modules that it brings
 
 
 def require_extra(extra: str) -> None:

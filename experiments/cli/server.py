@@ -45,7 +45,7 @@ def prepare_process() -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, MAX_FILES) if most > 0 else MAX_FILES, most))
 
 
-def serve(app: Any, listener: socket.socket, arguments: argparse.Namespace) -> None:
+async def serve(app: Any, listener: socket.socket, arguments: argparse.Namespace) -> None:
     """Print the URL of an ASGI application, open it, and serve until a signal comes."""
     import uvicorn  # imported here, so that other commands start fast
 
@@ -77,7 +77,7 @@ def serve(app: Any, listener: socket.socket, arguments: argparse.Namespace) -> N
     print(url, flush=True)
     if not arguments.no_open:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-    server.run(sockets=[listener])
+    await server.serve(sockets=[listener])
 
 
 def listen(host: str, port: int) -> socket.socket:

@@ -112,7 +112,7 @@ class Settings(_Table, frozen=True):
             )
         if unknown := [name for name in (*self.minimum, *self.optional) if name not in self.phases]:
             raise ValueError(f"minimum or optional names {unknown[0]!r}, which is not among the phases")
-        if played := [name for name in self.optional if name in (*PLAYED, CONSENT, COMPLETION)]:
+        if played := [name for name in self.optional if name in (CONSENT, TASK, COMPLETION)]:
             raise ValueError(f"{played[0]} cannot be optional")
 
 

@@ -124,6 +124,15 @@ class FormPhase:
             }
         )
 
+    def drafts(self, sent: FormData) -> Answers:
+        """The answers among what is in a form that is not sent yet; those that cannot be used are left out."""
+        form = self._form(sent, {})
+        form.validate()
+        given = {item.name: form[item.name] for item in self.items if item.name in sent}
+        return {
+            name: field.data for name, field in given.items() if not field.errors and field.data is not None
+        }
+
     def _form(self, sent: FormData | None, answers: Answers) -> Any:
         form = form_of(self.items, self.texts.scale, self._study.texts["common"])
         form.process(sent, data=dict(answers))

@@ -20,7 +20,7 @@ class Comprehension(FormPhase):
         if isinstance(read, Again):
             return read
         wrong = [i.name for i in self.items if i.right is not None and read.answers.get(i.name) != i.right]
-        answers = {**read.answers, "attempts": visitor.attempts + 1}
+        answers = dict(read.answers)
         if not wrong:
             return Done(answers)
         if visitor.attempts + 1 >= self._study.settings.limits.attempts:
@@ -30,4 +30,4 @@ class Comprehension(FormPhase):
 
 def build(study: Study) -> Comprehension:
     """The phase."""
-    return Comprehension(study, COMPREHENSION)
+    return Comprehension(study, COMPREHENSION, "comprehension")

@@ -38,7 +38,7 @@ class DeviceCheck(FormPhase):
         """Whether a keyboard is needed."""
         return {"keyboard": self._study.settings.device.keyboard}
 
-    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - what is sent says all
         """What was measured, if it suffices; who gives up is screened out."""
         measured = _measured(sent)
         if measured is None:
@@ -48,7 +48,6 @@ class DeviceCheck(FormPhase):
             "keyboard": measured.keyboard,
             "webgl": measured.webgl,
             "renderer": measured.renderer,
-            "attempts": visitor.attempts + 1,
         }
         faults = measured.faults(self._study.settings.device, measured.webgl)
         if sent.get("give_up"):

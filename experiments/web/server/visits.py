@@ -126,11 +126,15 @@ class Visit:
 
 
 class Visits:
-    """All visits in a folder, which is made if it is missing."""
+    """All visits in a folder, which is made if it is missing.
+
+    Attributes:
+        folder: The folder.
+    """
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        self._folder = folder
+        self.folder = folder
         self._known: dict[str, Visit] = {}
         self._lock = threading.Lock()
         self._begun = sum(1 for _ in folder.glob(f"*/{VISIT}"))
@@ -153,13 +157,13 @@ class Visits:
         Where there is a visit with `token`, it stays as it is.
         """
         token = token or new_token()
-        folder = self._folder / token_hash(token)
+        folder = self.folder / token_hash(token)
         if self.named(folder.name) is not None:
             return token
         folder.mkdir(0o700, exist_ok=True)
         visit = Visit(folder, _Stored(phases[0], list(phases), dict(trials), list(ended)))
         visit._save()
-        sync_folder(self._folder)
+        sync_folder(self.folder)
         self._known[visit.name] = visit
         return token
 
@@ -167,8 +171,8 @@ class Visits:
         """Delete a visit with all that was played in it."""
         with self._lock:
             self._known.pop(name, None)
-        shutil.rmtree(self._folder / name, ignore_errors=True)
-        sync_folder(self._folder)
+        shutil.rmtree(self.folder / name, ignore_errors=True)
+        sync_folder(self.folder)
 
     def find(self, token: str) -> Visit | None:
         """The visit that a token belongs to; a RecordError where its file is damaged."""
@@ -176,7 +180,7 @@ class Visits:
 
     def named(self, name: str) -> Visit | None:
         """The visit with a name; a RecordError where its file is damaged."""
-        path = self._folder / name / VISIT
+        path = self.folder / name / VISIT
         with self._lock:
             if name not in self._known and path.is_file():
                 try:

@@ -224,7 +224,8 @@ function pause(reason) {
 
 function askToEnd() {
   inputs.release();
-  panel.show(dialogs.ending(trial, Math.ceil((endable - performance.now()) / 1000)));
+  if (page.dataset["leave"]) location.assign(page.dataset["leave"]);
+  else panel.show(dialogs.ending(trial, Math.ceil((endable - performance.now()) / 1000)));
 }
 
 function openHelp() {

@@ -3,105 +3,41 @@
 import asyncio
 import json
 import re
-import threading
 import time
 from contextlib import contextmanager
 from ipaddress import ip_network
 from pathlib import Path
 
 import pytest
+from scripted_workers import (
+    METRICS,
+    ORIGIN,
+    ScriptedPool,
+    connected,
+    hello,
+    left,
+    play_trial,
+    started,
+    until,
+    until_phase,
+)
 from starlette.responses import PlainTextResponse
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from experiments.procedure.comprehension import Question
-from experiments.record import records
 from experiments.record.phases import PHASES
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
-from experiments.web.protocol import Frame, Inputs, Leave, Open, Pause, Run, Saved, Snapshot, State, Taken
+from experiments.web.protocol import Frame, Open, Pause, Snapshot, Taken
 from experiments.web.server.app import PlayConfig, PlayServer
 from experiments.web.server.guards import Guards, allowed_hosts
 from experiments.web.server.played_session import MAX_CRASHES
 from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
 from experiments.web.server.visits import VISIT, Visits, token_hash
-from experiments.web.state import Trigger
 
-ORIGIN = "http://127.0.0.1:8000"
 TASK = TrialConfig(objects=6, assistance="optimal", seed=0, user="human", live=True).settings()
 TRIALS = {"training": {**TASK, "objects": 1}, "task": TASK}
-METRICS = {
-    "ended": "all delivered",
-    "objects": 6,
-    "delivered": 6,
-    "completion_time_s": 125.0,
-    "task_distance_m": 70.2,
-    "ipl_locations": 0.93,
-    "total_regret_m": 3.25,
-    "regretful_visits": 2,
-}
-
-
-class ScriptedWorker:
-    """Answers as a worker does, at once; keeps what it was told."""
-
-    def __init__(self):
-        self.told = []
-        self._state = State()
-        self._answers = asyncio.Queue()
-        self._loop = asyncio.get_running_loop()
-
-    def send(self, message):
-        self.told.append(message)
-        match message:
-            case Open(run=run):
-                self._run, self._state = Path(run), State()
-                self._move(Trigger.OPENED)
-            case Run():
-                self._move(Trigger.RUN)
-            case Pause(reason):
-                self._move(Trigger.PAUSE, reason)
-            case Inputs(inputs):
-                self._answers.put_nowait(Taken(inputs[-1].number, 1))
-            case Leave():
-                self._run.mkdir()
-                (self._run / records.METRICS).write_text(json.dumps(METRICS))
-                self._move(Trigger.END, "all delivered")
-                self._answers.put_nowait(Saved())
-
-    def _move(self, trigger, reason=""):
-        self._state = self._state.after(trigger, reason)
-        self._answers.put_nowait(self._state)
-
-    def say(self, message):
-        self._loop.call_soon_threadsafe(self._answers.put_nowait, message)
-
-    def die(self):
-        self.say(None)
-
-    async def receive(self):
-        return await self._answers.get()
-
-
-class ScriptedPool:
-    """Gives scripted workers; `workers` holds those given."""
-
-    def __init__(self):
-        self.workers = []
-        self.discarded = []
-        self.given = threading.Condition()
-
-    async def start(self):
-        with self.given:
-            self.workers.append(ScriptedWorker())
-            self.given.notify_all()
-        return self.workers[-1]
-
-    def discard(self, worker):
-        self.discarded.append(worker)
-
-    async def close(self):
-        pass
 
 
 @pytest.fixture
@@ -129,50 +65,10 @@ def new_visit(client, **form):
     return answer.headers["location"]
 
 
-def hello(trial="training", tab="tab-00000001"):
-    view = {"type": "view", "width": 640, "height": 480, "codec": "none"}
-    return {"type": "hello", "tab": tab, "trial": trial, "view": view}
-
-
-@contextmanager
-def connected(client, link, origin=ORIGIN):
-    with client.websocket_connect(link, headers={"Origin": origin, "Host": "127.0.0.1:8000"}) as socket:
-        yield socket
-
-
-def until(socket, kind):
-    """Messages up to the first one of a type."""
-    said = []
-    while not said or said[-1]["type"] != kind:
-        said.append(socket.receive_json())
-    return said
-
-
-def until_phase(socket, phase):
-    """The first state with a phase."""
-    while (state := until(socket, "state")[-1])["phase"] != phase:
-        pass
-    return state
-
-
-def started(socket, trial="training", **kw):
-    socket.send_json(hello(trial, **kw))
-    until_phase(socket, "ready")
-    socket.send_json({"type": "run"})
-    return until_phase(socket, "running")
-
-
-def left(socket):
-    socket.send_json({"type": "leave"})
-    until(socket, "saved")
-
-
 def go_through(client, link):
     """Training and task, each left at once."""
     for phase in ("training", "task"):
-        with connected(client, link) as socket:
-            started(socket, phase)
-            left(socket)
+        play_trial(client, link, phase)
 
 
 def inputs(*numbers, **values):

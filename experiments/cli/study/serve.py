@@ -1,0 +1,128 @@
+"""`mjsim study serve`: a study with people, from the first page to the last."""
+
+import argparse
+import asyncio
+import os
+import secrets
+import socket
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.cli.options import add_command
+from experiments.cli.requirements import require_extra
+from experiments.cli.server import (
+    add_server_options,
+    check_public_url,
+    listen,
+    locked,
+    prepare_process,
+    serve,
+)
+from experiments.errors import ConfigError
+from experiments.record.phases import FLYTHROUGH
+
+if TYPE_CHECKING:  # imported when the command runs, so that other commands start fast
+    from experiments.people.study_file import Study
+    from experiments.web.server.pool import WorkerPool
+
+DATABASE, SECRET_FILE, FILM, VISITS = "study.db", "secret", "flythrough.mp4", "visits"
+SECRET = "MJSIM_STUDY_SECRET"
+DESCRIPTION = f"""\
+Serve a study with people: consent, a check of the computer, the story, a film of the house, questions about the task,
+training, task, survey, and the way back to where people came from. STUDY.toml is a design with a table [study]
+(docs/study-with-people.md); `paper` is the published study. Prints the URL on a separate line and opens it.
+
+Everything is kept in --out: the database, the journals and run directories of trials, the film, and the secret from
+which people who come from a platform are recognised ({SECRET} sets another one). Ctrl-C ends the server; the same
+command continues the study, and everybody in it continues where they stopped."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(commands, "serve", run, summary="serve a study with people", description=DESCRIPTION)
+    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the study")
+    parser.add_argument(
+        "--database",
+        metavar="URL",
+        help="database of people and answers (default: SQLite in --out), such as postgresql+psycopg://user@host/name",
+    )
+    parser.add_argument(
+        "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: made once)"
+    )
+    add_server_options(parser.add_argument_group("server"))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until a signal comes."""
+    require_extra("people")
+    from experiments.people.phases import phases_of_study
+    from experiments.people.study_file import read_people_study
+    from experiments.study.simulate import study_path
+
+    study = read_people_study(study_path(arguments.study))
+    phases_of_study(study)  # own ones may be missing
+    check_public_url(arguments.public_url)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    prepare_process()
+    with listen(arguments.host, arguments.port) as listener, locked(arguments.out):
+        from experiments.web.server.pool import WorkerPool
+
+        pool = WorkerPool(study.cells[0].trial(0).house)
+        pool.warm_up()  # in parallel to the film
+        film = _film(study, arguments)
+        asyncio.run(_serve(study, pool, film, listener, arguments))
+    return 0
+
+
+async def _serve(
+    study: "Study",
+    pool: "WorkerPool",
+    film: Path | None,
+    listener: socket.socket,
+    arguments: argparse.Namespace,
+) -> None:
+    import numpy as np
+
+    from experiments.people.phases import phases_of_study
+    from experiments.people.recruitment import recruiter
+    from experiments.people.server.app import Serving, StudyServer
+    from experiments.people.server.procedure import Procedure
+    from experiments.people.store import Store
+    from experiments.web.server.visits import Visits
+
+    url = arguments.database or f"sqlite+aiosqlite:///{(arguments.out / DATABASE).absolute()}"
+    store = await Store.open(url, study.settings.name, study.sha256)
+    visits = Visits(arguments.out.absolute() / VISITS)
+    procedure = Procedure(study, phases_of_study(study), store, visits, np.random.default_rng())
+    serving = Serving(_secret(arguments.out), film, arguments.trusted_proxy)
+    server = StudyServer(procedure, recruiter(study.settings.recruitment), pool, serving)
+    await serve(server.app(arguments.host, arguments.public_url), listener, arguments)
+
+
+def _secret(folder: Path) -> bytes:
+    """The study's secret: of the environment, or a file that is made once."""
+    if text := os.environ.get(SECRET):
+        return text.encode()
+    path = folder / SECRET_FILE
+    if not path.is_file():
+        from mjsim.files import write_text_atomically
+
+        write_text_atomically(path, secrets.token_hex(32) + "\n")
+    return path.read_bytes().strip()
+
+
+def _film(study: "Study", arguments: argparse.Namespace) -> Path | None:
+    """The film that the study shows, made now if there is none."""
+    if FLYTHROUGH not in study.settings.phases:
+        return None
+    if arguments.film is not None:
+        if not arguments.film.is_file():
+            raise ConfigError(f"there is no film {arguments.film}; leave out --film, or name an MP4 file")
+        return Path(arguments.film)
+    path: Path = arguments.out / FILM
+    if not path.is_file():
+        from experiments.cli.flythrough import film_house
+
+        film_house(study.cells[0].trial(0).house, path)
+    return path

@@ -1,0 +1,61 @@
+"""Where people come from: what a platform says about who arrives, and the way back to it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+Leaving = Literal["finished", "screened_out", "no_consent", "withdrawn", "timed_out"]
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Somebody who may take part.
+
+    Attributes:
+        key: The platform's id of the person, by which a second visit is recognised; None where there is none.
+        identity: All ids that paying needs; they never leave the store.
+    """
+
+    key: str | None = None
+    identity: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Preview:
+    """Somebody who looks at the study before accepting it."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A link that does not come from the platform as it should."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class WayBack:
+    """What a person sees at the end: a code, and where to go.
+
+    Attributes:
+        url: Of the platform, or empty.
+        fields: Of a form that is posted there; None for a plain link.
+    """
+
+    code: str = ""
+    url: str = ""
+    fields: Mapping[str, str] | None = None
+
+
+class Recruiter(Protocol):
+    """A platform. `parameters` are the names of what its links carry, which the first page keeps."""
+
+    platform: str
+    parameters: tuple[str, ...]
+
+    def arrive(self, query: Mapping[str, str]) -> Arrival | Preview | Refusal:
+        """Who comes with the query of a link."""
+        ...
+
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
+        """The way back of somebody who leaves."""
+        ...

@@ -1,0 +1,1 @@
+"""The server of a study with people: pages and WebSockets for participants."""

@@ -1,0 +1,346 @@
+"""The server of a study: a welcome, the phases one after the other, the end. Trials are played as in `mjsim play`."""
+
+import asyncio
+import base64
+import hashlib
+import hmac
+import logging
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl
+
+from starlette.applications import Starlette
+from starlette.datastructures import ImmutableMultiDict
+from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
+
+from experiments.people.phases.base import Again, FormData, Page
+from experiments.people.phases.played import Played
+from experiments.people.recruitment.base import Arrival, Leaving, Preview, Recruiter, Refusal
+from experiments.people.server.procedure import Now, Procedure
+from experiments.people.store import Person
+from experiments.people.study_file import CONSENT
+from experiments.web.modules import STATIC
+from experiments.web.server.browser_socket import BrowserSocket
+from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
+from experiments.web.server.limit import SessionLimit
+from experiments.web.server.pages import page
+from experiments.web.server.pool import WorkerPool
+from experiments.web.server.scene_files import scene_route
+from experiments.web.server.sessions import Sessions
+from experiments.web.server.visits import PLAYED, TOKEN, new_token, token_hash
+from mjsim.scene_export.store import scenes_folder
+
+LOG = logging.getLogger("mjsim.study")
+NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s
+BEAT_PERIOD = 60.0  # s between two notes that somebody is still there
+FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
+NEVER = 1e9  # s; as good as for ever
+MAX_FORM = 64 * 1024  # bytes
+MAX_FIELDS = 500
+
+
+@dataclass(frozen=True)
+class Serving:
+    """What a server needs besides the study.
+
+    Attributes:
+        secret: Key from which tokens of people with a platform's id are made.
+        film: Of the house, if the study shows one.
+        proxies: Whose word about the address of a person is believed.
+    """
+
+    secret: bytes
+    film: Path | None = None
+    proxies: tuple[Network, ...] = ()
+
+
+class StudyServer:
+    """Pages and sockets of a study."""
+
+    def __init__(
+        self, procedure: Procedure, recruiter: Recruiter, pool: WorkerPool, serving: Serving
+    ) -> None:
+        self._procedure, self._recruiter, self._serving = procedure, recruiter, serving
+        self._study, self._store = procedure.study, procedure.store
+        limits = self._study.settings.limits
+        self._pool = pool
+        optional = self._study.settings.optional
+        self._minimum = {name: 0.0 if name in optional else NEVER for name in PLAYED}
+        self._sessions = Sessions(pool, SessionLimit(limits.sessions), limits.idle, self._minimum)
+        self._new = Rate(*NEW_PEOPLE)
+        self._locks: dict[str, asyncio.Lock] = {}
+
+    def app(self, host: str, public: str | None = None) -> Starlette:
+        """The ASGI application that listens at `host`; `public` is the URL under which a proxy makes it public."""
+        return Starlette(
+            routes=[
+                Route("/", self._welcome),
+                Route("/begin", self._begin, methods=["POST"]),
+                Route("/play/{token}", self._show),
+                Route("/play/{token}", self._submit, methods=["POST"]),
+                Route("/play/{token}/answers", self._save, methods=["POST"]),
+                Route("/play/{token}/withdrawal", self._ask_to_leave),
+                Route("/play/{token}/withdrawal", self._leave, methods=["POST"]),
+                Route("/play/{token}/film", self._film),
+                Route("/play/{token}/ping", self._ping),
+                WebSocketRoute("/play/{token}", self._play),
+                scene_route(scenes_folder()),
+                Mount("/static", GZipMiddleware(StaticFiles(directory=STATIC))),
+            ],
+            middleware=[
+                Middleware(
+                    TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, public), www_redirect=False
+                ),
+                Middleware(Guards, public=public, proxies=self._serving.proxies, max_body=MAX_FORM),
+            ],
+            exception_handlers={404: self._unknown},
+            lifespan=self._lifespan,
+        )
+
+    @asynccontextmanager
+    async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
+        watching = asyncio.create_task(self._sessions.watch())
+        try:
+            yield
+        finally:
+            watching.cancel()
+            with suppress(asyncio.CancelledError):
+                await watching
+            await self._sessions.release()
+            await self._pool.close()
+            await self._store.close()
+
+    async def _welcome(self, request: Request) -> Response:
+        came = self._recruiter.arrive(request.query_params)
+        if isinstance(came, Refusal):
+            LOG.warning("a link was refused: %s", came.reason)
+            return self._message(request, "unknown", 400)
+        if isinstance(came, Arrival) and came.key is not None:
+            token = self._token(came.key)
+            if await self._store.find(token_hash(token)) is not None:
+                return RedirectResponse(f"/play/{token}", 303)
+        if (closed := await self._closed()) is not None:
+            return self._message(request, closed)
+        given = {name: request.query_params.get(name, "") for name in self._recruiter.parameters}
+        return self._page(
+            request,
+            "welcome",
+            section=self._study.texts["welcome"],
+            parameters=given,
+            remembers=self._recruiter.platform == "link",
+            preview=isinstance(came, Preview),
+        )
+
+    async def _begin(self, request: Request) -> Response:
+        if not self._new.allows(request.client.host if request.client else ""):
+            return self._message(request, "paused", 429)
+        came = self._recruiter.arrive({name: str(value) for name, value in (await _form(request)).items()})
+        if not isinstance(came, Arrival):
+            return self._message(request, "unknown", 400)
+        token = new_token() if came.key is None else self._token(came.key)
+        if await self._store.find(token_hash(token)) is None and (closed := await self._closed()) is not None:
+            return self._message(request, closed)
+        key = None if came.key is None else self._keyed(f"key:{came.key}").hex()
+        person = await self._store.arrive(
+            self._recruiter.platform, key, came.identity, token_hash(token), self._procedure.phases[0].name
+        )
+        LOG.info("person %d arrives", person.id)
+        return RedirectResponse(f"/play/{token}", 303)
+
+    async def _show(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None:
+            return self._message(request, "unknown", 404)
+        return await self._show_phase(request, person)
+
+    async def _submit(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None:
+            return self._message(request, "unknown", 404)
+        form = await _form(request)
+        async with self._lock(person):
+            now = await self._procedure.now(person, request.url.path)
+            refused = await self._procedure.submit(now, str(form.get("phase", "")), form)
+        if refused is not None:
+            return await self._show_phase(request, person, refused)
+        return RedirectResponse(request.url.path, 303)
+
+    async def _save(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None:
+            return Response(status_code=404)
+        form = await _form(request)
+        now = await self._procedure.now(person, request.url.path)
+        await self._procedure.save(now, str(form.get("phase", "")), form)
+        return Response(status_code=204)
+
+    async def _ask_to_leave(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None or not person.active:
+            return self._message(request, "unknown", 404)
+        path = f"/play/{request.path_params['token']}"
+        return self._page(request, "withdrawal", section=self._study.texts["withdrawal"], path=path)
+
+    async def _leave(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None or not person.active:
+            return self._message(request, "unknown", 404)
+        form = await _form(request)
+        async with self._lock(person):
+            await self._sessions.release(lambda session: session.visit.name == person.token_hash)
+            await self._procedure.withdraw(person, delete=form.get("data") == "delete")
+        return RedirectResponse(f"/play/{request.path_params['token']}", 303)
+
+    async def _film(self, request: Request) -> Response:
+        if await self._person(request) is None or self._serving.film is None:
+            return PlainTextResponse("not found\n", 404)
+        return FileResponse(self._serving.film, headers=FILM_HEADERS, media_type="video/mp4")
+
+    async def _ping(self, request: Request) -> Response:  # noqa: ARG002 - only the time counts
+        return Response(status_code=204)
+
+    async def _play(self, socket: WebSocket) -> None:
+        token = socket.path_params["token"]
+        person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
+        visit = None if person is None else await asyncio.to_thread(self._procedure.visits.find, token)
+        if person is None or visit is None or not person.active or visit.phase not in PLAYED:
+            await socket.close(1008)
+            return
+        await socket.accept()
+        beating = asyncio.create_task(self._beat(person))
+        try:
+            await BrowserSocket(socket).serve(self._sessions.of(visit), visit.phase)
+        finally:
+            beating.cancel()
+            with suppress(asyncio.CancelledError):
+                await beating
+
+    async def _beat(self, person: Person) -> None:
+        while True:
+            await self._store.beat(person.id)
+            await asyncio.sleep(BEAT_PERIOD)
+
+    async def _show_phase(self, request: Request, person: Person, refused: Again | None = None) -> Response:
+        async with self._lock(person):
+            now = await self._procedure.now(person, request.url.path)
+            if isinstance(now.phase, Played):
+                return await self._played(request, now)
+        if now.phase is None:
+            return self._left(request, now.person)
+        shown = now.phase.page(now.visitor, refused)
+        if now.number == len(self._procedure.phases):
+            return await self._end(request, now.person, shown)
+        return self._page(request, shown.template, **{**self._around(now), **shown.values})
+
+    def _around(self, now: Now) -> dict[str, Any]:
+        """What the pages of all phases have."""
+        common, name = self._study.texts["common"], now.phase.name if now.phase else ""
+        step = common["step"].replace("{step}", str(now.number))
+        section = self._study.texts.get(name)
+        return {
+            "step": step.replace("{steps}", str(len(self._procedure.phases))),
+            "path": now.visitor.path,
+            "phase": name,
+            "wait": now.wait,
+            "optional": name in self._study.settings.optional,
+            "leave": name != CONSENT,
+            "paragraphs": section.paragraphs() if section else [],
+            "story_title": self._study.texts["story"]["title"],
+        }
+
+    async def _played(self, request: Request, now: Now) -> Response:
+        token = request.path_params["token"]
+        visit = await self._procedure.visit(now.person, token)
+        if visit is None:
+            return self._message(request, "full")
+        settings = visit.settings(visit.phase)
+        return page(
+            request,
+            "play",
+            trial=visit.phase,
+            objects=settings["objects"],
+            draw=settings["draw"],
+            wait=self._minimum[visit.phase],
+            leave=f"{request.url.path}/withdrawal",
+        )
+
+    async def _end(self, request: Request, person: Person, shown: Page) -> Response:
+        back = self._recruiter.way_back("finished", await self._store.identity(person.id))
+        section = self._study.texts["completion"]
+        values = {**shown.values, "paragraphs": section.paragraphs(), "completion": section}
+        return self._page(
+            request, shown.template, **values, code=back.code, back=back.url, fields=back.fields
+        )
+
+    def _left(self, request: Request, person: Person) -> Response:
+        """The last page of somebody who did not finish."""
+        names: Mapping[str, tuple[str, str, Leaving]] = {
+            "no_consent": ("consent", "declined", "no_consent"),
+            "withdrawn": ("withdrawal", "left", "withdrawn"),
+            "screened_out": (person.phase, "failed", "screened_out"),
+        }
+        section, text, how = names.get(person.status, ("welcome", "unknown", "timed_out"))
+        words = self._study.texts[section]
+        back = self._recruiter.way_back(how, {})
+        heading = {"title": words[f"{text}_title"]}
+        return self._page(
+            request,
+            "completion",
+            section=heading,
+            paragraphs=[words[text]],
+            completion=self._study.texts["completion"],
+            code=back.code,
+            back=back.url,
+            fields=back.fields,
+        )
+
+    def _message(self, request: Request, name: str, status: int = 200) -> Response:
+        words = self._study.texts["welcome"]
+        heading = {"title": words[f"{name}_title"]}
+        return self._page(request, "study", status, section=heading, paragraphs=[words[name]])
+
+    async def _unknown(self, request: Request, _: Exception) -> Response:
+        return self._message(request, "unknown", 404)
+
+    def _page(self, request: Request, template: str, status: int = 200, **values: Any) -> Response:
+        section: Any = values.get("section")
+        if "paragraphs" not in values:
+            values["paragraphs"] = section.paragraphs()
+        return page(request, template, status, common=self._study.texts["common"], **values)
+
+    async def _closed(self) -> str | None:
+        """Why nobody new may come: the name of a text; None if people may."""
+        state = (await self._store.study()).state
+        return {"open": None, "paused": "paused"}.get(state, "full")
+
+    async def _person(self, request: Request) -> Person | None:
+        token = request.path_params["token"]
+        return await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
+
+    def _lock(self, person: Person) -> asyncio.Lock:
+        """Held while a person's phase is read or changed, so that two pages of one person take turns."""
+        return self._locks.setdefault(person.token_hash, asyncio.Lock())
+
+    def _token(self, key: str) -> str:
+        """The token of a platform's person, the same whenever that person comes."""
+        return base64.urlsafe_b64encode(self._keyed(f"token:{key}")).decode().rstrip("=")
+
+    def _keyed(self, text: str) -> bytes:
+        name = self._study.settings.name
+        return hmac.new(self._serving.secret, f"{name}:{text}".encode(), hashlib.sha256).digest()
+
+
+async def _form(request: Request) -> FormData:
+    """The fields of a form that was sent."""
+    text = (await request.body()).decode("utf-8", "replace")
+    return ImmutableMultiDict(parse_qsl(text, keep_blank_values=True, max_num_fields=MAX_FIELDS))

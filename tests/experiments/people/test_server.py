@@ -1,0 +1,208 @@
+"""A study served to people: pages in order, nothing lost, repeated or skipped; trials by a scripted worker."""
+
+import dataclasses
+import re
+from contextlib import contextmanager
+
+import msgspec
+import numpy as np
+import pytest
+from scripted_workers import ORIGIN, ScriptedPool, connected, play_trial, started, until
+from starlette.testclient import TestClient
+
+from experiments.people.phases import phases_of_study
+from experiments.people.recruitment import recruiter
+from experiments.people.server.app import Serving, StudyServer
+from experiments.people.server.procedure import Procedure
+from experiments.people.store import Store
+from experiments.people.study_file import read_people_study
+from experiments.study.designs import FOLDER
+from experiments.web.server.visits import Visits
+
+DEVICE = {"frames_per_s": "60", "latency_ms": "40", "width": "1280", "height": "720", "pixel_ratio": "1"}
+DEVICE |= {"keyboard": "yes", "webgl": "yes", "renderer": "a card"}
+
+
+@pytest.fixture
+def study():
+    study = read_people_study(FOLDER / "paper.toml")
+    return dataclasses.replace(study, settings=msgspec.structs.replace(study.settings, minimum={}))
+
+
+class MadeInItsLoop:
+    """An application that is made in the event loop in which it runs, as its database has to be."""
+
+    def __init__(self, make):
+        self._make, self._app = make, None
+
+    async def __call__(self, scope, receive, send):
+        self._app = self._app or await self._make()
+        await self._app(scope, receive, send)
+
+
+@contextmanager
+def serving(folder, study):
+    film = folder / "film.mp4"
+    film.write_bytes(b"a film")
+
+    async def make():
+        store = await Store.open(f"sqlite:///{folder / 'study.db'}", "study", "0" * 64)
+        visits, rng = Visits(folder / "visits"), np.random.default_rng(0)
+        procedure = Procedure(study, phases_of_study(study), store, visits, rng)
+        came_from = recruiter(study.settings.recruitment)
+        return StudyServer(procedure, came_from, ScriptedPool(), Serving(b"secret", film)).app("127.0.0.1")
+
+    with TestClient(MadeInItsLoop(make), base_url=ORIGIN, follow_redirects=False) as client:
+        yield client
+
+
+@pytest.fixture
+def client(tmp_path, study):
+    with serving(tmp_path, study) as client:
+        yield client
+
+
+def post(client, path, **data):
+    return client.post(path, data=data, headers={"Origin": ORIGIN})
+
+
+def begin(client):
+    answer = post(client, "/begin")
+    assert answer.status_code == 303
+    return answer.headers["location"]
+
+
+def phase(client, link):
+    """Name of the phase whose page is shown; None where there is none."""
+    found = re.search(r'name="phase" value="(\w+)"|data-trial="(\w+)"', client.get(link).text)
+    return next(name for name in found.groups() if name) if found else None
+
+
+def right_answers(study):
+    return {item.name: item.right for item in study.texts["comprehension"].items}
+
+
+def survey_answers(study):
+    return {item.name: "4" for item in study.texts["survey"].items if item.kind == "scale"}
+
+
+def go_to(client, link, study, wanted):
+    """Go through the phases until the wanted one is shown."""
+    sent = {
+        "consent": {"agree": "yes"},
+        "device": DEVICE,
+        "story": {},
+        "flythrough": {},
+        "comprehension": right_answers(study),
+        "survey": survey_answers(study),
+        "debriefing": {},
+    }
+    while (now := phase(client, link)) != wanted:
+        assert now is not None, f"the study ended before {wanted}"
+        if now in sent:
+            assert post(client, link, phase=now, **sent[now]).status_code == 303
+        else:
+            play_trial(client, link, now)
+
+
+def test_a_person_goes_through_all_phases_in_order(client, study):
+    assert "7.50 USD" in client.get("/").text
+    link, seen = begin(client), []
+    for name in study.settings.phases[:-1]:
+        go_to(client, link, study, name)
+        seen.append(phase(client, link))
+    assert seen == list(study.settings.phases[:-1])
+    go_to(client, link, study, None)
+    assert "Thank you" in client.get(link).text
+    assert client.get(link).text == client.get(link).text  # it stays
+
+
+def test_reload_back_and_double_submit_change_nothing(client, study):
+    link = begin(client)
+    go_to(client, link, study, "story")
+    assert phase(client, link) == phase(client, link) == "story"
+    for _ in range(2):  # a double click, and the form of a page before
+        assert post(client, link, phase="story").status_code == 303
+    assert post(client, link, phase="consent", agree="no").status_code == 303
+    assert phase(client, link) == "flythrough"
+
+
+def test_who_does_not_agree_leaves_and_cannot_come_back(client):
+    link = begin(client)
+    post(client, link, phase="consent", agree="no")
+    assert "You did not agree" in client.get(link).text
+    post(client, link, phase="consent", agree="yes")
+    assert phase(client, link) is None
+
+
+def test_three_wrong_comprehension_checks_end_the_study(client, study):
+    link = begin(client)
+    go_to(client, link, study, "comprehension")
+    wrong = {**right_answers(study), "hands": "One"}
+    for _ in range(2):
+        assert "Not all answers are right" in post(client, link, phase="comprehension", **wrong).text
+        assert phase(client, link) == "comprehension"
+    post(client, link, phase="comprehension", **wrong)
+    assert phase(client, link) is None
+    assert "the study ends here" in client.get(link).text
+
+
+def test_answers_are_kept_as_they_are_given(client, study, tmp_path):
+    link = begin(client)
+    go_to(client, link, study, "survey")
+    hostile = "<script>alert(1)</script> '; DROP TABLE person; --"
+    kept = post(client, f"{link}/answers", phase="survey", useful="2", comments=hostile, age="7")
+    assert kept.status_code == 204
+    assert post(client, f"{link}/answers", phase="story", useful="5").status_code == 204  # of another page
+    client.close()
+    with serving(tmp_path, study) as later:  # the server was restarted
+        text = later.get(link).text
+        assert re.search(r'checked[^>]*name="useful"[^>]*value="2"', text)
+        assert "&lt;script&gt;" in text and "<script>alert" not in text
+        refused = post(later, link, phase="survey", useful="2")
+        assert refused.status_code == 200 and "Please answer this question" in refused.text
+        assert phase(later, link) == "survey"
+
+
+def test_a_trial_is_left_only_with_the_study(client, study):
+    link = begin(client)
+    go_to(client, link, study, "training")
+    assert f'data-leave="{link}/withdrawal"' in client.get(link).text
+    with connected(client, link) as socket:
+        started(socket, "training")
+        socket.send_json({"type": "leave"})
+        assert until(socket, "error")[-1]["code"] == "too early"
+    assert phase(client, link) == "training"
+
+
+def test_minimum_times_hold(tmp_path, study):
+    slow = dataclasses.replace(
+        study, settings=msgspec.structs.replace(study.settings, minimum={"consent": 60})
+    )
+    with serving(tmp_path, slow) as client:
+        link = begin(client)
+        assert "take the time" in post(client, link, phase="consent", agree="yes").text
+        assert phase(client, link) == "consent"
+
+
+def test_leaving_deletes_what_was_played_if_wanted(client, study, tmp_path):
+    for data, left in (("keep", 1), ("delete", 0)):
+        link = begin(client)
+        go_to(client, link, study, "survey")
+        before = len(list((tmp_path / "visits").iterdir()))
+        assert "Leave the study?" in client.get(f"{link}/withdrawal").text
+        post(client, f"{link}/withdrawal", data=data)
+        assert "You have left the study" in client.get(link).text
+        assert len(list((tmp_path / "visits").iterdir())) == before - 1 + left
+
+
+def test_strangers_get_nothing(client, study):
+    link = begin(client)
+    other = "/play/" + "x" * 43
+    for path in (other, f"{other}/film", f"{other}/withdrawal", "/play/short", "/nothing"):
+        assert client.get(path).status_code == 404
+    assert (
+        client.post(link, data={"phase": "consent", "agree": "yes"}).status_code == 403
+    )  # from another site
+    assert phase(client, link) == "consent"
+    assert study.settings.contact in client.get(link).text
