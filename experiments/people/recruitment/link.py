@@ -13,7 +13,7 @@ class OpenLink:
         code: Shown at the end; empty for none.
     """
 
-    parameters = ()
+    parameters: tuple[str, ...] = ()
 
     def __init__(self, platform: str = "link", code: str = "") -> None:
         self.platform, self._code = platform, code
