@@ -57,12 +57,13 @@ def unit_of(width: int, height: int) -> float:
     return min(width / 640.0, height / 480.0)
 
 
-def margins(width: int, height: int) -> tuple[int, int, int]:
-    """Room above, to the left and to the right of a picture, px, in which a frame's lists lie beside it."""
+def margins(width: int, height: int) -> tuple[int, int, int, int]:
+    """Room above, below, to the left and to the right of a picture, px, in which all but messages lie beside it."""
     chips = theme.MARGIN + theme.CHIP_HEIGHT + theme.GAP
     left, right = 2 * theme.MARGIN + theme.MAX_LIST_WIDTH, 2 * theme.MARGIN + theme.BINS_WIDTH_WIDE
-    unit = min(width / (640.0 - left - right), height / (480.0 - chips))  # `unit_of` the whole frame
-    return round(chips * unit), round(left * unit), round(right * unit)
+    hands = theme.GAP + theme.SLOT_HEIGHT + theme.MARGIN
+    unit = min(width / (640.0 - left - right), height / (480.0 - chips - hands))  # `unit_of` the whole frame
+    return round(chips * unit), round(hands * unit), round(left * unit), round(right * unit)
 
 
 def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Layout:

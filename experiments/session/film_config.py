@@ -16,8 +16,8 @@ class FilmConfig:
         width: Of the picture, px.
         height: Of the picture, px.
         profile: Render profile.
-        beside: Whether the lists of the HUD lie beside the picture, as on the page of `mjsim play`: frames are then
-            larger than the picture.
+        beside: Whether lists and hands of the HUD lie beside the picture, as on the page of `mjsim play`: frames are
+            then larger than the picture.
 
     Raises:
         ConfigError: There is no such profile.
@@ -33,19 +33,19 @@ class FilmConfig:
             raise ConfigError(f"no render profile {self.profile!r}; there are {', '.join(PROFILES)}")
 
     @property
-    def margins(self) -> tuple[int, int, int]:
-        """Room above, to the left and to the right of the picture, px; frames of films have even sizes."""
+    def margins(self) -> tuple[int, int, int, int]:
+        """Room above, below, to the left and to the right of the picture, px; frames of films have even sizes."""
         if not self.beside:
-            return 0, 0, 0
+            return 0, 0, 0, 0
         from hud.layout import (
             margins,
         )  # imported late: it takes long, and the command line needs the rest at once
 
-        top, left, right = margins(self.width, self.height)
-        return top + (self.height + top) % 2, left, right + (self.width + left + right) % 2
+        top, below, left, right = margins(self.width, self.height)
+        return top + (self.height + top + below) % 2, below, left, right + (self.width + left + right) % 2
 
     @property
     def frame_size(self) -> tuple[int, int]:
         """Width and height of a frame, px."""
-        top, left, right = self.margins
-        return left + self.width + right, top + self.height
+        top, below, left, right = self.margins
+        return left + self.width + right, top + self.height + below

@@ -72,8 +72,8 @@ class FirstPersonRenderer:
             self._compositor = Compositor(self._pictures)
         picture = self._renderer.rgb(data, markers=state.markers)
         if self._film.beside:
-            top, left, right = self._film.margins
-            picture = np.pad(picture, ((top, 0), (left, right), (0, 0)))
+            top, below, left, right = self._film.margins
+            picture = np.pad(picture, ((top, below), (left, right), (0, 0)))
         return self._compositor.compose(picture, state)
 
     def close(self) -> None:

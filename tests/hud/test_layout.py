@@ -113,10 +113,10 @@ def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(state, siz
 @given(states(), st.integers(240, 1200), st.floats(1.0, 2.4))
 def test_lists_lie_beside_a_picture_with_margins(state, height, aspect):
     width = round(height * aspect)
-    top, left, right = margins(width, height)
-    found = layout(state, (left + width + right, top + height))
+    top, below, left, right = margins(width, height)
+    found = layout(state, (left + width + right, top + height + below))
     picture = Rect(left, top, width, height)
-    beside = {"checklist", "bins", "progress", "clock", "minimap"}
+    beside = {"checklist", "bins", "progress", "clock", "inventory", "minimap"}
     for name in beside & found.panels.keys():
         assert not overlap(found.panels[name], picture), name
 

@@ -22,6 +22,7 @@ export class DrawnView {
   headset = null;
   world;
   #flush;
+  #house = { path: "", loaded: Promise.resolve() };
   /** @type {Scene | null} */
   #scene = null;
   /** @type {Walker | null} */
@@ -54,19 +55,23 @@ export class DrawnView {
     return this.#body[2] ?? 0;
   }
 
-  /** Loads a house; a page that reconnects has it. @param {Scene} message */
+  /** Loads a house; a page that reconnects, or has another size, has it or is loading it. @param {Scene} message */
   async load(message) {
     const { path } = message;
     if (path === null) throw new Error("the server has no files of it");
-    if (this.#scene?.path !== path) {
-      const { objects } = await this.world.load((name) => path + name);
-      this.world.loadModels(Object.keys(objects)); // now, so that an object that comes into view is there
-    }
+    if (this.#house.path !== path) this.#house = { path, loaded: this.#loadHouse(path) };
+    await this.#house.loaded;
     const floor = message.floor === null ? null : await fetch(message.floor);
     if (floor && !floor.ok) throw new Error(`${message.floor}: ${floor.status}`);
     this.#walker = floor && new Walker(message.gait, await floor.json());
     this.world.setFieldOfView(message.field_of_view);
     this.#scene = message;
+  }
+
+  /** @param {string} path */
+  async #loadHouse(path) {
+    const { objects } = await this.world.load((name) => path + name);
+    this.world.loadModels(Object.keys(objects)); // now, so that an object that comes into view is there
   }
 
   /** The clock runs from now on. @param {number} now ms */

@@ -13,8 +13,8 @@ const RESIZED = 300; // ms after which a new size of the page is told
  * @property {() => void} resized once the size stays
  */
 
-/** @param {Reactions} on */
-export function watchPage(on) {
+/** @param {HTMLElement} view whose size counts, also where text around it grows @param {Reactions} on */
+export function watchPage(view, on) {
   let hidden = 0;
   document.addEventListener("visibilitychange", () => {
     clearTimeout(hidden);
@@ -29,9 +29,11 @@ export function watchPage(on) {
   window.addEventListener("focus", () => on.blur(false));
   window.addEventListener("pagehide", on.close);
   let resized = 0;
-  window.addEventListener("resize", () => {
+  const resize = () => {
     on.resize();
     clearTimeout(resized);
     resized = window.setTimeout(on.resized, RESIZED);
-  });
+  };
+  window.addEventListener("resize", resize); // also where the screen has other pixels
+  new ResizeObserver(resize).observe(view);
 }

@@ -27,6 +27,7 @@ export class Picture {
   #wanted;
   #events;
   #screen;
+  #told = { width: 0, height: 0 }; // px
   /** @type {Codec} */
   #codec = "jpeg";
   #frame = ""; // what the last frame was
@@ -45,7 +46,7 @@ export class Picture {
       },
       () => {
         this.#codec = "jpeg";
-        this.tellSize();
+        this.#sendView();
       },
     );
   }
@@ -67,9 +68,10 @@ export class Picture {
     }
   }
 
-  /** @returns {View} */
+  /** What the server is told. @returns {View} */
   get view() {
-    return { type: "view", ...this.#screen.size, codec: this.drawn ? "none" : this.#codec };
+    this.#told = this.#screen.size;
+    return { type: "view", ...this.#told, codec: this.drawn ? "none" : this.#codec };
   }
 
   /** What draws, in words; empty before there is anything to see. */
@@ -139,11 +141,16 @@ export class Picture {
     this.drawn = null;
     this.#show(false);
     this.#events.send({ type: "draw", draw: "server", reason });
-    this.tellSize();
+    this.#sendView();
   }
 
-  /** Tells the server in which size it draws, and whether it does. */
+  /** The server has to know the size, if it has changed. */
   tellSize() {
+    const { width, height } = this.#screen.size;
+    if (width !== this.#told.width || height !== this.#told.height) this.#sendView();
+  }
+
+  #sendView() {
     this.#screen.reset();
     this.#events.send(this.view);
   }

@@ -256,7 +256,7 @@ connectKeyboard(bindings, inputs, commands, listens);
 const mouse = connectMouse(canvas, inputs, listens, () => hud.reach);
 connectTouch(canvas, byId("touch", HTMLElement), inputs, listens);
 connectGamepad(inputs, commands, listens);
-watchPage({
+watchPage(canvas, {
   release: () => inputs.release(),
   hidden: () => pause("hidden"),
   blur: (away) => connection.send({ type: "blur", away }),

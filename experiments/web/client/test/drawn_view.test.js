@@ -42,6 +42,13 @@ describe("a view that this browser draws", () => {
     expect(world.loadModels).toHaveBeenCalledWith(["mug"]);
   });
 
+  test("loads a house once, also where it is told again meanwhile", async () => {
+    world.load.mockClear();
+    const other = new DrawnView(/** @type {HTMLCanvasElement} */ ({}), () => {}, () => {});
+    await Promise.all([other.load(SCENE), other.load(SCENE)]);
+    expect(world.load).toHaveBeenCalledTimes(1);
+  });
+
   test("says why there is no floor", async () => {
     vi.stubGlobal("fetch", async () => new Response("", { status: 404 }));
     await expect(view.load(SCENE)).rejects.toThrow("floor.json: 404");

@@ -1,0 +1,168 @@
+"""Pages that tests drive: Chromium by Playwright, stock Firefox by the protocol that it speaks (WebDriver BiDi)."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Error
+from websockets.sync.client import connect
+
+from benchmarks.support.play_server import PATIENCE
+
+FIREFOX = next(
+    (path for path in map(Path, ("/usr/bin/firefox", "/usr/bin/firefox-esr")) if path.is_file()), None
+)
+XVFB = shutil.which("Xvfb")  # without a display, even one like this, Firefox has no WebGL
+KEYS = {"Enter": "\ue007", "Tab": "\ue004", "ArrowLeft": "\ue012", "ArrowRight": "\ue014"}  # of WebDriver
+TRIES = 5
+EVENTS = ["log.entryAdded", "network.beforeRequestSent"]
+
+
+class Page:
+    """A page of any browser.
+
+    Attributes:
+        faults: Errors and warnings of its console.
+        asked: Addresses that it asked for.
+    """
+
+    def __init__(self):
+        self.faults, self.asked = [], []
+
+    def evaluate(self, expression):
+        """Its value; a page that is just being left is asked again."""
+        for _ in range(TRIES):
+            try:
+                return self._evaluate(expression)
+            except (AssertionError, Error):
+                time.sleep(0.2)
+        return self._evaluate(expression)
+
+    def wait_for(self, expression):
+        until = time.monotonic() + PATIENCE
+        while not self.evaluate(f"Boolean({expression})"):
+            assert time.monotonic() < until, f"{expression}: {self.evaluate('document.body.innerText')}"
+            time.sleep(0.1)
+
+
+class Chromium(Page):
+    """A page of Playwright."""
+
+    def __init__(self, page):
+        super().__init__()
+        self._page = page
+        page.set_default_timeout(1000.0 * PATIENCE)
+        page.on("console", lambda line: line.type in ("error", "warning") and self.faults.append(line.text))
+        page.on("pageerror", lambda error: self.faults.append(str(error)))
+        page.on("request", lambda request: self.asked.append(request.url))
+        self.goto, self.reload, self.prepare = page.goto, page.reload, page.add_init_script
+        self._evaluate, self.down, self.up = page.evaluate, page.keyboard.down, page.keyboard.up
+
+    def resize(self, width, height):
+        self._page.set_viewport_size({"width": width, "height": height})
+
+    def picture(self, selector):
+        """PNG of a part of the page, with all that lies over it."""
+        return self._page.locator(selector).screenshot()
+
+    def hold(self, key, seconds=0.05):
+        self._page.keyboard.press(key, delay=1000.0 * seconds)
+
+
+class Firefox(Page):
+    """One tab of a browser that listens at an address."""
+
+    def __init__(self, socket):
+        super().__init__()
+        self._socket, self._count = socket, 0
+        self._ask("session.new", capabilities={})
+        # The first one never has the focus.
+        self._tab = self._ask("browsingContext.create", type="tab")["context"]
+        self._ask("session.subscribe", events=EVENTS, contexts=[self._tab])
+
+    def goto(self, url):
+        self._ask("browsingContext.navigate", context=self._tab, url=url, wait="complete")
+
+    def reload(self):
+        self._ask("browsingContext.reload", context=self._tab, wait="complete")
+
+    def resize(self, width, height):
+        viewport = {"width": width, "height": height}
+        self._ask("browsingContext.setViewport", context=self._tab, viewport=viewport)
+
+    def prepare(self, script):
+        """Run a script in every page before its own."""
+        self._ask("script.addPreloadScript", functionDeclaration=f"() => {{ {script} }}")
+
+    def _evaluate(self, expression):
+        target = {"context": self._tab}
+        answer = self._ask("script.evaluate", expression=expression, target=target, awaitPromise=True)
+        return answer["result"].get("value")
+
+    def down(self, key):
+        self._act({"type": "keyDown", "value": KEYS.get(key, key)})
+
+    def up(self, key):
+        self._act({"type": "keyUp", "value": KEYS.get(key, key)})
+
+    def hold(self, key, seconds=0.05):
+        value = KEYS.get(key, key)
+        pause = {"type": "pause", "duration": round(1000 * seconds)}
+        self._act({"type": "keyDown", "value": value}, pause, {"type": "keyUp", "value": value})
+
+    def _act(self, *actions):
+        keys = [{"type": "key", "id": "keys", "actions": actions}]
+        self._ask("input.performActions", context=self._tab, actions=keys)
+
+    def _ask(self, method, **params):
+        self._count += 1
+        self._socket.send(json.dumps({"id": self._count, "method": method, "params": params}))
+        while (answer := json.loads(self._socket.recv(timeout=PATIENCE))).get("id") != self._count:
+            self._note(answer)
+        assert answer["type"] != "error", f"{method}: {answer['message']}"
+        return answer["result"]
+
+    def _note(self, event):
+        params = event.get("params", {})
+        if event.get("method") == "network.beforeRequestSent":
+            self.asked.append(params["request"]["url"])
+        elif params.get("level") in ("error", "warn"):
+            self.faults.append(params["text"])
+
+
+@contextmanager
+def firefox(profile, screen=None):
+    """A Firefox on a screen, or else without one; `profile` is a new folder."""
+    profile.mkdir()
+    log = profile / "log.txt"
+    words = ["--no-remote", "--remote-debugging-port", "0", "--profile", str(profile)]
+    words += ["--headless"] if screen is None else []
+    variables = {**os.environ, **({} if screen is None else {"DISPLAY": screen})}
+    with (
+        log.open("wb") as output,
+        subprocess.Popen([str(FIREFOX), *words], stdout=output, stderr=output, env=variables) as process,
+    ):
+        until = time.monotonic() + PATIENCE
+        while not (address := re.search(r"BiDi listening on (ws://\S+)", log.read_text())):
+            assert process.poll() is None and time.monotonic() < until, log.read_text()
+            time.sleep(0.1)
+        with connect(f"{address[1]}/session", max_size=None) as socket:
+            yield Firefox(socket)
+            process.terminate()
+
+
+@contextmanager
+def virtual_screen():
+    """A display that nobody sees; its name."""
+    reading, writing = os.pipe()
+    words = [XVFB, "-displayfd", str(writing), "-screen", "0", "1600x1000x24", "-nolisten", "tcp"]
+    with subprocess.Popen(words, pass_fds=[writing], stderr=subprocess.DEVNULL) as process:
+        os.close(writing)
+        with os.fdopen(reading) as numbers:
+            yield f":{numbers.readline().strip()}"
+        process.terminate()

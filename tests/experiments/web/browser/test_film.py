@@ -1,0 +1,51 @@
+"""The film of a session that a browser drew shows what the person's window showed."""
+
+import time
+
+import av
+import numpy as np
+import pytest
+
+from benchmarks.play import FAST
+from benchmarks.support.play_server import PlayProcess
+from experiments.record.reader import read_run
+from experiments.replay.replay import ReplayFilm, as_seen, replay
+from tests.experiments.web.browser.key_presser import choose
+from tools.drawn_pairs import decoded, ssim
+
+LEAST = 0.95  # SSIM, as of the pairs of pictures
+STILL = 6.0  # s after which messages have faded, and the page has told its size
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "height"), [(1280, 720), (800, 600)])
+def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, height):
+    page = chromium_page
+    page.resize(width, height)
+    with PlayProcess(tmp_path / "visits", "--objects", "6", "--assistance", "optimal", *FAST) as server:
+        page.goto(server.url)
+        page.hold("Enter")  # the button has the focus
+        page.wait_for("location.pathname.startsWith('/play/')")
+        address = page.evaluate("location.href")
+        page.goto(f"{address}?draw=browser")
+        choose(page, "Skip the training")
+        choose(page, "Start")
+        page.wait_for("document.querySelectorAll('#list li').length > 0")
+        time.sleep(STILL)  # where the episode begins, so that every run of this test compares the same
+        seen = decoded(page.picture("#world"))
+        page.hold("p")
+        page.wait_for("document.getElementById('panel-title').textContent === 'Paused'")
+        page.evaluate("document.getElementById('end-button').click()")
+        choose(page, "End the task")
+        page.wait_for("document.querySelector('h1').textContent === 'Your result'")
+        run = server.visit(address) / "task"
+    film = tmp_path / "film.mp4"
+    replay(run, film=ReplayFilm(film, None))
+    config = as_seen(read_run(run), "fast")
+    assert seen.shape == (config.height, config.width, 3), "the film has the shape of the view"
+    with av.open(str(film)) as video:
+        *_, last = video.decode(video=0)
+    top, _, left, _ = config.margins
+    frame = last.to_ndarray(format="rgb24")[top : top + config.height, left : left + config.width]
+    np.savez(tmp_path / "pictures.npz", seen=seen, frame=frame)  # to be looked at
+    assert ssim(seen, frame) >= LEAST
