@@ -1,6 +1,7 @@
 """The database of a study with people. Nothing outside of this package speaks to the database."""
 
 from experiments.people.store.choice import choose
+from experiments.people.store.copies import restore
 from experiments.people.store.ledger import Ledger
 from experiments.people.store.store import Store
 from experiments.people.store.values import (
@@ -14,6 +15,8 @@ from experiments.people.store.values import (
     PaymentKind,
     Person,
     PhaseRow,
+    Researcher,
+    Role,
     Rule,
     Status,
     StudyRow,
@@ -34,6 +37,8 @@ __all__ = [
     "PaymentKind",
     "Person",
     "PhaseRow",
+    "Researcher",
+    "Role",
     "Rule",
     "Status",
     "Store",
@@ -41,5 +46,6 @@ __all__ = [
     "StudyState",
     "TrialRow",
     "choose",
+    "restore",
     "utc_now",
 ]

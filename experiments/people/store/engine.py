@@ -7,12 +7,12 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from sqlalchemy import URL, Connection, event, make_url
+from sqlalchemy import URL, Connection, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
 
 from experiments.errors import StoreError
-from experiments.people.store.failures import advice, passes
+from experiments.people.store.failures import advice, damaged, passes
 
 T = TypeVar("T")
 
@@ -60,9 +60,37 @@ class Database:
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncConnection]:
-        """A connection to read from; what is read is of one moment in SQLite and PostgreSQL."""
+        """A connection to read from."""
+        async with self._connection() as connection:
+            yield connection
+
+    @asynccontextmanager
+    async def snapshot(self) -> AsyncIterator[AsyncConnection]:
+        """A connection to read from, which sees everything as of one moment; SQLite does so always."""
+        options = {} if self._sqlite else {"isolation_level": "REPEATABLE READ"}
+        async with self._connection(**options) as connection:
+            yield connection
+
+    async def empty_log(self) -> None:
+        """Move what SQLite has in its log into the file, so that nothing that was deleted is left there."""
+        if self._sqlite:
+            async with self._alone(), self._connection(begin="") as connection:
+                await connection.execute(text("PRAGMA wal_checkpoint(TRUNCATE)"))
+
+    async def check(self) -> None:
+        """Raise StoreError if the file of a SQLite database is damaged."""
+        if self._sqlite:
+            async with self._connection(begin="") as connection:
+                found = (await connection.execute(text("PRAGMA integrity_check(1)"))).scalar()
+            if found != "ok":
+                raise StoreError(damaged(self.name))
+
+    @asynccontextmanager
+    async def _connection(self, **options: Any) -> AsyncIterator[AsyncConnection]:
         try:
             async with self._engine.connect() as connection:
+                if options:
+                    await connection.execution_options(**options)
                 yield connection
         except SQLAlchemyError as error:
             raise StoreError(advice(error, self.name)) from error
@@ -86,7 +114,7 @@ class Database:
 
     async def _transaction(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
         async with self._alone(), self._engine.connect() as connection:
-            await connection.execution_options(writes=True)
+            await connection.execution_options(begin="BEGIN IMMEDIATE")
             result = await work(connection)
             try:
                 await connection.commit()
@@ -120,6 +148,10 @@ def _engine(url: URL) -> AsyncEngine:
     if url.get_backend_name() == "sqlite":
         if not url.database or url.database == ":memory:":
             raise StoreError("A study's database must be kept: name a file, as in sqlite:///study.db.")
+        if not Path(url.database).parent.is_dir():
+            raise StoreError(
+                f"There is no folder {Path(url.database).parent} for the database: make it first."
+            )
         engine = create_async_engine(url, connect_args={"timeout": PATIENCE_S})
         event.listen(engine.sync_engine, "connect", _prepare)
         event.listen(engine.sync_engine, "begin", _begin)
@@ -140,15 +172,10 @@ def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
 
 def _begin(connection: Connection) -> None:
     """A transaction that will write takes the lock at once: one that reads first might have to give up later."""
-    writes = connection.get_execution_options().get("writes", False)
-    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+    if statement := connection.get_execution_options().get("begin", "BEGIN"):
+        connection.exec_driver_sql(statement)
 
 
 def _again(error: SQLAlchemyError, attempt: int) -> bool:
     """Whether the same work may succeed now; after a conflict of two writers it does at the second try."""
     return passes(error) or (isinstance(error, IntegrityError) and attempt == 1)
-
-
-def sqlite_file(url: URL) -> Path | None:
-    """The file of a SQLite database, None for others."""
-    return Path(url.database) if url.get_backend_name() == "sqlite" and url.database else None

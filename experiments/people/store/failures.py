@@ -2,6 +2,7 @@
 
 from sqlalchemy.exc import DBAPIError, IntegrityError, SQLAlchemyError, TimeoutError
 
+DAMAGED = "is damaged: restore the last backup with `mjsim study restore`."
 PASSING = {
     "1205",  # MariaDB: waited too long for a lock
     "1213",  # MariaDB: deadlock
@@ -16,10 +17,7 @@ MEANINGS = (
         ("1021", "1114", "53100", "disk is full"),
         "has no space left: free some, nothing saved so far is lost.",
     ),
-    (
-        ("not a database", "malformed", "disk image"),
-        "is damaged: restore the last backup with `mjsim study restore`.",
-    ),
+    (("not a database", "disk image is malformed"), DAMAGED),
     (("database is locked",), "is locked by another program for too long: close it, then try again."),
     (("readonly database",), "cannot be written: check the rights of the file and its folder."),
     (("unable to open",), "cannot be opened: check that its folder exists and can be written."),
@@ -50,6 +48,11 @@ def advice(error: SQLAlchemyError, database: str) -> str:
     if isinstance(error, DBAPIError) and (error.connection_invalidated or _unreachable(text)):
         return f"The database {database} cannot be reached: check that its server runs. ({text})"
     return f"The database {database} failed: {text}"
+
+
+def damaged(database: str) -> str:
+    """What to do about a damaged file."""
+    return f"The database {database} {DAMAGED}"
 
 
 def _codes(error: SQLAlchemyError) -> set[str]:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any, get_args
 
-from sqlalchemy import insert, select
+from sqlalchemy import ColumnElement, insert, select
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
@@ -84,7 +84,7 @@ class Ledger(Part):
 
         async def work(connection: AsyncConnection) -> int | None:
             events = await self._known(connection, key)
-            if events[-1].in_doubt or _paid(events):
+            if events[-1].in_doubt or paid(events):
                 return None
             attempt = events[-1].attempt + 1
             await self._add(connection, key, attempt, "sending", now, **_same(events[0]))
@@ -99,7 +99,7 @@ class Ledger(Part):
 
         async def work(connection: AsyncConnection) -> bool:
             events = await self._known(connection, key)
-            if _paid(events):
+            if paid(events):
                 return False
             values = {**_same(events[0]), "reference": reference, "note": note}
             await self._add(connection, key, attempt, "confirmed", now, **values)
@@ -131,17 +131,17 @@ class Ledger(Part):
         :meth:`confirm` or :meth:`fail` that attempt.
         """
         limit = (now or utc_now()) - in_doubt_after
-        payments = _by_key(await self.history()).values()
-        unpaid = [events[-1] for events in payments if not _paid(events)]
+        payments = by_key(await self.history()).values()
+        unpaid = [events[-1] for events in payments if not paid(events)]
         return tuple(last for last in unpaid if not last.in_doubt or last.at <= limit)
 
     async def history(self, person_id: int | None = None) -> tuple[PaymentEvent, ...]:
         """Events of a person, or all, in order."""
-        query = select(*_FIELDS).where(payment.c.study_id == self._study_id).order_by(payment.c.id)
+        which = [payment.c.study_id == self._study_id]
         if person_id is not None:
-            query = query.where(payment.c.person_id == person_id)
+            which.append(payment.c.person_id == person_id)
         async with self._database.reading() as connection:
-            return tuple(PaymentEvent(*row) for row in await connection.execute(query))
+            return tuple(await events_of(connection, *which))
 
     async def _known(self, connection: AsyncConnection, key: str) -> Sequence[PaymentEvent]:
         events = await self._events(connection, key)
@@ -152,8 +152,7 @@ class Ledger(Part):
     async def _events(self, connection: AsyncConnection, key: str) -> Sequence[PaymentEvent]:
         """Events of a key; nobody adds any until the transaction ends."""
         await lock_study(connection, self._study_id)
-        query = select(*_FIELDS).where(payment.c.study_id == self._study_id, payment.c.key == key)
-        return [PaymentEvent(*row) for row in await connection.execute(query.order_by(payment.c.id))]
+        return await events_of(connection, payment.c.study_id == self._study_id, payment.c.key == key)
 
     async def _check_person(self, connection: AsyncConnection, person_id: int, kind: PaymentKind) -> None:
         known = select(person.c.id).where(person.c.id == person_id, person.c.study_id == self._study_id)
@@ -205,12 +204,20 @@ def _same(event: PaymentEvent) -> dict[str, Any]:
     }
 
 
-def _by_key(events: Sequence[PaymentEvent]) -> dict[str, list[PaymentEvent]]:
+async def events_of(connection: AsyncConnection, *which: ColumnElement[bool]) -> Sequence[PaymentEvent]:
+    """Some events, in order."""
+    query = select(*_FIELDS).where(*which).order_by(payment.c.id)
+    return [PaymentEvent(*row) for row in await connection.execute(query)]
+
+
+def by_key(events: Sequence[PaymentEvent]) -> dict[str, list[PaymentEvent]]:
+    """The events of each payment."""
     found: dict[str, list[PaymentEvent]] = {}
     for event in events:
         found.setdefault(event.key, []).append(event)
     return found
 
 
-def _paid(events: Sequence[PaymentEvent]) -> bool:
+def paid(events: Sequence[PaymentEvent]) -> bool:
+    """Whether the platform is known to have paid."""
     return any(event.event == "confirmed" for event in events)

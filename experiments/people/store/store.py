@@ -2,36 +2,42 @@
 
 from collections.abc import Mapping
 from datetime import datetime
+from pathlib import Path
 from typing import Any, Self
 
 from sqlalchemy import insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store.assignments import Assignments
+from experiments.people.store.copies import back_up
 from experiments.people.store.endings import Endings
 from experiments.people.store.engine import Database
+from experiments.people.store.erasure import Erasure
 from experiments.people.store.ledger import Ledger
 from experiments.people.store.part import new_id, note
 from experiments.people.store.people import People
 from experiments.people.store.phases import Phases
+from experiments.people.store.researchers import Researchers
 from experiments.people.store.tables import audit, study
 from experiments.people.store.upgrade import upgrade
 from experiments.people.store.values import AuditRow, StudyRow, StudyState, utc_now
 
 
-class Store(People, Assignments, Phases, Endings):
+class Store(People, Assignments, Phases, Endings, Erasure):
     """The database of one study. What a method has returned from is on the disk.
 
     Every method raises :class:`~experiments.errors.StoreError` where the database cannot do it.
 
     Attributes:
         ledger: What people are paid.
+        researchers: Who may see the researcher's page; the same for all studies of a database.
     """
 
     def __init__(self, database: Database, study_id: int) -> None:
         """See :meth:`open`."""
         super().__init__(database, study_id)
         self.ledger = Ledger(database, study_id)
+        self.researchers = Researchers(database)
 
     @classmethod
     async def open(cls, url: str, study_name: str, file_hash: str) -> Self:
@@ -53,6 +59,10 @@ class Store(People, Assignments, Phases, Endings):
     async def close(self) -> None:
         """Close all connections."""
         await self._database.close()
+
+    async def backup(self, path: Path) -> None:
+        """Write the whole database, as of one moment, to a new SQLite file; people may go on meanwhile."""
+        await back_up(self._database, path)
 
     async def study(self) -> StudyRow:
         """The study, with its state."""

@@ -10,6 +10,7 @@ StudyState = Literal["open", "paused", "closed"]
 PlaceState = Literal["held", "finished", "released"]
 PaymentKind = Literal["reward", "bonus", "screen_out", "partial", "rejection"]
 PaymentEventName = Literal["decided", "sending", "confirmed", "failed"]
+Role = Literal["owner", "assistant", "viewer"]
 Rule = Literal["uniform", "balanced"]
 
 ACTIVE: tuple[Status, ...] = ("arrived", "assigned")
@@ -184,3 +185,14 @@ class PaymentEvent:
     def in_doubt(self) -> bool:
         """Whether the platform may have paid without our knowing, if this is the last event of its key."""
         return self.event == "sending"
+
+
+@dataclass(frozen=True)
+class Researcher:
+    """Who may see the researcher's page."""
+
+    id: int
+    name: str
+    role: Role
+    created: datetime
+    disabled: bool

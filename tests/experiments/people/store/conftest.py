@@ -12,6 +12,7 @@ from experiments.people.store import Store
 from experiments.people.store.engine import DRIVERS
 
 HASH = "0" * 64
+URLS = {"mariadb": "mysql:", "postgresql": "postgresql:"}
 
 
 @pytest.fixture
@@ -42,8 +43,19 @@ def postgresql():
 )
 def url(request, tmp_path):
     """URL of an empty database."""
+    return _new_database(request, tmp_path / "study.db")
+
+
+@pytest.fixture
+def other_url(request, tmp_path, url):
+    """URL of another empty database, on the same server."""
+    request.param = next((kind for kind in SERVERS if url.startswith(URLS[kind])), "sqlite")
+    return _new_database(request, tmp_path / "other.db")
+
+
+def _new_database(request, file):
     if request.param == "sqlite":
-        return f"sqlite:///{tmp_path}/study.db"
+        return f"sqlite:///{file}"
     server = request.getfixturevalue(request.param)
     name = f"study_{uuid.uuid4().hex}"
     asyncio.run(_create(server, name))

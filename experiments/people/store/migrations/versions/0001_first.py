@@ -110,7 +110,7 @@ def _progress() -> None:
         _text("name", 100),
         _column("shown", TIME),
         _column("ended", TIME, null=True),
-        _column("duration_s", sa.Float(53), null=True),
+        _column("duration_s", sa.Double, null=True),
         _column("attempts", sa.Integer, null=True),
         _text("reason", 100, null=True),
         _unique("phase", "person_id", "name"),

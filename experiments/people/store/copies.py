@@ -1,0 +1,99 @@
+"""Backups: one SQLite file whatever the database is, so that restoring may move a study to another kind."""
+
+import os
+import shutil
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from sqlalchemy import func, insert, select, text
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.people.store.engine import Database
+from experiments.people.store.tables import metadata
+from experiments.people.store.upgrade import upgrade
+
+ROWS = 1000  # at a time
+
+
+async def back_up(source: Database, path: Path) -> None:
+    """Write every row, as of one moment, to a new SQLite file, which is there whole or not at all.
+
+    Raises StoreError if the file exists or cannot be written.
+    """
+    if path.exists():
+        raise StoreError(f"{path} is there already: name a new file for the backup.")
+    part = path.with_name(f"{path.name}.part")
+    part.unlink(missing_ok=True)
+    target = Database(f"sqlite:///{part}")
+    try:
+        await upgrade(target)
+        await _copy(source, target)
+    finally:
+        await target.close()
+    with closing(sqlite3.connect(part)) as connection:
+        connection.execute("PRAGMA journal_mode = DELETE")  # no log beside it: the backup is one file
+    with part.open("rb") as file:
+        os.fsync(file.fileno())
+    part.rename(path)
+
+
+async def restore(path: Path, url: str) -> None:
+    """Fill an empty database with a backup.
+
+    Args:
+        path: A file that :meth:`Store.backup` wrote.
+        url: The database, see :meth:`Store.open`.
+
+    Raises:
+        StoreError: The backup is missing or damaged, or the database holds a study already.
+    """
+    if not path.is_file():
+        raise StoreError(f"There is no backup {path}.")
+    with TemporaryDirectory() as folder:  # a backup of an older version is upgraded, and stays as it is
+        copy = shutil.copyfile(path, Path(folder, "backup.db"))
+        source, target = Database(f"sqlite:///{copy}"), Database(url)
+        try:
+            await source.check()
+            await upgrade(source)
+            await upgrade(target)
+            if await _rows(target):
+                raise StoreError(f"The database {target.name} is not empty: restore into a new one.")
+            await _copy(source, target)
+        finally:
+            await source.close()
+            await target.close()
+
+
+async def _rows(database: Database) -> int:
+    async with database.reading() as connection:
+        counts = [
+            (await connection.execute(select(func.count()).select_from(table))).scalar_one()
+            for table in metadata.sorted_tables
+        ]
+    return sum(counts)
+
+
+async def _copy(source: Database, target: Database) -> None:
+    async with source.snapshot() as reading:
+
+        async def work(writing: AsyncConnection) -> None:
+            for table in metadata.sorted_tables:
+                rows: list[dict[str, Any]] = []
+                async for row in await reading.stream(select(table).order_by(table.c.id)):
+                    rows.append(dict(row._mapping))
+                    if len(rows) == ROWS:
+                        await writing.execute(insert(table), rows)
+                        rows = []
+                if rows:
+                    await writing.execute(insert(table), rows)
+                if target.kind == "postgresql":  # it counts ids apart from the rows
+                    last = f"(SELECT COALESCE(MAX(id), 0) + 1 FROM {table.name})"
+                    await writing.execute(
+                        text(f"SELECT setval(pg_get_serial_sequence('{table.name}', 'id'), {last}, false)")
+                    )
+
+        await target.write(work)

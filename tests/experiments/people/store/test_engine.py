@@ -1,0 +1,198 @@
+"""The database itself: what is acknowledged is on the disk, upgrades keep data, and errors say what to do."""
+
+import asyncio
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import text
+
+from experiments.errors import StoreError
+from experiments.people.store import Store
+from experiments.people.store.engine import Database
+from experiments.people.store.tables import metadata
+from experiments.people.store.upgrade import MIGRATIONS, upgrade
+
+pytestmark = pytest.mark.anyio
+
+LATER = '''
+"""A later form, with one more column."""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "later"
+down_revision = "0001"
+
+
+def upgrade() -> None:
+    op.add_column("person", sa.Column("host", sa.String(100), nullable=False, server_default="here"))
+'''
+
+ACKNOWLEDGE = """
+import asyncio, sys
+from experiments.people.store import Store
+
+async def main():
+    store = await Store.open(sys.argv[1], "pilot", "0" * 64)
+    number = 0
+    while True:
+        person = await store.arrive("link", None, {}, f"{number:064x}", "consent")
+        await store.finish_phase(person.id, "consent", "story", {"number": number})
+        print(number, flush=True)
+        number += 1
+
+asyncio.run(main())
+"""
+
+
+async def run(store, sql, **values):
+    async def work(connection):
+        await connection.execute(text(sql), values)
+
+    await store._database.write(work)
+
+
+async def test_what_is_acknowledged_survives_a_kill(url):
+    command = [sys.executable, "-c", ACKNOWLEDGE, url]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        for line in process.stdout:
+            acknowledged = int(line)
+            if acknowledged == 20:
+                process.kill()
+    store = await Store.open(url, "pilot", "0" * 64)
+    try:
+        answers = {answer.value for answer in await store.answers() if answer.final}
+        assert answers >= set(range(acknowledged + 1))
+        assert all(person.phase in ("story", "consent") for person in await store.people())
+    finally:
+        await store.close()
+
+
+async def test_the_migrations_make_the_tables(store):
+    async with store._database.reading() as connection:
+        difference = await connection.run_sync(
+            lambda sync: compare_metadata(
+                MigrationContext.configure(sync, opts={"compare_type": True}), metadata
+            )
+        )
+    assert difference == []
+
+
+async def test_a_later_form_keeps_what_is_there_and_an_older_program_refuses_it(url, store, arrive, tmp_path):
+    people = [await arrive(number) for number in range(3)]
+    await store.save_answers(people[0].id, "consent", {"age": 30})
+    later = shutil.copytree(MIGRATIONS, tmp_path / "migrations")
+    (later / "versions" / "0002_later.py").write_text(LATER)
+    await upgrade(store._database, later)
+    await upgrade(store._database, later)
+    assert [person.token_hash for person in await store.people()] == [person.token_hash for person in people]
+    assert len(await store.answers()) == 1
+    async with store._database.reading() as connection:
+        assert (await connection.execute(text("SELECT host FROM person"))).scalars().all() == ["here"] * 3
+    with pytest.raises(StoreError, match="newer mjsim"):
+        await Store.open(url, "pilot", "0" * 64)
+
+
+async def test_an_upgrade_that_was_interrupted_goes_on(url):
+    """MariaDB commits each table by itself."""
+    store = await Store.open(url, "pilot", "0" * 64)
+    await run(store, "DROP TABLE login")
+    await run(store, "DELETE FROM alembic_version")
+    await store.close()
+    store = await Store.open(url, "pilot", "0" * 64)
+    assert await store.researchers.who("a" * 64) is None
+    await store.close()
+
+
+async def test_two_processes_that_start_at_once_make_one_study(url):
+    stores = await asyncio.gather(*(Store.open(url, "pilot", "0" * 64) for _ in range(4)))
+    assert len({(await store.study()).id for store in stores}) == 1
+    for store in stores:
+        await store.close()
+
+
+async def test_a_changed_study_file_is_noted(store, url):
+    again = await Store.open(url, "pilot", "1" * 64)
+    await again.close()
+    [entry] = await store.audit_log()
+    assert (entry.action, entry.details) == ("study file changed", {"before": "0" * 64, "now": "1" * 64})
+    assert (await store.study()).file_hash == "1" * 64
+
+
+async def test_a_database_holds_several_studies(store, url, arrive):
+    person = await arrive(1, key="a" * 64)
+    other = await Store.open(url, "second", "0" * 64)
+    try:
+        assert await other.people() == ()
+        assert not (await other.arrive("link", "a" * 64, {}, f"{2:064x}", "consent")).returning
+        assert await other.find(person.token_hash) is None
+        assert len(await store.people()) == 1
+    finally:
+        await other.close()
+
+
+async def test_the_state_of_a_study_and_who_changed_it(store):
+    assert (await store.study()).state == "open"
+    await store.set_state("paused", "ada")
+    await store.audit("ada", "looked at a session", {"person": 3})
+    assert (await store.study()).state == "paused"
+    assert [(entry.who, entry.action) for entry in await store.audit_log()] == [
+        ("ada", "study paused"),
+        ("ada", "looked at a session"),
+    ]
+
+
+async def test_tables_of_another_program_are_left_alone(url):
+    database = Database(url)
+
+    async def work(connection):
+        await connection.execute(text("CREATE TABLE person (id INTEGER)"))
+
+    await database.write(work)
+    await database.close()
+    with pytest.raises(StoreError, match="another program"):
+        await Store.open(url, "pilot", "0" * 64)
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("oracle://here", "'oracle' begins no database URL"),
+        ("study.db", "begins no database URL"),
+        ("sqlite://", "name a file"),
+        ("sqlite:////nowhere/at/all/study.db", "make it first"),
+        ("postgresql://me:secret@127.0.0.1:9/study", "cannot be reached"),
+        ("mysql://me:secret@127.0.0.1:9/study", "cannot be reached"),
+    ],
+)
+async def test_errors_say_what_to_do_and_no_password(url, message):
+    with pytest.raises(StoreError, match=message) as caught:
+        await Store.open(url, "pilot", "0" * 64)
+    assert "secret" not in str(caught.value)
+
+
+async def test_a_damaged_file_is_named(tmp_path):
+    (tmp_path / "study.db").write_bytes(b"no database at all, but long enough" * 100)
+    with pytest.raises(StoreError, match="damaged: restore"):
+        await Store.open(f"sqlite:///{tmp_path}/study.db", "pilot", "0" * 64)
+
+
+async def test_a_full_disk_is_named_and_takes_nothing_back(tmp_path):
+    store = await Store.open(f"sqlite:///{tmp_path}/study.db", "pilot", "0" * 64)
+    try:
+        person = await store.arrive("link", None, {}, "a" * 64, "consent")
+        await store.save_answers(person.id, "consent", {"kept": 1})
+        async with store._database.reading() as connection:
+            pages = (await connection.execute(text("PRAGMA page_count"))).scalar()
+        await run(store, f"PRAGMA max_page_count = {pages}")
+        with pytest.raises(StoreError, match="no space left"):
+            await store.save_answers(person.id, "consent", {"lost": "x" * 1_000_000})
+        assert [answer.item for answer in await store.answers()] == ["kept"]
+    finally:
+        await store.close()
+    assert Path(tmp_path / "study.db").is_file()
