@@ -9,6 +9,7 @@ from experiments.cli.requirements import add_checkout_command
 # A module each, with `add_parser(commands)`; those outside the wheel need a checkout.
 SUBCOMMANDS = {
     "serve": "experiments.cli.study.serve",
+    "collect": "experiments.cli.study.collect",
     "preregister": "experiments.cli.study.preregister",
     "simulate": "experiments.cli.study.simulate",
     "controls": "studies.commands.controls",

@@ -18,6 +18,7 @@ from experiments.cli.server import (
     prepare_process,
     serve,
 )
+from experiments.cli.study.database import DATABASE, add_database
 from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:  # imported when the command runs, so that other commands star
     from experiments.people.study_file import Study
     from experiments.web.server.pool import WorkerPool
 
-DATABASE, SECRET_FILE, FILM, VISITS = "study.db", "secret", "flythrough.mp4", "visits"
+SECRET_FILE, FILM, VISITS = "secret", "flythrough.mp4", "visits"
 SECRET = "MJSIM_STUDY_SECRET"
 DESCRIPTION = f"""\
 Serve a study with people: consent, a check of the computer, the story, a film of the house, questions about the task,
@@ -42,11 +43,7 @@ def add_parser(commands: Any) -> None:
     parser = add_command(commands, "serve", run, summary="serve a study with people", description=DESCRIPTION)
     parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the study")
-    parser.add_argument(
-        "--database",
-        metavar="URL",
-        help="database of people and answers (default: SQLite in --out), such as postgresql+psycopg://user@host/name",
-    )
+    add_database(parser)
     parser.add_argument(
         "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: made once)"
     )
@@ -91,7 +88,7 @@ async def _serve(
     from experiments.people.store import Store
     from experiments.web.server.visits import Visits
 
-    url = arguments.database or f"sqlite+aiosqlite:///{(arguments.out / DATABASE).absolute()}"
+    url = arguments.database or f"sqlite:///{(arguments.out / DATABASE).absolute()}"
     store = await Store.open(url, study.settings.name, study.sha256)
     visits = Visits(arguments.out.absolute() / VISITS)
     procedure = Procedure(study, phases_of_study(study), store, visits, np.random.default_rng())

@@ -1,0 +1,73 @@
+"""`mjsim study collect`: the tidy table of a study with people."""
+
+import argparse
+import asyncio
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.cli.options import add_command, add_force
+from experiments.cli.requirements import require_extra
+from experiments.cli.study.database import add_database, database_url
+from experiments.errors import RecordError
+from experiments.trials.design import counted
+
+if TYPE_CHECKING:
+    from experiments.people.collect import Collected
+    from experiments.people.study_file import Study
+
+DESCRIPTION = """\
+Write what the people of a study did and answered as a tidy table, a row for each whose task is over: OUT/trials.parquet
+and OUT/trials.csv, which `mjsim study analyze`, `compare` and `score` read, and OUT/texts.csv with what people wrote
+freely. Answers on a scale are columns likert_NAME, others answer_NAME. No id of a platform and no address is in them.
+
+DIR is the folder of `mjsim study serve`, which may run meanwhile. The folder of `mjsim play` needs no collecting:
+`mjsim study analyze` reads it as it is."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands, "collect", run, summary="the tidy table of a study with people", description=DESCRIPTION
+    )
+    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the study")
+    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder of the table")
+    add_database(parser)
+    add_force(parser, "replace tables that exist")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Collect; 1 if a run cannot be used."""
+    require_extra("people")
+    from experiments.people.collect import TEXTS, write_collected
+    from experiments.people.study_file import read_people_study
+    from experiments.record.run_directory import check_file
+    from experiments.study.simulate import study_path
+    from experiments.trials.table import NAME
+
+    study = read_people_study(study_path(arguments.study))
+    for name in (f"{NAME}.parquet", f"{NAME}.csv", TEXTS):
+        check_file(arguments.out / name, replace=arguments.force)
+    found = asyncio.run(_collect(study, arguments))
+    for person, fault in found.unusable.items():
+        print(f"mjsim: {person}: {fault}", file=sys.stderr)
+    if not found.rows:
+        raise RecordError(
+            f"nobody in {arguments.folder} has finished the task yet; there is no table to write"
+        )
+    table, *_ = write_collected(found, arguments.out)
+    others = ", ".join(f"{number} {status.replace('_', ' ')}" for status, number in found.unfinished.items())
+    print(f"{table} ({counted(len(found.rows), 'row')}; without one: {others or 'nobody'})")
+    return 1 if found.unusable else 0
+
+
+async def _collect(study: "Study", arguments: argparse.Namespace) -> "Collected":
+    from experiments.people.collect import collect
+    from experiments.people.store import Store
+
+    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
+    try:
+        return await collect(study, store, arguments.folder)
+    finally:
+        await store.close()

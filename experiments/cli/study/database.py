@@ -1,0 +1,28 @@
+"""The database of a study, as commands name it."""
+
+import argparse
+from pathlib import Path
+
+from experiments.errors import RecordError
+
+DATABASE = "study.db"
+
+
+def add_database(parser: argparse.ArgumentParser) -> None:
+    """Add `--database`."""
+    parser.add_argument(
+        "--database",
+        metavar="URL",
+        help="database of people and answers, such as postgresql://USER:PASSWORD@HOST/NAME or mysql://... (default: "
+        f"{DATABASE} in the study's folder)",
+    )
+
+
+def database_url(arguments: argparse.Namespace) -> str:
+    """The URL of the database of a study that has been served."""
+    if arguments.database:
+        return str(arguments.database)
+    path: Path = arguments.folder / DATABASE
+    if not path.is_file():
+        raise RecordError(f"{arguments.folder} has no {DATABASE}; name the folder of `mjsim study serve`")
+    return f"sqlite:///{path.absolute()}"

@@ -1,0 +1,136 @@
+"""The tidy table of a study with people: a row for each person, from the store and the runs."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.errors import RecordError, ReplayError
+from experiments.people.items import Item
+from experiments.people.store import Answer, Person, PhaseRow, Store, TrialRow
+from experiments.people.study_file import SURVEY, Study
+from experiments.record.phases import TASK
+from experiments.study.measures import LIKERT_PREFIX
+from experiments.trials.batch_folder import read_trial
+from experiments.trials.table import write_tables
+from mjsim.files import write_text_atomically
+
+TEXTS = "texts.csv"
+FREE = ("line", "text")  # kinds of items whose answers are written freely
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how what a spreadsheet would compute begins
+
+
+@dataclass(frozen=True)
+class Collected:
+    """What was found.
+
+    Attributes:
+        rows: Of people whose task is over, with what they did and answered.
+        texts: What people wrote freely: person, item and text.
+        unfinished: How many people there are by status of those without a row.
+        unusable: Why a run of somebody cannot be used, by person.
+    """
+
+    rows: Sequence[Mapping[str, Any]]
+    texts: Sequence[tuple[str, str, str]]
+    unfinished: Mapping[str, int]
+    unusable: Mapping[str, str]
+
+
+async def collect(study: Study, store: Store, folder: Path) -> Collected:
+    """The rows of all people of a study whose runs lie in `folder`; nobody's platform id is in them.
+
+    A person who wanted their data deleted is not in them either.
+    """
+    people = [person for person in await store.people() if not person.delete_wanted]
+    trials = {row.person_id: row for row in await store.trials() if row.phase == TASK}
+    answers, phases = await store.answers(), await store.phases()
+    rows: list[Mapping[str, Any]] = []
+    unusable: dict[str, str] = {}
+    unfinished: dict[str, int] = {}
+    items = study.texts[SURVEY].items
+    for person in people:
+        trial = trials.get(person.id)
+        if trial is None:
+            unfinished[person.status] = unfinished.get(person.status, 0) + 1
+            continue
+        try:
+            run = read_trial(folder / trial.folder)
+        except (RecordError, ReplayError, OSError) as error:
+            unusable[person_name(person)] = str(error)
+            continue
+        mine = [answer for answer in answers if answer.person_id == person.id]
+        passed = [phase for phase in phases if phase.person_id == person.id]
+        rows.append({**_about(person, trial, passed), **run.row, **_answers(items, mine)})
+    return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable)
+
+
+def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
+    """Write `trials.parquet`, `trials.csv` and `texts.csv` into a folder; their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("participant", "item", "text"))
+    writer.writerows((person, item, harmless(words)) for person, item, words in collected.texts)
+    write_text_atomically(out / TEXTS, text.getvalue())
+    return [*write_tables(out, collected.rows), out / TEXTS]
+
+
+def person_name(person: Person) -> str:
+    """The name of a person in tables: the number in the store."""
+    return f"p{person.id:05d}"
+
+
+def harmless(text: str) -> str:
+    """A text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text.startswith(FORMULA) else text
+
+
+def _about(person: Person, trial: TrialRow, phases: Sequence[PhaseRow]) -> dict[str, Any]:
+    durations = {f"phase_{phase.name}_s": phase.duration_s for phase in phases if phase.name.isidentifier()}
+    return {
+        "participant": person_name(person),
+        "platform": person.platform,
+        "status": person.status,
+        "arrived": person.created.isoformat(timespec="seconds"),
+        "task_ended": trial.finished.isoformat(timespec="seconds"),
+        **durations,
+    }
+
+
+def _answers(items: Sequence[Item], answers: Sequence[Answer]) -> dict[str, Any]:
+    """Columns of final answers: `likert_NAME` of scales, `answer_NAME` of others; those of other phases by phase."""
+    given = {(answer.phase, answer.item): answer.value for answer in answers if answer.final}
+    columns: dict[str, Any] = {}
+    for item in items:
+        value = given.pop((SURVEY, item.name), None)
+        if item.kind == "scale":
+            columns[LIKERT_PREFIX + item.name] = value
+        elif item.kind == "several":
+            columns[f"answer_{item.name}"] = None if value is None else "; ".join(value)
+        elif item.kind not in FREE:
+            columns[f"answer_{item.name}"] = value
+    for (phase, name), value in given.items():
+        if isinstance(value, int | float | bool):
+            columns[f"{phase}_{name}"] = value
+    return columns
+
+
+def _texts(
+    items: Sequence[Item], people: Sequence[Person], answers: Sequence[Answer]
+) -> list[tuple[str, str, str]]:
+    free = {item.name for item in items if item.kind in FREE}
+    names = {person.id: person_name(person) for person in people}
+    return [
+        (names[answer.person_id], answer.item, str(answer.value))
+        for answer in answers
+        if answer.final and answer.phase == SURVEY and answer.item in free and answer.person_id in names
+    ]
+
+
+def _complete(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Rows with the columns of all, in order of first appearance."""
+    columns = dict.fromkeys(name for row in rows for name in row)
+    return [{name: row.get(name) for name in columns} for row in rows]

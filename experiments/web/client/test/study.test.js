@@ -1,0 +1,88 @@
+// @vitest-environment happy-dom
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+
+describe("a form of a study", () => {
+  const sent = vi.fn(async () => new Response(null, { status: 204 }));
+  beforeEach(async () => {
+    vi.useFakeTimers();
+    vi.resetModules();
+    sent.mockClear();
+    vi.stubGlobal("fetch", sent);
+    document.body.innerHTML = `<form data-save="/play/x/answers"><input type="hidden" name="phase" value="survey">
+      <input type="radio" name="useful" value="2"><textarea name="comments"></textarea></form>`;
+    await import("../static/study/form.js");
+  });
+  afterEach(() => vi.useRealTimers());
+
+  const body = () => Object.fromEntries(/** @type {any} */ (sent.mock.lastCall)?.[1].body);
+
+  test("saves a choice at once", () => {
+    const radio = /** @type {HTMLInputElement} */ (document.querySelector("[name=useful]"));
+    radio.checked = true;
+    radio.dispatchEvent(new Event("change", { bubbles: true }));
+    expect(body()).toMatchObject({ phase: "survey", useful: "2" });
+  });
+
+  test("saves a text once the person pauses, not at every key", () => {
+    const text = /** @type {HTMLTextAreaElement} */ (document.querySelector("[name=comments]"));
+    for (const words of ["s", "so", "so far"]) {
+      text.value = words;
+      text.dispatchEvent(new Event("input", { bubbles: true }));
+      vi.advanceTimersByTime(100);
+    }
+    expect(sent).not.toHaveBeenCalled();
+    vi.advanceTimersByTime(1000);
+    expect(sent).toHaveBeenCalledTimes(1);
+    expect(body().comments).toBe("so far");
+  });
+
+  test("does not save after it was sent", () => {
+    const [form, text] = [document.querySelector("form"), document.querySelector("textarea")];
+    text?.dispatchEvent(new Event("input", { bubbles: true }));
+    form?.dispatchEvent(new Event("submit"));
+    vi.advanceTimersByTime(1000);
+    expect(sent).not.toHaveBeenCalled();
+  });
+});
+
+describe("the check of a computer", () => {
+  beforeEach(() => {
+    vi.resetModules();
+    vi.stubGlobal("requestAnimationFrame", (/** @type {FrameRequestCallback} */ next) => setTimeout(() => next(performance.now()), 16));
+    const names = ["webgl", "renderer", "frames_per_s", "latency_ms", "width", "height", "pixel_ratio", "keyboard"];
+    document.body.innerHTML = `<form id="device" data-ping="/ping" data-keyboard="yes"><p id="state" data-running="Checking" data-key="Press W"></p>
+      ${["webgl", "frames", "latency", "keyboard", "screen"].map((name) => `<b data-result="${name}"></b>`).join("")}
+      ${names.map((name) => `<input type="hidden" name="${name}">`).join("")}
+      <button class="button" disabled>Continue</button><button name="give_up" disabled>No</button></form>`;
+  });
+  const value = (/** @type {string} */ name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]`)).value;
+  const button = () => /** @type {HTMLButtonElement} */ (document.querySelector(".button"));
+
+  test("measures, asks for a key, and lets the person continue", async () => {
+    vi.stubGlobal("fetch", async () => new Response(null, { status: 204 }));
+    const checked = import("../static/study/device.js");
+    await vi.waitFor(() => expect(document.body.textContent).toContain("Press W"), 5000);
+    expect(button().disabled).toBe(true);
+    window.dispatchEvent(new KeyboardEvent("keydown", { code: "KeyQ" }));
+    expect(value("keyboard")).toBe("");
+    window.dispatchEvent(new KeyboardEvent("keydown", { code: "KeyW" }));
+    await checked;
+    expect(button().disabled).toBe(false);
+    expect(value("keyboard")).toBe("yes");
+    expect(Number(value("frames_per_s"))).toBeGreaterThan(10);
+    expect(Number(value("latency_ms"))).toBeLessThan(1000);
+    expect(value("width")).toBe(String(window.innerWidth));
+    expect(value("webgl")).toBe(""); // there is none here
+  });
+
+  test("tells of a connection that does not answer", async () => {
+    vi.stubGlobal("fetch", async () => {
+      throw new TypeError("no network");
+    });
+    const checked = import("../static/study/device.js");
+    await vi.waitFor(() => expect(document.body.textContent).toContain("Press W"), 5000);
+    window.dispatchEvent(new KeyboardEvent("keydown", { code: "KeyW" }));
+    await checked;
+    expect(value("latency_ms")).toBe("999999");
+  });
+});
