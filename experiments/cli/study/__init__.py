@@ -8,8 +8,12 @@ from experiments.cli.requirements import add_checkout_command
 
 # A module each, with `add_parser(commands)`; those outside the wheel need a checkout.
 SUBCOMMANDS = {
+    "init": "experiments.cli.study.init",
     "serve": "experiments.cli.study.serve",
     "collect": "experiments.cli.study.collect",
+    "backup": "experiments.cli.study.backup",
+    "restore": "experiments.cli.study.restore",
+    "erase": "experiments.cli.study.erase",
     "preregister": "experiments.cli.study.preregister",
     "simulate": "experiments.cli.study.simulate",
     "controls": "studies.commands.controls",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command, add_force
 from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import add_database, database_url
+from experiments.cli.study.database import add_database, add_served_study, database_url
 from experiments.errors import RecordError
 from experiments.trials.design import counted
 
@@ -30,8 +30,7 @@ def add_parser(commands: Any) -> None:
     parser = add_command(
         commands, "collect", run, summary="the tidy table of a study with people", description=DESCRIPTION
     )
-    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the study")
+    add_served_study(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder of the table")
     add_database(parser)
     add_force(parser, "replace tables that exist")

@@ -8,6 +8,12 @@ from experiments.errors import RecordError
 DATABASE = "study.db"
 
 
+def add_served_study(parser: argparse.ArgumentParser) -> None:
+    """Add the study file and the folder of a study that has been served."""
+    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the study")
+
+
 def add_database(parser: argparse.ArgumentParser) -> None:
     """Add `--database`."""
     parser.add_argument(

@@ -26,7 +26,7 @@ if TYPE_CHECKING:  # imported when the command runs, so that other commands star
     from experiments.people.study_file import Study
     from experiments.web.server.pool import WorkerPool
 
-SECRET_FILE, FILM, VISITS = "secret", "flythrough.mp4", "visits"
+SECRET_FILE, FILM = "secret", "flythrough.mp4"
 SECRET = "MJSIM_STUDY_SECRET"
 DESCRIPTION = f"""\
 Serve a study with people: consent, a check of the computer, the story, a film of the house, questions about the task,
@@ -81,6 +81,7 @@ async def _serve(
 ) -> None:
     import numpy as np
 
+    from experiments.people import VISITS
     from experiments.people.phases import phases_of_study
     from experiments.people.recruitment import recruiter
     from experiments.people.server.app import Serving, StudyServer

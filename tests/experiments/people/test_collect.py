@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
+from experiments.cli.main import main
 from experiments.people.collect import TEXTS, collect, harmless, write_collected
 from experiments.people.store import Store
 from experiments.people.study_file import read_people_study
@@ -42,8 +43,8 @@ async def _fill(store, folder, run):
         if name == "leaves":
             await store.withdraw(person.id, delete=False)
             continue
-        shutil.copytree(run, folder / "visits" / name)
-        await store.finish_trial(person.id, "task", f"visits/{name}", "all delivered")
+        shutil.copytree(run, folder / "visits" / (name[0] * 64) / "task")
+        await store.finish_trial(person.id, "task", f"visits/{name[0] * 64}/task", "all delivered")
         await store.finish_phase(person.id, "task", "survey", {}, "all delivered")
         await store.finish_phase(person.id, "survey", "completion", answers, status="finished")
         if deletes:
@@ -88,3 +89,30 @@ def test_texts_are_no_formulas():
     for text in ("=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1"):
         assert harmless(text) == f"'{text}"
     assert harmless("a = b") == "a = b"
+
+
+def test_a_person_is_erased_from_database_and_files_and_backups_move_the_rest(tmp_path, run, capsys):
+    study_file = tmp_path / "study.toml"
+    assert main(["study", "init", str(study_file)]) == 0
+    folder = tmp_path / "served"
+    folder.mkdir()
+    asyncio.run(_filled(study_file, folder, run))
+    names = [str(study_file), str(folder)]
+    assert main(["study", "erase", *names, "p00001", "--who", "me"]) == 0
+    assert main(["study", "erase", *names, "p00001", "--who", "me"]) == 2, "there is nobody any more"
+    assert main(["study", "backup", *names, "--out", str(tmp_path / "backup.db")]) == 0
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    assert main(["study", "restore", str(tmp_path / "backup.db"), str(moved / "study.db")]) == 0
+    assert main(["study", "collect", str(study_file), str(moved), "--out", str(tmp_path / "table")]) == 2
+    assert "nobody" in capsys.readouterr().err
+    for path in (*folder.rglob("*"), tmp_path / "backup.db"):
+        assert not path.is_file() or b"secret-first" not in path.read_bytes()
+    assert not (folder / "visits" / ("f" * 64)).exists()
+
+
+async def _filled(study_file, folder, run):
+    study = read_people_study(study_file)
+    store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
+    await _fill(store, folder, run)
+    await store.close()

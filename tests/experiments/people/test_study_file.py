@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from experiments.cli.main import main
 from experiments.errors import ConfigError
 from experiments.people.study_file import PHASES, read_people_study
 from experiments.people.texts import languages, read_texts
@@ -99,3 +100,12 @@ def test_every_language_has_the_same_texts_and_items():
         assert {n: (set(s.words), [i.name for i in s.items]) for n, s in other.items()} == {
             n: (set(s.words), [i.name for i in s.items]) for n, s in first.items()
         }
+
+
+def test_the_template_is_a_study(tmp_path, capsys):
+    path = tmp_path / "study.toml"
+    assert main(["study", "init", str(path)]) == 0
+    study = read_people_study(path)
+    assert (len(study.cells), study.people, study.settings.phases) == (2, 40, PHASES)
+    assert main(["study", "init", str(path)]) == 2, "nothing is replaced"
+    assert "--force" in capsys.readouterr().err
