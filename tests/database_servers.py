@@ -24,9 +24,59 @@ class MissingProgramError(Exception):
     """A database server is not installed."""
 
 
+class Server:
+    """A database server that can be killed and started again.
+
+    Attributes:
+        url: Its URL, without the name of a database.
+    """
+
+    def __init__(
+        self, url: str, command: list[str], folder: Path, user: str | None, stop: signal.Signals
+    ) -> None:
+        self.url = url
+        self._command, self._folder, self._user, self._stop = command, folder, user, stop
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it, again if what was killed is still going, until it answers."""
+        port = int(self.url.rpartition(":")[2])
+        end = time.monotonic() + PATIENCE_S
+        while self._process is None or not _answers(port):
+            if time.monotonic() > end:
+                raise RuntimeError(
+                    f"{self._command[0]} does not start:\n{(self._folder / 'log').read_text()}"
+                )
+            if self._process is None or self._process.poll() is not None:
+                with (self._folder / "log").open("ab") as log:
+                    self._process = subprocess.Popen(
+                        self._command,
+                        stdout=log,
+                        stderr=log,
+                        cwd=self._folder,
+                        user=self._user,
+                        group=self._user,
+                    )
+            time.sleep(0.05)
+
+    def stop(self) -> None:
+        """Stop it without waiting for connections."""
+        self._end(self._stop)
+
+    def kill(self) -> None:
+        """Kill it on the spot."""
+        self._end(signal.SIGKILL)
+
+    def _end(self, how: signal.Signals) -> None:
+        if self._process is not None:
+            self._process.send_signal(how)
+            self._process.wait(PATIENCE_S)
+            self._process = None
+
+
 @contextmanager
-def mariadb() -> Iterator[str]:
-    """URL of a running MariaDB, without the name of a database."""
+def mariadb() -> Iterator[Server]:
+    """A running MariaDB."""
     with _folder("mysql") as (folder, user):
         port = _free_port()
         data = f"--datadir={folder / 'data'}"
@@ -40,21 +90,23 @@ def mariadb() -> Iterator[str]:
             f"--init-file={folder / 'init.sql'}",
             "--skip-name-resolve",
         ]
-        with _running(command, port, folder, user, signal.SIGTERM):
-            yield f"mysql://study:secret@127.0.0.1:{port}"
+        url = f"mysql://study:secret@127.0.0.1:{port}"
+        with _running(Server(url, command, folder, user, signal.SIGTERM)) as server:
+            yield server
 
 
 @contextmanager
-def postgresql() -> Iterator[str]:
-    """URL of a running PostgreSQL, without the name of a database."""
+def postgresql() -> Iterator[Server]:
+    """A running PostgreSQL."""
     with _folder("postgres") as (folder, user):
         port = _free_port()
         data = str(folder / "data")
         _run([_program("initdb"), "-D", data, "-A", "trust", "-U", "study", "-E", "UTF8"], folder, user)
         command = [_program("postgres"), "-D", data, "-p", str(port), "-c", "listen_addresses=127.0.0.1"]
         command += ["-c", f"unix_socket_directories={folder}"]
-        with _running(command, port, folder, user, signal.SIGINT):  # SIGTERM waits for connections
-            yield f"postgresql://study@127.0.0.1:{port}"
+        url = f"postgresql://study@127.0.0.1:{port}"
+        with _running(Server(url, command, folder, user, signal.SIGINT)) as server:
+            yield server
 
 
 SERVERS = {"mariadb": mariadb, "postgresql": postgresql}
@@ -79,22 +131,12 @@ def _folder(owner: str) -> Iterator[tuple[Path, str | None]]:
 
 
 @contextmanager
-def _running(
-    command: list[str], port: int, folder: Path, user: str | None, stop: signal.Signals
-) -> Iterator[None]:
-    log = folder / "log"
-    with log.open("wb") as output:
-        server = subprocess.Popen(command, stdout=output, stderr=output, cwd=folder, user=user, group=user)
+def _running(server: Server) -> Iterator[Server]:
     try:
-        end = time.monotonic() + PATIENCE_S
-        while not _answers(port):
-            if server.poll() is not None or time.monotonic() > end:
-                raise RuntimeError(f"{command[0]} does not start:\n{log.read_text()}")
-            time.sleep(0.05)
-        yield
+        server.start()
+        yield server
     finally:
-        server.send_signal(stop)
-        server.wait(PATIENCE_S)
+        server.stop()
 
 
 def _answers(port: int) -> bool:

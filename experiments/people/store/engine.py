@@ -29,8 +29,8 @@ PRAGMAS = (
     "PRAGMA secure_delete = ON",  # what is deleted is overwritten
 )
 PATIENCE_S = 20  # for locks and for connections
-TRIES = 8
-PAUSE_S = 0.02  # before the second try; doubles with each try
+TRIES = 9
+PAUSE_S = 0.01  # before the second try, on average twice as long; doubles with each try
 
 
 class Database:
@@ -88,12 +88,26 @@ class Database:
     @asynccontextmanager
     async def _connection(self, **options: Any) -> AsyncIterator[AsyncConnection]:
         try:
-            async with self._engine.connect() as connection:
+            connection = await self._connected()
+            try:
                 if options:
                     await connection.execution_options(**options)
                 yield connection
+            finally:
+                await connection.close()
         except SQLAlchemyError as error:
             raise StoreError(advice(error, self.name)) from error
+
+    async def _connected(self) -> AsyncConnection:
+        """A connection; waits some seconds for a server that is being started."""
+        for attempt in range(1, TRIES):
+            try:
+                return await self._engine.connect()
+            except SQLAlchemyError as error:
+                if not passes(error):
+                    raise
+            await _pause(attempt)
+        return await self._engine.connect()
 
     async def write(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
         """Do work in one transaction; its result, once it is committed.
@@ -109,7 +123,7 @@ class Database:
             except SQLAlchemyError as error:
                 if attempt == TRIES or not _again(error, attempt):
                     raise StoreError(advice(error, self.name)) from error
-            await asyncio.sleep(PAUSE_S * 2**attempt * random.random())
+            await _pause(attempt)
         raise AssertionError
 
     async def _transaction(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
@@ -174,6 +188,11 @@ def _begin(connection: Connection) -> None:
     """A transaction that will write takes the lock at once: one that reads first might have to give up later."""
     if statement := connection.get_execution_options().get("begin", "BEGIN"):
         connection.exec_driver_sql(statement)
+
+
+async def _pause(attempt: int) -> None:
+    """Wait before another try; all tries together take about five seconds."""
+    await asyncio.sleep(PAUSE_S * 2**attempt * random.uniform(0.5, 1.5))
 
 
 def _again(error: SQLAlchemyError, attempt: int) -> bool:

@@ -3,25 +3,32 @@
 from sqlalchemy.exc import DBAPIError, IntegrityError, SQLAlchemyError, TimeoutError
 
 DAMAGED = "is damaged: restore the last backup with `mjsim study restore`."
+UNREACHABLE = "cannot be reached: check that its server runs."
 PASSING = {
     "1205",  # MariaDB: waited too long for a lock
     "1213",  # MariaDB: deadlock
     "40001",  # PostgreSQL: conflict of two transactions
     "40P01",  # PostgreSQL: deadlock
 }
-# MariaDB's number, PostgreSQL's state or a part of SQLite's message -> what it means and what to do
+# MariaDB's number, PostgreSQL's state, or words of the message -> what it means and what to do
 MEANINGS = (
-    (("1045", "1044", "28P01", "28000", "42501"), "refuses this user: check user, password and rights."),
-    (("1049", "3D000"), "does not exist on its server: create it, empty, then start again."),
+    (
+        ("1045", "1044", "28P01", "42501", "authentication failed", "FATAL:  role", "pg_hba.conf"),
+        "refuses this user: check user, password and rights.",
+    ),
+    (
+        ("1049", "3D000", "FATAL:  database"),
+        "does not exist on its server: create it, empty, then start again.",
+    ),
     (
         ("1021", "1114", "53100", "disk is full"),
-        "has no space left: free some, nothing saved so far is lost.",
+        "has no space left: free some; nothing saved so far is lost.",
     ),
     (("not a database", "disk image is malformed"), DAMAGED),
     (("database is locked",), "is locked by another program for too long: close it, then try again."),
     (("readonly database",), "cannot be written: check the rights of the file and its folder."),
-    (("unable to open",), "cannot be opened: check that its folder exists and can be written."),
-    (("2002", "2003", "2006", "2013", "57P01", "57P03"), "cannot be reached: check that its server runs."),
+    (("unable to open",), "cannot be opened: check the rights of the file and its folder."),
+    (("2002", "2003", "2006", "2013", "57P01", "57P02", "57P03", "connection failed"), UNREACHABLE),
 )
 
 
@@ -29,7 +36,7 @@ def passes(error: SQLAlchemyError) -> bool:
     """Whether the same transaction may succeed if it is done again."""
     if not isinstance(error, DBAPIError):
         return False
-    return error.connection_invalidated or bool(_codes(error) & PASSING)
+    return error.connection_invalidated or bool(_codes(error) & PASSING) or _meaning(error) == UNREACHABLE
 
 
 def advice(error: SQLAlchemyError, database: str) -> str:
@@ -40,14 +47,9 @@ def advice(error: SQLAlchemyError, database: str) -> str:
         )
     if isinstance(error, IntegrityError):
         return f"The database {database} refuses a row that refers to nothing, or is there already: {error.orig}."
-    cause = error.orig if isinstance(error, DBAPIError) else error
-    codes, text = _codes(error), str(cause)
-    for signs, meaning in MEANINGS:
-        if codes.intersection(signs) or any(" " in sign and sign in text for sign in signs):
-            return f"The database {database} {meaning}"
-    if isinstance(error, DBAPIError) and (error.connection_invalidated or _unreachable(text)):
-        return f"The database {database} cannot be reached: check that its server runs. ({text})"
-    return f"The database {database} failed: {text}"
+    if not isinstance(error, DBAPIError):
+        return f"The database {database} failed: {error}"
+    return f"The database {database} {_meaning(error) or f'failed: {error.orig}'}"
 
 
 def damaged(database: str) -> str:
@@ -55,14 +57,15 @@ def damaged(database: str) -> str:
     return f"The database {database} {DAMAGED}"
 
 
-def _codes(error: SQLAlchemyError) -> set[str]:
-    """Number of MariaDB's error, or PostgreSQL's state."""
-    cause = error.orig if isinstance(error, DBAPIError) else None
-    codes = {str(getattr(cause, "sqlstate", None))}
-    if cause is not None and cause.args:
-        codes.add(str(cause.args[0]))
-    return codes
+def _meaning(error: DBAPIError) -> str | None:
+    codes, text = _codes(error), str(error.orig)
+    for signs, meaning in MEANINGS:
+        if any(sign in codes or (len(sign) > 5 and sign in text) for sign in signs):
+            return meaning
+    return UNREACHABLE if error.connection_invalidated else None
 
 
-def _unreachable(text: str) -> bool:
-    return any(sign in text for sign in ("connect", "closed"))
+def _codes(error: DBAPIError) -> set[str]:
+    """Number of MariaDB's error, and PostgreSQL's state."""
+    number = error.orig.args[:1] if error.orig is not None else ()
+    return {str(code) for code in (*number, getattr(error.orig, "sqlstate", None))}

@@ -22,8 +22,8 @@ def anyio_backend():
 
 def _server(kind):
     try:
-        with SERVERS[kind]() as url:
-            yield url
+        with SERVERS[kind]() as server:
+            yield server
     except MissingProgramError as reason:
         pytest.skip(str(reason))
 
@@ -56,7 +56,7 @@ def other_url(request, tmp_path, url):
 def _new_database(request, file):
     if request.param == "sqlite":
         return f"sqlite:///{file}"
-    server = request.getfixturevalue(request.param)
+    server = request.getfixturevalue(request.param).url
     name = f"study_{uuid.uuid4().hex}"
     asyncio.run(_create(server, name))
     return f"{server}/{name}"

@@ -12,7 +12,7 @@ from alembic.runtime.migration import MigrationContext
 from sqlalchemy import text
 
 from experiments.errors import StoreError
-from experiments.people.store import Store
+from experiments.people.store import Store, engine
 from experiments.people.store.engine import Database
 from experiments.people.store.tables import metadata
 from experiments.people.store.upgrade import MIGRATIONS, upgrade
@@ -35,7 +35,7 @@ def upgrade() -> None:
 
 ACKNOWLEDGE = """
 import asyncio, sys
-from experiments.people.store import Store
+from experiments.people.store import Store, engine
 
 async def main():
     store = await Store.open(sys.argv[1], "pilot", "0" * 64)
@@ -170,10 +170,27 @@ async def test_tables_of_another_program_are_left_alone(url):
         ("mysql://me:secret@127.0.0.1:9/study", "cannot be reached"),
     ],
 )
-async def test_errors_say_what_to_do_and_no_password(url, message):
+async def test_errors_say_what_to_do_and_no_password(url, message, monkeypatch):
+    monkeypatch.setattr(engine, "PAUSE_S", 0.0)
     with pytest.raises(StoreError, match=message) as caught:
         await Store.open(url, "pilot", "0" * 64)
     assert "secret" not in str(caught.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "address", "message"),
+    [
+        ("mariadb", "mysql://study:wrong@{}/none", "refuses this user"),
+        ("mariadb", "mysql://study:secret@{}/none", "does not exist"),
+        ("postgresql", "postgresql://nobody@{}/none", "refuses this user"),
+        ("postgresql", "postgresql://study@{}/none", "does not exist"),
+    ],
+)
+async def test_a_wrong_user_or_database_is_named(request, kind, address, message):
+    server = request.getfixturevalue(kind).url.rpartition("@")[2]
+    with pytest.raises(StoreError, match=message):
+        await Store.open(address.format(server), "pilot", "0" * 64)
 
 
 async def test_a_damaged_file_is_named(tmp_path):
