@@ -1,11 +1,12 @@
 """Cells and places: who gets which, in one transaction with a lock on the study."""
 
+from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
-from sqlalchemy import ColumnElement, Select, func, insert, or_, select, update
+from sqlalchemy import Select, func, insert, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
@@ -51,7 +52,7 @@ class Assignments(Part):
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> Assignment | None:
-            await lock_study(connection, self._study_id)
+            quotas = await lock_study(connection, self._study_id)
             await self._check_active(connection, person_id, now)
             before = await place_of(connection, person_id)
             if before is not None:
@@ -59,11 +60,14 @@ class Assignments(Part):
                     return before
                 if await take_back(connection, self._study_id, before, "held"):
                     return await place_of(connection, person_id)
-            fresh = or_(assignment.c.state == "finished", person.c.seen >= now - abandoned_after)
-            place = await self._free_place(connection, cells, rule, rng, fresh)
-            if place is None:
+            holders = await self._holders(connection, now - abandoned_after)
+            wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
+            fresh = Counter(holder.cell for holder in holders if holder.fresh)
+            cell = choose([fresh[index] for index in range(len(cells))], wanted, rule, rng)
+            if cell is None:
                 return None
-            await self._give(connection, person_id, place, cells, rng, now, new=before is None)
+            place = await _free_place(connection, [one for one in holders if one.cell == cell], wanted[cell])
+            await self._give(connection, person_id, (cell, place), cells, rng, now, new=before is None)
             return await place_of(connection, person_id)
 
         return await self._database.write(work)
@@ -86,11 +90,8 @@ class Assignments(Part):
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:
-            await lock_study(connection, self._study_id)
-            mine = study.c.id == self._study_id
-            quotas = (await connection.execute(select(study.c.quotas).where(mine))).scalar_one()
-            changed = {**quotas, str(cell): wanted}
-            await connection.execute(update(study).where(mine).values(quotas=changed))
+            quotas = {**await lock_study(connection, self._study_id), str(cell): wanted}
+            await connection.execute(update(study).where(study.c.id == self._study_id).values(quotas=quotas))
             await note(
                 connection, self._study_id, who, "quota changed", {"cell": cell, "wanted": wanted}, now
             )
@@ -107,7 +108,7 @@ class Assignments(Part):
             .where(assignment.c.study_id == self._study_id)
             .group_by(assignment.c.cell, assignment.c.state)
         )
-        async with self._database.reading() as connection:
+        async with self._database.snapshot() as connection:
             statuses = await _tally(connection, by_status)
             phases = await _tally(connection, by_phase.group_by(person.c.phase))
             cells: dict[int, dict[str, int]] = {}
@@ -117,44 +118,28 @@ class Assignments(Part):
 
     async def _check_active(self, connection: AsyncConnection, person_id: int, now: datetime) -> None:
         active = await connection.execute(
-            update(person).where(person.c.id == person_id, person.c.status.in_(ACTIVE)).values(seen=now)
+            update(person)
+            .where(person.c.id == person_id, person.c.study_id == self._study_id, person.c.status.in_(ACTIVE))
+            .values(seen=now)
         )
         if not active.rowcount:
             raise StoreError(
                 f"Person {person_id} has ended the participation, or does not exist: no place is given."
             )
 
-    async def _free_place(
-        self,
-        connection: AsyncConnection,
-        cells: Sequence[CellQuota],
-        rule: Rule,
-        rng: np.random.Generator,
-        fresh: ColumnElement[bool],
-    ) -> tuple[int, int] | None:
-        """A cell and a place in it that nobody has; an abandoned one is released where no other is free."""
-        mine = (assignment.c.study_id == self._study_id, assignment.c.active == 1)
-        joined = select(assignment.c.cell, func.count()).join(person, person.c.id == assignment.c.person_id)
-        counts = await _tally(connection, joined.where(*mine, fresh).group_by(assignment.c.cell))
-        changed = await connection.execute(select(study.c.quotas).where(study.c.id == self._study_id))
-        quotas = {int(cell): wanted for cell, wanted in changed.scalar_one().items()}
-        wanted = [quotas.get(index, cell.wanted) for index, cell in enumerate(cells)]
-        cell = choose([counts.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
-        if cell is None:
-            return None
-        held = await connection.execute(
-            select(assignment.c.place, assignment.c.person_id, fresh.label("fresh"))
+    async def _holders(self, connection: AsyncConnection, since: datetime) -> Sequence[Any]:
+        """Who has which place, and whether it is finished or held with a sign of life since then.
+
+        It is one query, as signs of life may come meanwhile; those who have been away for longest come first.
+        """
+        fresh = or_(assignment.c.state == "finished", person.c.seen >= since)
+        query = (
+            select(assignment.c.cell, assignment.c.place, assignment.c.person_id, fresh.label("fresh"))
             .join(person, person.c.id == assignment.c.person_id)
-            .where(*mine, assignment.c.cell == cell, assignment.c.place < wanted[cell])
+            .where(assignment.c.study_id == self._study_id, assignment.c.active == 1)
             .order_by(person.c.seen)
         )
-        holders = held.all()
-        free = sorted(set(range(wanted[cell])) - {holder.place for holder in holders})
-        if free:
-            return cell, free[0]
-        abandoned = next(holder for holder in holders if not holder.fresh)
-        await set_place(connection, abandoned.person_id, "released")
-        return cell, abandoned.place
+        return (await connection.execute(query)).all()
 
     async def _give(
         self,
@@ -186,6 +171,16 @@ class Assignments(Part):
                 update(assignment).where(assignment.c.person_id == person_id).values(**values)
             )
         await connection.execute(update(person).where(person.c.id == person_id).values(status="assigned"))
+
+
+async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int:
+    """The first place of a cell that nobody has; an abandoned one is released where no other is free."""
+    free = sorted(set(range(wanted)) - {holder.place for holder in holders})
+    if free:
+        return free[0]
+    abandoned = next(holder for holder in holders if not holder.fresh and holder.place < wanted)
+    await set_place(connection, abandoned.person_id, "released")
+    return int(abandoned.place)
 
 
 async def _tally(connection: AsyncConnection, query: Select[Any]) -> dict[Any, int]:

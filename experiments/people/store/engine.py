@@ -60,14 +60,14 @@ class Database:
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncConnection]:
-        """A connection to read from."""
-        async with self._connection() as connection:
+        """A connection to read from; each statement sees what is committed by then."""
+        async with self._connection(begin="") as connection:
             yield connection
 
     @asynccontextmanager
     async def snapshot(self) -> AsyncIterator[AsyncConnection]:
-        """A connection to read from, which sees everything as of one moment; SQLite does so always."""
-        options = {} if self._sqlite else {"isolation_level": "REPEATABLE READ"}
+        """A connection to read from, which sees everything as of one moment."""
+        options = {"begin": "BEGIN"} if self._sqlite else {"isolation_level": "REPEATABLE READ"}
         async with self._connection(**options) as connection:
             yield connection
 
@@ -186,7 +186,7 @@ def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
 
 def _begin(connection: Connection) -> None:
     """A transaction that will write takes the lock at once: one that reads first might have to give up later."""
-    if statement := connection.get_execution_options().get("begin", "BEGIN"):
+    if statement := connection.get_execution_options()["begin"]:
         connection.exec_driver_sql(statement)
 
 

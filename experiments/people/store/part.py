@@ -24,9 +24,13 @@ def new_id(inserted: CursorResult[Any]) -> int:
     return int(key[0]) if key else 0
 
 
-async def lock_study(connection: AsyncConnection, study_id: int) -> None:
-    """Let others who lock the study wait until this transaction ends; SQLite has locked the whole database."""
-    await connection.execute(select(tables.study.c.id).where(tables.study.c.id == study_id).with_for_update())
+async def lock_study(connection: AsyncConnection, study_id: int) -> dict[str, int]:
+    """Let others who lock the study wait until this transaction ends; its changed quotas, by cell.
+
+    SQLite has locked the whole database.
+    """
+    query = select(tables.study.c.quotas).where(tables.study.c.id == study_id).with_for_update()
+    return dict((await connection.execute(query)).scalar_one())
 
 
 async def note(

@@ -33,18 +33,34 @@ def upgrade() -> None:
     op.add_column("person", sa.Column("host", sa.String(100), nullable=False, server_default="here"))
 '''
 
+# Twenty people at a time come, get a place, answer and are paid; a line is printed for what has been acknowledged.
 ACKNOWLEDGE = """
 import asyncio, sys
-from experiments.people.store import Store, engine
+import numpy as np
+from experiments.people.store import CellQuota, Store
+
+async def one(store, number, rng):
+    person = await store.arrive("link", f"{number:064x}", {"id": "p"}, f"{number:064x}", "consent")
+    print("person", person.id, flush=True)
+    place = await store.assign(person.id, [CellQuota(1000, (1, 2, 3))] * 3, "balanced", rng)
+    print("place", person.id, place.cell, place.place, flush=True)
+    await store.save_answers(person.id, "consent", {"number": number})
+    print("answer", person.id, number, flush=True)
+    await store.finish_phase(person.id, "consent", "completion", {"last": number}, status="finished")
+    print("finished", person.id, flush=True)
+    await store.ledger.decide(person.id, "reward", 750, "USD", f"reward-{number}")
+    print("owed", person.id, await store.ledger.begin_sending(f"reward-{number}"), flush=True)
+
+async def many(store, first):
+    rng = np.random.default_rng(first)
+    number = first
+    while True:
+        await one(store, number, rng)
+        number += 20
 
 async def main():
     store = await Store.open(sys.argv[1], "pilot", "0" * 64)
-    number = 0
-    while True:
-        person = await store.arrive("link", None, {}, f"{number:064x}", "consent")
-        await store.finish_phase(person.id, "consent", "story", {"number": number})
-        print(number, flush=True)
-        number += 1
+    await asyncio.gather(*(many(store, first) for first in range(20)))
 
 asyncio.run(main())
 """
@@ -57,20 +73,47 @@ async def run(store, sql, **values):
     await store._database.write(work)
 
 
-async def test_what_is_acknowledged_survives_a_kill(url):
+@pytest.mark.parametrize("lines", [30, 101, 250])
+async def test_what_is_acknowledged_survives_a_kill(url, lines):
     command = [sys.executable, "-c", ACKNOWLEDGE, url]
+    acknowledged = []
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         for line in process.stdout:
-            acknowledged = int(line)
-            if acknowledged == 20:
+            if not line.endswith("\n"):
+                break
+            what, *numbers = line.split()
+            acknowledged.append((what, *map(int, numbers)))
+            if len(acknowledged) == lines:
                 process.kill()
     store = await Store.open(url, "pilot", "0" * 64)
     try:
-        answers = {answer.value for answer in await store.answers() if answer.final}
-        assert answers >= set(range(acknowledged + 1))
-        assert all(person.phase in ("story", "consent") for person in await store.people())
+        kept = await _kept(store)
+        assert len(acknowledged) >= lines
+        assert [line for line in acknowledged if line not in kept] == []
+        for person in await store.people():
+            finished = person.status == "finished"
+            assert (person.phase == "completion") == finished
+            assert (("finished_place", person.id) in kept) == finished
+            assert await store.identity(person.id) == {"id": "p"}
     finally:
         await store.close()
+
+
+async def _kept(store):
+    """What is in the store, in the words of `ACKNOWLEDGE`."""
+    people, places = await store.people(), await store.assignments()
+    return {
+        *(("person", person.id) for person in people),
+        *(("place", place.person_id, place.cell, place.place) for place in places),
+        *(("answer", a.person_id, a.value) for a in await store.answers() if a.item == "number"),
+        *(("finished", a.person_id) for a in await store.answers() if a.item == "last" and a.final),
+        *(("finished_place", place.person_id) for place in places if place.state == "finished"),
+        *(
+            ("owed", event.person_id, event.attempt)
+            for event in await store.ledger.history()
+            if event.in_doubt
+        ),
+    }
 
 
 async def test_the_migrations_make_the_tables(store):
