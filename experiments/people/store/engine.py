@@ -28,6 +28,14 @@ PRAGMAS = (
     "PRAGMA foreign_keys = ON",
     "PRAGMA secure_delete = ON",  # what is deleted is overwritten
 )
+# Settings of servers, and the values with which a commit is on the disk before it returns.
+DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
+    "mysql": {"@@innodb_flush_log_at_trx_commit": ("1",)},
+    "postgresql": {
+        "current_setting('fsync')": ("on",),
+        "current_setting('synchronous_commit')": ("on", "local", "remote_write", "remote_apply"),
+    },
+}
 PATIENCE_S = 20  # for locks and for connections
 TRIES = 9
 PAUSE_S = 0.01  # before the second try, on average twice as long; doubles with each try
@@ -84,6 +92,19 @@ class Database:
                 found = (await connection.execute(text("PRAGMA integrity_check(1)"))).scalar()
             if found != "ok":
                 raise StoreError(damaged(self.name))
+
+    async def check_durable(self) -> None:
+        """Raise StoreError if the server is set to confirm what is not on its disk yet."""
+        if self._sqlite:
+            return
+        async with self.reading() as connection:
+            for setting, safe in DURABLE[self.kind].items():
+                value = (await connection.execute(text(f"SELECT {setting}"))).scalar()
+                if str(value) not in safe:
+                    raise StoreError(
+                        f"The database {self.name} may lose what it has confirmed, as {setting} is {value}: "
+                        f"set it to {safe[0]}."
+                    )
 
     @asynccontextmanager
     async def _connection(self, **options: Any) -> AsyncIterator[AsyncConnection]:

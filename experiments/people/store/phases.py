@@ -71,13 +71,9 @@ class Phases(Part):
             )
             if not moved.rowcount:
                 return False
-            await _save(connection, person_id, name, answers or {}, now)
-            await connection.execute(
-                update(answer)
-                .where(answer.c.person_id == person_id, answer.c.phase == name)
-                .values(final=True)
-            )
-            await _end_phase(connection, person_id, name, now, duration_s, attempts=attempts, reason=reason)
+            await _save(connection, person_id, name, answers or {}, now, final=True)
+            how = {"duration_s": duration_s, "attempts": attempts, "reason": reason}
+            await _end_phase(connection, person_id, name, now, how)
             if status is not None:
                 await end(connection, self._study_id, person_id, status)
             return True
@@ -156,40 +152,42 @@ async def _phase(connection: AsyncConnection, person_id: int, name: str) -> Phas
 
 
 async def _end_phase(
-    connection: AsyncConnection,
-    person_id: int,
-    name: str,
-    now: datetime,
-    duration_s: float | None,
-    **how: Any,
+    connection: AsyncConnection, person_id: int, name: str, now: datetime, how: dict[str, Any]
 ) -> None:
     row = await _phase(connection, person_id, name)
+    if how["duration_s"] is None:
+        how["duration_s"] = max(0.0, (now - row.shown).total_seconds()) if row else 0.0
     if row is None:  # it was never shown, such as a phase that is skipped
-        await connection.execute(insert(phases).values(person_id=person_id, name=name, shown=now))
-    if duration_s is None:
-        duration_s = max(0.0, (now - row.shown).total_seconds()) if row else 0.0
-    await connection.execute(
-        update(phases)
-        .where(phases.c.person_id == person_id, phases.c.name == name)
-        .values(ended=now, duration_s=duration_s, **how)
-    )
+        await connection.execute(
+            insert(phases).values(person_id=person_id, name=name, shown=now, ended=now, **how)
+        )
+        return
+    mine = (phases.c.person_id == person_id, phases.c.name == name)
+    await connection.execute(update(phases).where(*mine).values(ended=now, **how))
 
 
 async def _save(
-    connection: AsyncConnection, person_id: int, phase: str, values: Mapping[str, Any], now: datetime
+    connection: AsyncConnection,
+    person_id: int,
+    phase: str,
+    values: Mapping[str, Any],
+    now: datetime,
+    *,
+    final: bool = False,
 ) -> None:
-    """Insert or replace; nobody else writes meanwhile, as the person's row is locked."""
+    """Insert or replace; with `final`, make all answers of the phase final. The person's row must be locked."""
     mine = (answer.c.person_id == person_id, answer.c.phase == phase)
     known = set((await connection.execute(select(answer.c.item).where(*mine))).scalars())
-    for item, value in values.items():
-        if item in known:
-            await connection.execute(
-                update(answer)
-                .where(*mine, answer.c.item == item, answer.c.final.is_(False))
-                .values(value=value, given=now)
-            )
+    for item in known & set(values):
+        await connection.execute(
+            update(answer)
+            .where(*mine, answer.c.item == item, answer.c.final.is_(False))
+            .values(value=values[item], given=now)
+        )
+    if final and known:
+        await connection.execute(update(answer).where(*mine).values(final=True))
     new = [
-        {"person_id": person_id, "phase": phase, "item": item, "value": value, "given": now, "final": False}
+        {"person_id": person_id, "phase": phase, "item": item, "value": value, "given": now, "final": final}
         for item, value in values.items()
         if item not in known
     ]

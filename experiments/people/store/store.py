@@ -50,6 +50,7 @@ class Store(People, Assignments, Phases, Endings, Erasure):
         """
         database = Database(url)
         try:
+            await database.check_durable()
             await upgrade(database)
             return cls(database, await _study_id(database, study_name, file_hash))
         except BaseException:

@@ -236,6 +236,29 @@ async def test_a_wrong_user_or_database_is_named(request, kind, address, message
         await Store.open(address.format(server), "pilot", "0" * 64)
 
 
+@pytest.mark.parametrize(
+    ("kind", "unsafe", "safe"),
+    [
+        (
+            "mysql",
+            "SET GLOBAL innodb_flush_log_at_trx_commit = 2",
+            "SET GLOBAL innodb_flush_log_at_trx_commit = 1",
+        ),
+        ("postgresql", "ALTER DATABASE {} SET synchronous_commit = off", "ALTER DATABASE {} RESET ALL"),
+    ],
+)
+async def test_a_server_that_may_lose_what_it_confirmed_is_refused(url, store, kind, unsafe, safe):
+    database = store._database.url
+    if database.get_backend_name() != kind:
+        pytest.skip(f"only for {kind}")
+    await run(store, unsafe.format(database.database))
+    try:
+        with pytest.raises(StoreError, match=r"may lose what it has confirmed.* set it to (1|on)\."):
+            await Store.open(url, "pilot", "0" * 64)
+    finally:
+        await run(store, safe.format(database.database))
+
+
 async def test_a_damaged_file_is_named(tmp_path):
     (tmp_path / "study.db").write_bytes(b"no database at all, but long enough" * 100)
     with pytest.raises(StoreError, match="damaged: restore"):
