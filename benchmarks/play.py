@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.support.first_frame import measure_first_frame
 from benchmarks.support.play_hostile import NGINX, measure_hostile
 from benchmarks.support.play_load import load, measure_capacity, measure_latency
 from benchmarks.support.play_server import Report
@@ -17,6 +18,7 @@ from experiments.errors import ConfigError
 SESSIONS, DRAWING_SESSIONS = 3, 25  # a core, with frames and with clients that draw
 SECONDS, QUICK_SECONDS = 15.0, 4.0  # of each case
 HOSTILE_SOCKETS = 2000
+OPENINGS, QUICK_OPENINGS = 5, 1  # of a link, in each case
 TRIES = 3  # numbers of sessions that are tried, each smaller than the one before
 FAST = ("--fidelity", "event")
 REQUIREMENTS = {
@@ -42,6 +44,12 @@ REQUIREMENTS = {
         ),
         Requirement("slowest new visit meanwhile, s", "slowest_visit_s", "<=", 2.0),
     ),
+    "first-frame": (
+        Requirement("from the link to Start, first visit, s", "first_s", "<=", 3.0),
+        Requirement("the same at 10 Mbit/s and 80 ms, s", "slow_s", "<=", 5.0),
+        Requirement("second visit, s", "second_s", "<=", 1.0),
+        Requirement("over the network, first visit, MB", "megabytes", "<=", 2.0),
+    ),
 }
 
 
@@ -59,7 +67,12 @@ def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]
         if name not in REQUIREMENTS:
             raise ConfigError(f"benchmark play has no part {name!r}; there are {', '.join(REQUIREMENTS)}")
     result: dict[str, Any] = {"load": load()}
-    measures = {"latency": _latency, "capacity": _capacity, "hostile": _hostile}
+    measures = {
+        "latency": _latency,
+        "capacity": _capacity,
+        "hostile": _hostile,
+        "first-frame": _first_frame,
+    }
     with tempfile.TemporaryDirectory(prefix="mjsim-play-") as folder:
         for name in parts or measures:
             place = Path(folder) / name
@@ -73,7 +86,7 @@ def lines(result: Mapping[str, Any]) -> Iterator[str]:
     yield f"load at the start: {result['load']:.1f} processes a core"
     for name, requirements in REQUIREMENTS.items():
         if name in result:
-            line = _hostile_line if name == "hostile" else _line
+            line = LINES.get(name, _line)
             yield from (line(case_name, case) for case_name, case in result[name]["cases"].items())
             yield from requirement_lines(result[name], requirements)
 
@@ -92,6 +105,16 @@ def _hostile_line(name: str, case: Mapping[str, Any]) -> str:
         f"of the hostile machine {case['sockets_served']} sockets of one visit were served, {case['visits_begun']} "
         f"visits begun, and its flood left {case['journal_kb']:.0f} kB"
     )
+
+
+def _first_frame_line(name: str, case: Mapping[str, Any]) -> str:
+    return (
+        f"{name}: {case['seconds']:.2f} s from the link to Start (slowest of {case['tries']}: "
+        f"{case['slowest']:.2f} s), {case['megabytes']:.2f} MB"
+    )
+
+
+LINES = {"hostile": _hostile_line, "first-frame": _first_frame_line}
 
 
 def _progress(part: str) -> Report:
@@ -152,6 +175,19 @@ def _hostile(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
         "cases": cases,
         "states_per_s": min(case["states_per_s"] for case in cases.values()),
         "slowest_visit_s": max(case["slowest_visit_s"] for case in cases.values()),
+    }
+
+
+def _first_frame(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
+    _, words = _size(quick)
+    cases = measure_first_frame(folder / "visits", QUICK_OPENINGS if quick else OPENINGS, report, *words)
+    first = cases["first visit"]
+    return {
+        "cases": cases,
+        "first_s": first["seconds"],
+        "slow_s": cases["first visit, 10 Mbit/s and 80 ms"]["seconds"],
+        "second_s": cases["second visit"]["seconds"],
+        "megabytes": first["megabytes"],
     }
 
 

@@ -1,16 +1,9 @@
 """Browsers of the system: Chromium, driven by Playwright, and Firefox."""
 
-import os
-from pathlib import Path
-
 import pytest
 
+from benchmarks.support.chromium import CHROMIUM, chromium_browser
 from tests.experiments.web.browser.pages import FIREFOX, XVFB, Chromium, firefox, virtual_screen
-
-CHROMIUM = Path("/usr/bin/chromium")
-# Mesa's software, some four times as fast as the browser's own.
-WEBGL = ["--use-angle=gles-egl", "--ignore-gpu-blocklist", "--enable-unsafe-swiftshader"]
-FLAGS = ["--no-sandbox", "--disable-background-networking", *WEBGL]
 
 
 @pytest.fixture
@@ -18,13 +11,8 @@ def chromium():
     """A browser without a screen."""
     if not CHROMIUM.is_file():
         pytest.skip(f"no browser at {CHROMIUM}")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver:
-        software = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}
-        browser = driver.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS, env=software)
+    with chromium_browser() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -1,0 +1,91 @@
+"""How soon a visit can be played: from opening its link until the house is loaded and Start can be pressed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Browser, BrowserContext, Page
+
+from benchmarks.support.chromium import chromium_browser
+from benchmarks.support.play_server import PATIENCE, TASK_ALONE, PlayProcess, Report
+
+SLOW = {"offline": False, "latency": 80, "downloadThroughput": 10e6 / 8, "uploadThroughput": 10e6 / 8}
+# The time since the link was opened, ms, once Start can be pressed; it comes when the house is loaded and compiled.
+PLAYABLE = """() => {
+  const start = document.querySelector("#panel[open] button.button:enabled");
+  return document.querySelector("#play[data-phase=ready]") && start?.checkVisibility() && performance.now();
+}"""
+WIDTH, HEIGHT = 1280, 720  # px
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A visit that was opened.
+
+    Attributes:
+        seconds: From opening the link until Start could be pressed, s.
+        megabytes: What came over the network, with all that is loaded later, MB.
+    """
+
+    seconds: float
+    megabytes: float
+
+
+def measure_first_frame(folder: Path, tries: int, report: Report, *words: str) -> dict[str, dict[str, Any]]:
+    """Cases of opening a visit: each the median of some tries, but for the first visit to a server."""
+    cases: dict[str, list[Opened]] = {}
+    places = "--sessions", str(3 * tries + 1)  # pages that are closed keep theirs for a while
+    with PlayProcess(folder, *TASK_ALONE, *places, *words) as server, chromium_browser() as browser:
+        report("the first visit to a server that has just started")
+        cases["server just started"] = [_open(_context(browser), server)]
+        for number in range(tries):
+            report(f"round {number + 1} of {tries}")
+            context = _context(browser)
+            cases.setdefault("first visit", []).append(_open(context, server))
+            cases.setdefault("second visit", []).append(_open(context, server))
+            slow = _open(_context(browser), server, slow=True)
+            cases.setdefault("first visit, 10 Mbit/s and 80 ms", []).append(slow)
+            for used in browser.contexts:
+                used.close()
+    return {name: _median(opened) for name, opened in cases.items()}
+
+
+def _context(browser: Browser) -> BrowserContext:
+    """Like a new browser, with an empty cache."""
+    context = browser.new_context(viewport={"width": WIDTH, "height": HEIGHT})
+    context.set_default_timeout(1000.0 * PATIENCE)
+    return context
+
+
+def _open(context: BrowserContext, server: PlayProcess, *, slow: bool = False) -> Opened:
+    page = context.new_page()
+    came = _count(page, slow)
+    page.goto(f"{server.begin()}?draw=browser", wait_until="commit")
+    seconds = page.wait_for_function(PLAYABLE).json_value() / 1000.0
+    page.wait_for_load_state("networkidle")
+    page.close()
+    return Opened(seconds, sum(came) / 1e6)
+
+
+def _count(page: Page, slow: bool) -> list[float]:
+    """Bytes that come in, of answers as they are on the wire and of the socket before compression."""
+    came: list[float] = []
+    session = page.context.new_cdp_session(page)
+    session.send("Network.enable")
+    if slow:
+        session.send("Network.emulateNetworkConditions", SLOW)
+    session.on("Network.loadingFinished", lambda event: came.append(event["encodedDataLength"]))
+    session.on(
+        "Network.webSocketFrameReceived", lambda event: came.append(len(event["response"]["payloadData"]))
+    )
+    return came
+
+
+def _median(opened: list[Opened]) -> dict[str, Any]:
+    ordered = sorted(opened, key=lambda one: one.seconds)
+    return {
+        "seconds": ordered[len(ordered) // 2].seconds,
+        "slowest": ordered[-1].seconds,
+        "megabytes": max(one.megabytes for one in opened),
+        "tries": len(opened),
+    }
