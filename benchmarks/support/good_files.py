@@ -1,5 +1,6 @@
 """Good files of every kind, and a process that has loaded all that commands need."""
 
+import asyncio
 import contextlib
 import itertools
 import json
@@ -58,7 +59,9 @@ metrics batch
 compare batch
 study analyze people --out gone
 check home/catalogue.toml
+study init study.toml
 """
+NO_FILM = 'phases = ["consent", "training", "task", "survey", "completion"]\n[study.pay]'
 
 
 def prepare(folder: Path) -> None:
@@ -69,7 +72,12 @@ def prepare(folder: Path) -> None:
     from experiments.web.server.pool import WorkerPool
 
     parser(*COMMANDS)
-    uvicorn.Server.run = WorkerPool.warm_up = lambda *_, **__: None  # type: ignore
+
+    async def serve_nobody(*_: Any, **__: Any) -> None:
+        """Let `mjsim play` and `mjsim study serve` end at once."""
+
+    uvicorn.Server.serve = serve_nobody  # type: ignore
+    WorkerPool.warm_up = lambda *_, **__: None  # type: ignore
     (folder / "home").mkdir()
     (folder / "people").mkdir()
     texts = {
@@ -96,6 +104,25 @@ def prepare(folder: Path) -> None:
                 raise RuntimeError(f"mjsim {line} ended with {code}")
     shutil.rmtree(folder / "gone")
     shutil.copy(folder / "run" / "episode.json", folder)
+    study = (folder / "study.toml").read_text()
+    study = study[: study.index("[study.minimum]")] + study[study.index("[study.pay]") :]
+    (folder / "study.toml").write_text(study.replace("[study.pay]", NO_FILM))
+    asyncio.run(_played(folder))
+
+
+async def _played(folder: Path) -> None:
+    """A study in which one person has played, and its backup."""
+    from experiments.people.store import Store
+    from experiments.record.checksums import sha256_of
+
+    served = folder / "served"
+    shutil.copytree(folder / "run", served / "visits" / ("a" * 64) / "task")
+    store = await Store.open(f"sqlite:///{served / 'study.db'}", "my-study", sha256_of(folder / "study.toml"))
+    person = await store.arrive("link", None, {}, "a" * 64, "task")
+    await store.finish_trial(person.id, "task", f"visits/{'a' * 64}/task", "all delivered")
+    await store.finish_phase(person.id, "task", "survey", {}, "all delivered")
+    await store.backup(folder / "backup.db")
+    await store.close()
 
 
 def made_up_rows(people: int = 4) -> list[dict[str, Any]]:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from experiments.errors import RecordError
+from experiments.errors import ConfigError, RecordError
 
 DATABASE = "study.db"
 
@@ -31,4 +31,13 @@ def database_url(arguments: argparse.Namespace) -> str:
     path: Path = arguments.folder / DATABASE
     if not path.is_file():
         raise RecordError(f"{arguments.folder} has no {DATABASE}; name the folder of `mjsim study serve`")
+    return sqlite_url(path)
+
+
+def sqlite_url(path: Path) -> str:
+    """The URL of an SQLite file."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise ConfigError(f"{str(path)!r} cannot be the path of a database; it is not UTF-8") from None
     return f"sqlite:///{path.absolute()}"

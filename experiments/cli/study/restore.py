@@ -7,6 +7,7 @@ from typing import Any
 
 from experiments.cli.options import add_command
 from experiments.cli.requirements import require_extra
+from experiments.cli.study.database import sqlite_url
 
 DESCRIPTION = """\
 Fill an empty database with a backup of `mjsim study backup`. The database may be of another kind than the one that was
@@ -30,6 +31,6 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.people.store import restore
 
     url = arguments.database
-    asyncio.run(restore(arguments.backup, url if "://" in url else f"sqlite:///{Path(url).absolute()}"))
+    asyncio.run(restore(arguments.backup, url if "://" in url else sqlite_url(Path(url))))
     print(url)
     return 0

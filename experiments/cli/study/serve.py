@@ -18,7 +18,7 @@ from experiments.cli.server import (
     prepare_process,
     serve,
 )
-from experiments.cli.study.database import DATABASE, add_database
+from experiments.cli.study.database import DATABASE, add_database, sqlite_url
 from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH
 
@@ -89,7 +89,7 @@ async def _serve(
     from experiments.people.store import Store
     from experiments.web.server.visits import Visits
 
-    url = arguments.database or f"sqlite:///{(arguments.out / DATABASE).absolute()}"
+    url = arguments.database or sqlite_url(arguments.out / DATABASE)
     store = await Store.open(url, study.settings.name, study.sha256)
     visits = Visits(arguments.out.absolute() / VISITS)
     procedure = Procedure(study, phases_of_study(study), store, visits, np.random.default_rng())

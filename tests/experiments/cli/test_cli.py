@@ -160,10 +160,14 @@ def test_the_help_names_the_phases_that_are_usual(command, phases, capsys):
     assert f"(docs/procedure.md) (default: {phases})" in text
 
 
+async def _nothing(*_, **__):
+    """Serves nobody."""
+
+
 @pytest.mark.parametrize(("text", "code"), [("Once upon a time.", 0), (None, 2)])
 def test_people_read_a_story_of_ones_own(text, code, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("experiments.web.server.pool.WorkerPool.warm_up", lambda _: None)
-    monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: None)
+    monkeypatch.setattr("uvicorn.Server.serve", _nothing)
     story = tmp_path / "story.txt"
     if text is not None:
         story.write_text(text)
