@@ -32,7 +32,7 @@ WATCH = """
 LOOK = """JSON.stringify({
     ...(window.watched ?? {}),
     phase: document.querySelector("#play")?.dataset.phase ?? "",
-    title: document.querySelector("h1")?.textContent ?? "",
+    trial: document.querySelector("#play")?.dataset.trial ?? "",
 })"""
 
 
@@ -61,9 +61,9 @@ class KeyPresser:
         self._seen, self._forward = {}, False
 
     def tidy(self):
-        """Play until the result is shown."""
-        until = time.monotonic() + TIME_LIMIT * len(self._targets)
-        while self._look()["title"] != "Your result":
+        """Play until another page is shown."""
+        until, trial = time.monotonic() + TIME_LIMIT * len(self._targets), self._look()["trial"]
+        while self._look()["trial"] == trial:
             assert time.monotonic() < until, "the task was not done in time"
             if self._playing:
                 self._visit()
