@@ -23,6 +23,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
+from experiments.errors import StoreError
 from experiments.people.phases.base import Again, FormData, Page
 from experiments.people.phases.played import Played
 from experiments.people.recruitment.base import Arrival, Leaving, Preview, Recruiter, Refusal
@@ -103,7 +104,7 @@ class StudyServer:
                 ),
                 Middleware(Guards, public=public, proxies=self._serving.proxies, max_body=MAX_FORM),
             ],
-            exception_handlers={404: self._unknown},
+            exception_handlers={404: self._unknown, StoreError: self._out_of_order},
             lifespan=self._lifespan,
         )
 
@@ -227,7 +228,10 @@ class StudyServer:
 
     async def _beat(self, person: Person) -> None:
         while True:
-            await self._store.beat(person.id)
+            try:
+                await self._store.beat(person.id)
+            except StoreError as error:  # the next one may be noted
+                LOG.warning("%s", error)
             await asyncio.sleep(BEAT_PERIOD)
 
     async def _show_phase(self, request: Request, person: Person, refused: Again | None = None) -> Response:
@@ -308,6 +312,10 @@ class StudyServer:
         words = self._study.texts["welcome"]
         heading = {"title": words[f"{name}_title"]}
         return self._page(request, "study", status, section=heading, paragraphs=[words[name]])
+
+    async def _out_of_order(self, request: Request, error: Exception) -> Response:
+        LOG.error("%s", error)
+        return self._message(request, "paused", 503)
 
     async def _unknown(self, request: Request, _: Exception) -> Response:
         return self._message(request, "unknown", 404)

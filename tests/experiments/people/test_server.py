@@ -10,6 +10,7 @@ import pytest
 from scripted_workers import ORIGIN, ScriptedPool, connected, play_trial, started, until
 from starlette.testclient import TestClient
 
+from experiments.errors import StoreError
 from experiments.people.phases import phases_of_study
 from experiments.people.recruitment import recruiter
 from experiments.people.server.app import Serving, StudyServer
@@ -194,6 +195,19 @@ def test_leaving_deletes_what_was_played_if_wanted(client, study, tmp_path):
         post(client, f"{link}/withdrawal", data=data)
         assert "You have left the study" in client.get(link).text
         assert len(list((tmp_path / "visits").iterdir())) == before - 1 + left
+
+
+def test_a_database_that_fails_pauses_the_study(client, monkeypatch):
+    link = begin(client)
+
+    async def fail(*_):
+        raise StoreError("the disk is full")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(Store, "finish_phase", fail)
+        answer = post(client, link, phase="consent", agree="yes")
+    assert answer.status_code == 503 and "come back later" in answer.text
+    assert phase(client, link) == "consent"
 
 
 def test_strangers_get_nothing(client, study):
