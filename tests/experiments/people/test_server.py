@@ -200,7 +200,7 @@ def test_leaving_deletes_what_was_played_if_wanted(client, study, tmp_path):
 def test_a_database_that_fails_pauses_the_study(client, monkeypatch):
     link = begin(client)
 
-    async def fail(*_):
+    async def fail(*_, **__):
         raise StoreError("the disk is full")
 
     with monkeypatch.context() as broken:
