@@ -17,7 +17,7 @@ FLAGS = ["--no-sandbox", "--disable-background-networking", *WEBGL]
 def chromium_browser() -> Iterator[Browser]:
     """A browser that draws with one of the processor's programs."""
     with sync_playwright() as driver:
-        software = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}
+        software: dict[str, str | float | bool] = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}
         browser = driver.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS, env=software)
         try:
             yield browser
