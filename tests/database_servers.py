@@ -2,6 +2,7 @@
 
 import os
 import pwd
+import random
 import shutil
 import signal
 import socket
@@ -32,32 +33,43 @@ class Server:
     """
 
     def __init__(
-        self, url: str, command: list[str], folder: Path, user: str | None, stop: signal.Signals
+        self,
+        url: str,
+        command: list[str],
+        folder: Path,
+        user: str | None,
+        stop: signal.Signals,
+        ready: list[str],
     ) -> None:
+        """`ready` is a command that succeeds once the server that answers takes connections as well."""
         self.url = url
-        self._command, self._folder, self._user, self._stop = command, folder, user, stop
+        self._command, self._folder, self._user, self._stop, self._ready = command, folder, user, stop, ready
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
         """Start it, again if what was killed is still going, until it answers."""
         port = int(self.url.rpartition(":")[2])
         end = time.monotonic() + PATIENCE_S
-        while self._process is None or not _answers(port):
+        while not (self._running() and _answers(port) and not subprocess.run(self._ready).returncode):
             if time.monotonic() > end:
                 raise RuntimeError(
                     f"{self._command[0]} does not start:\n{(self._folder / 'log').read_text()}"
                 )
-            if self._process is None or self._process.poll() is not None:
+            if not self._running():
                 with (self._folder / "log").open("ab") as log:
                     self._process = subprocess.Popen(
                         self._command,
                         stdout=log,
                         stderr=log,
                         cwd=self._folder,
+                        env=_own(self._folder),
                         user=self._user,
                         group=self._user,
                     )
             time.sleep(0.05)
+
+    def _running(self) -> bool:
+        return self._process is not None and self._process.poll() is None
 
     def stop(self) -> None:
         """Stop it without waiting for connections."""
@@ -91,7 +103,7 @@ def mariadb() -> Iterator[Server]:
             "--skip-name-resolve",
         ]
         url = f"mysql://study:secret@127.0.0.1:{port}"
-        with _running(Server(url, command, folder, user, signal.SIGTERM)) as server:
+        with _running(Server(url, command, folder, user, signal.SIGTERM, ["true"])) as server:
             yield server
 
 
@@ -105,7 +117,8 @@ def postgresql() -> Iterator[Server]:
         command = [_program("postgres"), "-D", data, "-p", str(port), "-c", "listen_addresses=127.0.0.1"]
         command += ["-c", f"unix_socket_directories={folder}"]
         url = f"postgresql://study@127.0.0.1:{port}"
-        with _running(Server(url, command, folder, user, signal.SIGINT)) as server:
+        ready = [_program("pg_isready"), "-q", "-h", "127.0.0.1", "-p", str(port)]
+        with _running(Server(url, command, folder, user, signal.SIGINT, ready)) as server:
             yield server
 
 
@@ -145,15 +158,24 @@ def _answers(port: int) -> bool:
 
 
 def _free_port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A port that no client gets: a server that is started again must find it free."""
+    while True:
+        port = random.randrange(15_000, 32_000)  # Linux gives clients those from 32768
+        if not _answers(port):
+            return port
 
 
 def _run(command: list[str], folder: Path, user: str | None) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, user=user, group=user)
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=folder, env=_own(folder), user=user, group=user
+    )
     if done.returncode:
         raise RuntimeError(f"{command} failed:\n{done.stdout}{done.stderr}")
+
+
+def _own(folder: Path) -> dict[str, str]:
+    """A server of MariaDB that starts deletes the temporary tables of others from a folder that they share."""
+    return {**os.environ, "TMPDIR": str(folder)}
 
 
 def _program(name: str) -> str:
