@@ -13,14 +13,13 @@ from typing import Any
 from urllib.parse import parse_qsl
 
 from starlette.applications import Starlette
+from starlette.background import BackgroundTask
 from starlette.datastructures import ImmutableMultiDict
 from starlette.middleware import Middleware
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
-from starlette.staticfiles import StaticFiles
+from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from experiments.errors import StoreError
@@ -30,7 +29,6 @@ from experiments.people.recruitment.base import Arrival, Leaving, Preview, Recru
 from experiments.people.server.procedure import Now, Procedure
 from experiments.people.store import Person
 from experiments.people.study_file import CONSENT
-from experiments.web.modules import STATIC
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
 from experiments.web.server.limit import SessionLimit
@@ -38,6 +36,7 @@ from experiments.web.server.pages import page
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.scene_files import scene_route
 from experiments.web.server.sessions import Sessions
+from experiments.web.server.static_files import static_routes
 from experiments.web.server.visits import PLAYED, TOKEN, new_token, token_hash
 from mjsim.scene_export.store import scenes_folder
 
@@ -96,7 +95,7 @@ class StudyServer:
                 Route("/play/{token}/ping", self._ping),
                 WebSocketRoute("/play/{token}", self._play),
                 scene_route(scenes_folder()),
-                Mount("/static", GZipMiddleware(StaticFiles(directory=STATIC))),
+                *static_routes(),
             ],
             middleware=[
                 Middleware(
@@ -268,15 +267,18 @@ class StudyServer:
         if visit is None:
             return self._message(request, "full")
         settings = visit.settings(visit.phase)
-        return page(
+        answer = page(
             request,
             "play",
             trial=visit.phase,
             objects=settings["objects"],
             draw=settings["draw"],
+            scene=self._sessions.scene(settings),
             wait=self._minimum[visit.phase],
             leave=f"{request.url.path}/withdrawal",
         )
+        answer.background = BackgroundTask(self._sessions.open, visit)
+        return answer
 
     async def _end(self, request: Request, person: Person, shown: Page) -> Response:
         back = self._recruiter.way_back("finished", await self._store.identity(person.id))

@@ -12,20 +12,18 @@ from urllib.parse import parse_qs
 
 from msgspec.structs import replace
 from starlette.applications import Starlette
+from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
-from starlette.staticfiles import StaticFiles
+from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from experiments.errors import RecordError
 from experiments.procedure.comprehension import Question
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
-from experiments.web.modules import STATIC
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
 from experiments.web.server.limit import SessionLimit
@@ -34,6 +32,7 @@ from experiments.web.server.pool import WorkerPool
 from experiments.web.server.readings import Readings
 from experiments.web.server.scene_files import scene_route
 from experiments.web.server.sessions import Sessions
+from experiments.web.server.static_files import static_routes
 from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, following, token_hash
 from mjsim.scene_export.store import scenes_folder
 
@@ -86,7 +85,7 @@ class PlayServer:
                 Route("/play/{token}/floor-plan.png", self._floor_plan),
                 WebSocketRoute("/play/{token}", self._play),
                 scene_route(scenes_folder()),
-                Mount("/static", GZipMiddleware(StaticFiles(directory=STATIC))),
+                *static_routes(),
             ],
             middleware=[
                 Middleware(
@@ -203,16 +202,18 @@ class PlayServer:
             return page(request, "film", wait=wait)
         if visit.phase in PLAYED:
             settings = visit.settings(visit.phase)
-            objects, draw = settings["objects"], settings["draw"]
-            return page(
+            answer = page(
                 request,
                 "play",
                 trial=visit.phase,
-                objects=objects,
-                draw=draw,
+                objects=settings["objects"],
+                draw=settings["draw"],
+                scene=self.sessions.scene(settings),
                 wait=wait,
                 xr=self._config.xr,
             )
+            answer.background = BackgroundTask(self.sessions.open, visit)
+            return answer
         again = visit.settings(TASK)["episode"] is None  # else there is but one, whose best way was shown
         return page(
             request, "result", metrics=visit.metrics(TASK), again=again, token=request.path_params["token"]

@@ -11,9 +11,11 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from experiments.web.server.static_files import static_caching
+
 MAX_BODY = 4096  # bytes of a form
 HOST = re.compile(r"([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(:\d{1,5})?")
-UNCACHED, CHECKED = "no-store", "no-cache"  # pages; files, which are used again while their ETag is the same
+UNCACHED = "no-store"  # pages
 Address = IPv4Address | IPv6Address
 Network = IPv4Network | IPv6Network
 HEADERS = {
@@ -78,7 +80,7 @@ class Guards:
             await send({"type": "websocket.close", "code": 1008})
             return
 
-        cache = CHECKED if scope["path"].startswith("/static/") else UNCACHED
+        cache = static_caching(scope["path"]) or UNCACHED
 
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":

@@ -8,6 +8,7 @@ from starlette.responses import Response
 from starlette.templating import Jinja2Templates
 
 from experiments.web.modules import STATIC, modules_of
+from experiments.web.server.static_files import static_url
 
 CLIENT = STATIC.parent
 
@@ -25,7 +26,7 @@ def _modules(entry: str) -> tuple[str, ...]:
 
 _templates = Jinja2Templates(CLIENT / "templates")
 _templates.env.filters["duration"] = _duration
-_templates.env.globals["modules"] = _modules
+_templates.env.globals.update(modules=_modules, static=static_url)
 _templates.env.trim_blocks = True
 
 

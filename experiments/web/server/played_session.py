@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableMapping
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -21,6 +21,7 @@ from experiments.web.protocol import (
     Pause,
     Run,
     Saved,
+    Scene,
     Seen,
     Snapshot,
     State,
@@ -63,9 +64,14 @@ class PlayedSession:
     """
 
     def __init__(
-        self, visit: Visit, pool: WorkerPool, limit: SessionLimit, minimum: Mapping[str, float]
+        self,
+        visit: Visit,
+        pool: WorkerPool,
+        limit: SessionLimit,
+        minimum: Mapping[str, float],
+        scenes: MutableMapping[str, str],
     ) -> None:
-        self.visit, self._minimum = visit, minimum
+        self.visit, self._minimum, self._scenes = visit, minimum, scenes
         self.browser: Browser | None = None
         self.heard = time.monotonic()
         self.state = State()
@@ -74,6 +80,12 @@ class PlayedSession:
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
         self._taken = self._step = 0  # number of the last input that is safe, and the next control step
+
+    def open(self) -> None:
+        """Open the session if there is a place: a page that was just sent will ask for it."""
+        if self._task is None and self._limit.free:
+            self.heard = time.monotonic()
+            self._task = asyncio.create_task(self._run())
 
     def attach(self, browser: Browser, view: View) -> None:
         """Connect a browser; it replaces the one before."""
@@ -218,6 +230,8 @@ class PlayedSession:
                     case Taken(number, step):
                         crashes = 0 if step > safe else crashes
                         self._taken, safe, self._step = number, step, max(self._step, step)
+                    case Scene(path=str(path)):
+                        self._scenes[opening.config["house"]] = path
                     case Snapshot(step):
                         self._step = max(self._step, step)
                     case Saved():

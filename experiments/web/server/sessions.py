@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from experiments.web import protocol
 from experiments.web.server.limit import SessionLimit
@@ -22,12 +23,23 @@ class Sessions:
     ) -> None:
         self._pool, self._limit, self._idle, self._minimum = pool, limit, idle, minimum
         self._sessions: dict[str, PlayedSession] = {}
+        self._scenes: dict[str, str] = {}  # by house, of those that a worker has named
 
     def of(self, visit: Visit) -> PlayedSession:
         """The session of a visit."""
         if visit.name not in self._sessions:
-            self._sessions[visit.name] = PlayedSession(visit, self._pool, self._limit, self._minimum)
+            self._sessions[visit.name] = PlayedSession(
+                visit, self._pool, self._limit, self._minimum, self._scenes
+            )
         return self._sessions[visit.name]
+
+    async def open(self, visit: Visit) -> None:
+        """Open the session of a visit whose page was just sent, so that it is ready when the page connects."""
+        self.of(visit).open()
+
+    def scene(self, settings: Mapping[str, Any]) -> str | None:
+        """Folder of the files that the page of a trial will probably draw; None where that is not known."""
+        return None if settings["draw"] == "server" else self._scenes.get(settings["house"])
 
     async def watch(self) -> None:
         """Release sessions whose person is gone, for ever."""

@@ -41,6 +41,7 @@ class SessionControl:
         self._promises: deque[tuple[int, float]] = deque(maxlen=MAX_PROMISES)
         self._notes: list[Note] = []
         self._changed = threading.Condition()
+        self._asked = False  # to be shown at once
         self._ready = 0.0  # when the session could first be started, monotonic
         self._heard = now()  # when the page was heard last
 
@@ -67,7 +68,7 @@ class SessionControl:
             elif (before.phase, after.phase) == (PAUSED, RUNNING):
                 self._note("resume")
             elif after.phase is READY:
-                self._ready = self._now()
+                self._ready = self._now() if self._asked else 0.0
             elif (before.phase, after.phase) == (READY, RUNNING):
                 self._note("started", waited_s=round(self._now() - self._ready, 3))
             self._announce(after)
@@ -137,10 +138,18 @@ class SessionControl:
             taken, self._notes = self._notes, []
         return taken
 
-    def wait_for_change(self, phase: SessionPhase, seconds: float) -> None:
-        """Wait until the session has left a phase, but no longer than `seconds`."""
+    def ask_to_show(self) -> None:
+        """Somebody has just connected, or has another view."""
         with self._changed:
-            self._changed.wait_for(lambda: self.state.phase is not phase, seconds)
+            self._asked = True
+            self._ready = self._ready or self._now()
+            self._changed.notify_all()
+
+    def wait_for_change(self, phase: SessionPhase, seconds: float) -> None:
+        """Wait until the session has left a phase or is to be shown, but no longer than `seconds`."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._asked or self.state.phase is not phase, seconds)
+            self._asked = False
 
     def _promise(self, until: int) -> None:
         if not self._promises or until > self._promises[-1][0]:

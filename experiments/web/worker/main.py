@@ -93,6 +93,7 @@ class Worker:
                 self._control.note(type(message).__name__.lower(), **msgspec.structs.asdict(message))
             case View():
                 self._viewer.set_view(message)
+                self._control.ask_to_show()
             case Seen(frame) if self._viewer.drawer is not None:
                 self._viewer.drawer.note_seen(frame)
 

@@ -55,11 +55,18 @@ export class DrawnView {
     return this.#body[2] ?? 0;
   }
 
+  /** Loads a house ahead of the server's word; `load` says what went wrong. @param {string} path */
+  prepare(path) {
+    const before = this.#house.loaded.catch(() => {});
+    this.#house = { path, loaded: before.then(() => this.#loadHouse(path)) };
+    this.#house.loaded.catch(() => {});
+  }
+
   /** Loads a house; a page that reconnects, or has another size, has it or is loading it. @param {Scene} message */
   async load(message) {
     const { path } = message;
     if (path === null) throw new Error("the server has no files of it");
-    if (this.#house.path !== path) this.#house = { path, loaded: this.#loadHouse(path) };
+    if (this.#house.path !== path) this.prepare(path);
     await this.#house.loaded;
     const floor = message.floor === null ? null : await fetch(message.floor);
     if (floor && !floor.ok) throw new Error(`${message.floor}: ${floor.status}`);

@@ -274,6 +274,7 @@ learnLayout();
 const lack = await picture.prepare();
 const { drawn: view } = picture;
 view?.world.onFrame(drawPicture);
+if (page.dataset["scene"]) view?.prepare(page.dataset["scene"]);
 if (view && "headset" in page.dataset) {
   view.headset = new HeadsetPage(view.world, inputs);
   view.headset.offer(byId("headset-button", HTMLElement), () => view.heading);

@@ -49,6 +49,21 @@ describe("a view that this browser draws", () => {
     expect(world.load).toHaveBeenCalledTimes(1);
   });
 
+  test("loads another house after the one that was expected", async () => {
+    const [other, order] = [new DrawnView(/** @type {HTMLCanvasElement} */ ({}), () => {}, () => {}), /** @type {string[]} */ ([])];
+    world.load.mockImplementation(/** @param {any} resolve */ async (...resolve) => {
+      const path = /** @type {any} */ (resolve[0])("");
+      order.push(path);
+      await Promise.resolve();
+      order.push(`${path} is there`);
+      if (path !== SCENE.path) throw new Error("no such house");
+      return { objects: { mug: {} } };
+    });
+    other.prepare("/scene/0/");
+    await other.load(SCENE);
+    expect(order).toEqual(["/scene/0/", "/scene/0/ is there", "/scene/1/", "/scene/1/ is there"]);
+  });
+
   test("says why there is no floor", async () => {
     vi.stubGlobal("fetch", async () => new Response("", { status: 404 }));
     await expect(view.load(SCENE)).rejects.toThrow("floor.json: 404");

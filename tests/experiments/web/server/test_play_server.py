@@ -37,6 +37,7 @@ from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
 from experiments.web.server.visits import VISIT, Visits, token_hash
 
 TASK = TrialConfig(objects=6, assistance="optimal", seed=0, user="human", live=True).settings()
+SCENE = protocol.Scene("/scene/0123/", None, protocol.Gait(*[1.0] * 22), protocol.Speeds(1.0, 1.0, 1.0), 1.5, 0.04)
 TRIALS = {"training": {**TASK, "objects": 1}, "task": TASK}
 
 
@@ -195,6 +196,11 @@ def test_files_are_cached_and_pages_are_not(tmp_path, pool):
             assert not cached or headers["etag"]
         tag = client.get("/static/play.js").headers["etag"]
         assert client.get("/static/play.js", headers={"If-None-Match": tag}).status_code == 304
+        text = client.get(link).text
+        (address,) = re.findall(r'<script type="module" src="(/static/[0-9a-f]{16}/wait.js)">', text)
+        answer = client.get(address)
+        assert answer.status_code == 200 and "immutable" in answer.headers["cache-control"]
+        assert f'href="{address.replace("wait.js", "style.css")}"' in text
 
 
 PROXY, SPOOF = "203.0.113.9", "198.51.100."
@@ -598,6 +604,40 @@ def test_beyond_the_limit_people_wait_in_a_queue(client):
         until_phase(first, "ready")
         left(first)
         until_phase(second, "ready")
+
+
+def test_a_session_is_open_before_its_page_connects(client, pool):
+    link = new_visit(client)
+    client.get(link)
+    (worker,) = pool.workers
+    with connected(client, link) as socket:
+        started(socket)
+    assert pool.workers == [worker]
+    assert len([told for told in worker.told if isinstance(told, Open)]) == 1
+
+
+def test_a_page_that_never_connects_keeps_no_place_from_those_who_wait(tmp_path, monkeypatch, pool):
+    monkeypatch.setattr("experiments.web.server.sessions.MAX_AWAY", 0.1)
+    monkeypatch.setattr("experiments.web.server.sessions.WATCH_PERIOD", 0.05)
+    with serving(tmp_path, pool) as client:
+        client.get(new_visit(client))
+        client.get(new_visit(client))  # gets none, nor a place in the queue
+        assert len(pool.workers) == 1
+        with connected(client, new_visit(client)) as socket:
+            socket.send_json(hello())
+            until_phase(socket, "ready")
+
+
+def test_a_page_names_the_scene_that_its_house_had_before(tmp_path, pool):
+    with serving(tmp_path, pool, sessions=2) as client:
+        link = new_visit(client)
+        assert "/scene/" not in client.get(link).text
+        with connected(client, link) as socket:
+            started(socket)
+            pool.workers[0].say(SCENE)
+            until(socket, "scene")
+        text = client.get(new_visit(client)).text
+    assert 'data-scene="/scene/0123/"' in text and 'href="/scene/0123/house.glb" as="fetch"' in text
 
 
 def test_an_idle_session_gives_its_place_back(tmp_path, pool, monkeypatch):

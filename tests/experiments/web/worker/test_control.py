@@ -1,5 +1,8 @@
 """The state machine of a session, and the inputs that wait for it."""
 
+import time
+from unittest.mock import ANY
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -123,3 +126,24 @@ def test_the_clock_waits_for_what_was_promised_only():
     control.apply(Trigger.PAUSE, "asked")
     control.apply(Trigger.RUN, until=0)
     assert control.wait_for_promise(3, 0.01).missing, "a page that lets the clock run can announce promises"
+
+
+def test_who_connects_is_shown_the_session_at_once():
+    _, control = after("opened")
+    control.ask_to_show()
+    began = time.monotonic()
+    control.wait_for_change(READY, 10.0)
+    assert time.monotonic() - began < 5.0
+
+
+@pytest.mark.parametrize("events", [("opened", "show"), ("show", "opened")])
+def test_a_session_waits_for_its_person_from_when_it_is_ready_and_shown(events):
+    now = [100.0]
+    _, control = after(now=lambda: now[0])
+    for event in events:
+        now[0] += 5.0
+        control.ask_to_show() if event == "show" else control.apply(event)
+    now[0] += 2.5
+    control.ask_to_show()  # a page that is loaded again
+    control.apply("run")
+    assert control.take_notes() == [("started", {"waited_s": 2.5, "wall": ANY})]
