@@ -29,9 +29,12 @@ PERSON_VALUES = {  # options of their own, because they are changed most
     "field_of_view": "horizontal field of view of the picture and of what the participant perceives",
     "reading_time": "for how long the participant stands and reads before each visit",
 }
+PAGE_SETTINGS = ("draw", "field_of_view_range")  # of the page of `mjsim play`
 # The settings that run, batch and play have in common.
 TRIAL_OPTIONS = tuple(
-    name for name in SETTINGS if name not in ("objects", "assistance", "user", "live", "behaviour", "draw")
+    name
+    for name in SETTINGS
+    if name not in ("objects", "assistance", "user", "live", "behaviour", *PAGE_SETTINGS)
 )
 _TYPES = typing.get_type_hints(TrialConfig)
 

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 
 from experiments.cli.options import (
+    PAGE_SETTINGS,
     add_command,
     add_setting,
     add_task_options,
@@ -58,7 +59,8 @@ def add_parser(commands: Any) -> None:
     add_task_options(parser, OBJECTS)
     parser.add_argument("--user", default=HUMAN, metavar="NAME", help="name of the participant")
     add_trial_options(parser, phases=",".join(PHASES))
-    add_setting(parser, "draw")
+    for name in PAGE_SETTINGS:
+        add_setting(parser, name)
     parser.add_argument(
         "--xr", action="store_true", help="offer a button for a headset, where there is one (experimental)"
     )
@@ -120,7 +122,7 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
         user=HUMAN,
         **{
             "objects": OBJECTS,
-            **given_options(arguments, ("objects", "draw")),
+            **given_options(arguments, ("objects", *PAGE_SETTINGS)),
             **trial_options(arguments),
             "phases": ",".join(_phases(arguments)),
         },

@@ -22,6 +22,7 @@ class Displays:
         display_frame_ms_95: Of the times between two pictures, 95 % were shorter.
         display_latency_ms: From an input to the picture that shows it; None where nothing was pressed.
         display_dropped: Share of the pictures that came and were not shown.
+        display_field_of_view: Horizontal field of view of the picture, rad; None where the person could not choose it.
     """
 
     drawn_by_browser: float
@@ -33,6 +34,7 @@ class Displays:
     display_frame_ms_95: float
     display_latency_ms: float | None
     display_dropped: float
+    display_field_of_view: float | None
 
 
 def displays(events: Sequence[Event]) -> dict[str, Any]:
@@ -47,6 +49,7 @@ def displays(events: Sequence[Event]) -> dict[str, Any]:
     shown = sum(5.0 * event["frames_per_s"] for event in told)
     dropped = sum(event["dropped"] for event in told)
     waits = [event["latency_ms"] for event in told if event["latency_ms"] is not None]
+    angles = [angle for event in told if (angle := event.get("field_of_view")) is not None]
     found = Displays(
         drawn_by_browser=sum(event.get("draw") == "browser" for event in told) / len(told),
         display_renderer=statistics.mode(event["renderer"] for event in told),
@@ -57,5 +60,6 @@ def displays(events: Sequence[Event]) -> dict[str, Any]:
         display_frame_ms_95=median("frame_ms_95"),
         display_latency_ms=float(statistics.median(waits)) if waits else None,
         display_dropped=dropped / (shown + dropped) if dropped else 0.0,
+        display_field_of_view=float(statistics.median(angles)) if angles else None,
     )
     return asdict(found)

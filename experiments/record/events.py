@@ -274,6 +274,7 @@ class DisplayEvent(LoggedEvent, frozen=True):
             server that counts it; null where nothing was pressed.
         dropped: Pictures that came and were not shown.
         wall: When, s since 1970.
+        field_of_view: Horizontal field of view of the picture, rad; null where the person cannot choose it.
     """
 
     draw: Literal["browser", "server"]
@@ -287,6 +288,7 @@ class DisplayEvent(LoggedEvent, frozen=True):
     latency_ms: float | None
     dropped: Count
     wall: float
+    field_of_view: float | None = None
 
 
 class DrawEvent(LoggedEvent, frozen=True):

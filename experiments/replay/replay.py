@@ -185,7 +185,7 @@ def _house_of(directory: Path, record: Record, catalogue: str | None) -> House:
 
 
 def as_seen(record: Record, profile: str) -> FilmConfig:
-    """A film like the page on which the browser drew the session last: its shape, with the lists beside the picture.
+    """A film like the page on which the browser drew last: its shape, its field of view, and the lists beside it.
 
     Where no browser drew, the usual film.
     """
@@ -196,7 +196,13 @@ def as_seen(record: Record, profile: str) -> FilmConfig:
         return FilmConfig(profile=profile)
     width, height = views[-1]["width"], views[-1]["height"]
     scale = min(1.0, MAX_WIDTH / width)
-    return FilmConfig(max(320, round(scale * width)), max(240, round(scale * height)), profile, beside=True)
+    return FilmConfig(
+        max(320, round(scale * width)),
+        max(240, round(scale * height)),
+        profile,
+        beside=True,
+        field_of_view=views[-1].get("field_of_view"),
+    )
 
 
 def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[Viewer, VideoWriter]:

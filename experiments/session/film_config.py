@@ -18,6 +18,7 @@ class FilmConfig:
         profile: Render profile.
         beside: Whether lists and hands of the HUD lie beside the picture, as on the page of `mjsim play`: frames are
             then larger than the picture.
+        field_of_view: Horizontal field of view of the picture, rad; None for that of the person.
 
     Raises:
         ConfigError: There is no such profile.
@@ -27,6 +28,7 @@ class FilmConfig:
     height: int = 480
     profile: str | RenderProfile = "fast"
     beside: bool = False
+    field_of_view: float | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.profile, str) and self.profile not in PROFILES:

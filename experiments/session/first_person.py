@@ -1,6 +1,8 @@
 """First-person frames with the HUD over them, and films of them."""
 
 import contextlib
+import dataclasses
+import math
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,9 +18,11 @@ from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.errors import RenderError
+from mjsim.model.avatar import EYE
 from mjsim.model.scene import Scene
 from mjsim.observation import Observation
 from mjsim.render import Renderer, gl_info, render_house_map, render_pictures
+from mjsim.render.cameras import CameraPose
 from mjsim.world import World
 
 
@@ -50,7 +54,7 @@ class FirstPersonRenderer:
 
     def camera_view(self, data: Any) -> CameraView:
         """The eye camera as the next frame of `data` shows it; a condition needs it to point to a goal."""
-        pose = self._renderer.camera_pose(data)
+        pose = self._renderer.camera_pose(data, self._camera(data))
         width, height = self._film.width, self._film.height
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
 
@@ -70,11 +74,19 @@ class FirstPersonRenderer:
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
             self._compositor = Compositor(self._pictures)
-        picture = self._renderer.rgb(data, markers=state.markers)
+        picture = self._renderer.rgb(data, self._camera(data), state.markers)
         if self._film.beside:
             top, below, left, right = self._film.margins
             picture = np.pad(picture, ((top, below), (left, right), (0, 0)))
         return self._compositor.compose(picture, state)
+
+    def _camera(self, data: Any) -> str | CameraPose:
+        """The eye, as wide as the film says."""
+        film = self._film
+        if film.field_of_view is None:
+            return EYE
+        fovy = 2.0 * math.atan(math.tan(film.field_of_view / 2.0) * film.height / film.width)
+        return dataclasses.replace(self._renderer.camera_pose(data), fovy=fovy)
 
     def close(self) -> None:
         """Free the GL context."""

@@ -34,6 +34,21 @@ def check_person(described: Distributions) -> None:
     _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
 
 
+def view_limits(text: str) -> tuple[float, float]:
+    """Parse `1.2,1.9`: within which angles, rad, a person may choose how wide the picture is; ConfigError otherwise."""
+    least, most, _ = RANGES["field_of_view"]
+    try:
+        low, high = map(float, text.split(","))
+    except ValueError:
+        low = high = math.nan
+    if not least <= low < high <= most:
+        raise ConfigError(
+            f"field_of_view_range is {text!r}; it must be two angles joined by a comma, the smaller one first, from "
+            f"{least:.4g} to {most:.4g} rad, such as 1.2,1.9"
+        )
+    return low, high
+
+
 def drawn_person(described: Distributions, rng: "np.random.Generator") -> PersonParameters:
     """A person; a ConfigError where a name is unknown, or a value cannot be drawn."""
     return _person(draw(PARAMETERS, described, rng, "a person"))

@@ -12,7 +12,7 @@ from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
 from experiments.participants.distribution import Distributions
 from experiments.record.phases import STORY, TASK, TRAINING, phases_of
-from experiments.trials.person import check_person
+from experiments.trials.person import check_person, view_limits
 from mjsim.episode import CAPACITY, POINTS, Episode
 from mjsim.model.catalogue_files import house_name
 from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions
@@ -133,6 +133,14 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             choices=DRAWN_BY,
         ),
     ] = DRAWN_BY[0]
+    field_of_view_range: Annotated[
+        str | None,
+        _about(
+            "Within which angles, rad, a person whose browser draws may choose the horizontal field of view of the "
+            "picture; otherwise it is the person's (docs/play.md).",
+            metavar="LOW,HIGH",
+        ),
+    ] = None
     person: Annotated[
         Distributions,
         _about(
@@ -199,11 +207,18 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
                 "the phases"
             )
         check_person(self.person)
+        if self.field_of_view_range is not None:
+            view_limits(self.field_of_view_range)
 
     @property
     def phase_names(self) -> tuple[str, ...]:
         """The phases, one by one."""
         return phases_of(self.phases)
+
+    @property
+    def view_limits(self) -> tuple[float, float] | None:
+        """Within which angles, rad, a person may choose how wide the picture is; None without a choice."""
+        return None if self.field_of_view_range is None else view_limits(self.field_of_view_range)
 
     @property
     def limit(self) -> float:

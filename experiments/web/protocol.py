@@ -31,6 +31,7 @@ PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", 
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
 Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # px
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+Angle = Annotated[float, msgspec.Meta(gt=0.0, lt=3.0)]  # rad, horizontal, of a view
 Measured = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 
 
@@ -39,11 +40,15 @@ class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 
 
 class View(WireMessage, frozen=True):
-    """How a page wants to see the session: size in px, and how frames are compressed; `none` where it draws itself."""
+    """How a page wants to see the session: size in px, and how frames are compressed; `none` where it draws itself.
+
+    `field_of_view` is what the person chose; it counts within the `field_of_view_range` of the scene.
+    """
 
     width: Length
     height: Length
     codec: Codec = "jpeg"
+    field_of_view: Angle | None = None
 
 
 class Hello(WireMessage, frozen=True):
@@ -95,7 +100,8 @@ class Display(WireMessage, frozen=True):
     and `pixel_ratio` is how many px of the screen one of them has. `frames_per_s` counts the pictures that were shown,
     `frame_ms` and `frame_ms_95` are median and 95 % of the times between two of them, `latency_ms` the median from an
     input to the picture that shows it, or, where the browser draws, to the state of the server that counts it, absent
-    where nothing was pressed, and `dropped` counts the pictures that came and were not shown.
+    where nothing was pressed, and `dropped` counts the pictures that came and were not shown. `field_of_view` is that
+    of the picture where the person may choose it.
     """
 
     draw: Drawer
@@ -108,6 +114,7 @@ class Display(WireMessage, frozen=True):
     frame_ms_95: Measured
     dropped: Count
     latency_ms: Measured | None = None
+    field_of_view: Angle | None = None
 
 
 class Draw(WireMessage, frozen=True):
@@ -230,7 +237,8 @@ class Scene(WireMessage, frozen=True):
 
     `path` is the folder of the scene's files on this server, None where it has none: then the server has to draw.
     `floor` is the file of the obstacles for `gait`, or None where walking cannot be predicted. `field_of_view` is
-    horizontal, rad, whatever the shape of the view; `step_duration` is that of a control step, s.
+    horizontal, rad, whatever the shape of the view; `field_of_view_range` is within which angles the person may choose
+    it, None without a choice. `step_duration` is that of a control step, s.
     """
 
     path: str | None
@@ -238,6 +246,7 @@ class Scene(WireMessage, frozen=True):
     gait: Gait
     speeds: Speeds
     field_of_view: float
+    field_of_view_range: tuple[float, float] | None
     step_duration: float
 
 

@@ -46,15 +46,16 @@ class Foresight:
     Args:
         scene: The composed episode.
         horizon: Within which time, s.
+        field_of_view: How wide the view is, rad; that of the scene's person if it is left out.
     """
 
-    def __init__(self, scene: Scene, horizon: float) -> None:
+    def __init__(self, scene: Scene, horizon: float, field_of_view: float | None = None) -> None:
         person = scene.person
         self._walls = scene.once("opaque walls", lambda: _opaque_walls(scene))
         self._offsets, self._radii = _balls(scene)
         self._stride = horizon * person.fastest_walk
         self._swing = horizon * math.hypot(person.turning_speed, person.looking_speed)
-        self._width = math.tan(person.field_of_view / 2.0)
+        self._width = math.tan((field_of_view or person.field_of_view) / 2.0)
         low, high = _extent(self._walls, self._stride + 1.0)
         rows, columns = (math.ceil(length / CELL) for length in high - low)
         self._grid = _Grid(

@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 
-from experiments.web.protocol import Gait, Scene, Snapshot, Speeds
+from experiments.web.protocol import Gait, Scene, Snapshot, Speeds, View
 from experiments.web.worker.houses import scene_files
 from experiments.web.worker.live_session import LiveSession
 from mjsim.errors import AssetError
@@ -19,8 +19,17 @@ LOOK_EVERY = 3  # control steps after which it is found out anew what is known
 DECIMALS = 4  # of positions, m, and orientations
 
 
-def scene_of(live: LiveSession) -> Scene:
-    """Where the files of a session's scene are, and how its person moves."""
+def field_of_view(live: LiveSession, view: View) -> float:
+    """How wide a view is, rad: the person's field of view, or what the person chose within the study's limits."""
+    own, limits = live.scene.person.field_of_view, live.config.view_limits
+    if limits is None or view.codec != "none":
+        return own
+    low, high = limits
+    return min(high, max(low, view.field_of_view or own))
+
+
+def scene_of(live: LiveSession, view: View) -> Scene:
+    """Where the files of a session's scene are, how its person moves, and how wide the view is."""
     person, options = live.scene.person, live.world.options
     path: str | None
     floor: str | None
@@ -34,17 +43,18 @@ def scene_of(live: LiveSession) -> Scene:
         floor if live.config.fidelity == "event" else None,
         Gait(**kinematics.Gait.of(live.scene, options)._asdict()),
         Speeds(person.walking_speed, person.turning_speed, person.looking_speed),
-        person.field_of_view,
+        field_of_view(live, view),
+        live.config.view_limits,
         options.control_timestep,
     )
 
 
 class SnapshotStream:
-    """Snapshots of a session for a client that has seen none yet; its view has some width over height."""
+    """Snapshots of a session for a client that has seen none yet, and shows a view."""
 
-    def __init__(self, live: LiveSession, aspect: float) -> None:
-        self._live, self._aspect = live, aspect
-        self._foresight = Foresight(live.scene, HORIZON)
+    def __init__(self, live: LiveSession, view: View) -> None:
+        self._live, self._aspect = live, view.width / view.height
+        self._foresight = Foresight(live.scene, HORIZON, field_of_view(live, view))
         self._until: dict[str, int] = {}  # control steps before which an object stays known
         self._models = {item.name: item.model for item in live.scene.episode.objects}
         self._looked = -LOOK_EVERY  # the control step when it was found out what is known

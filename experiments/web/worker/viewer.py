@@ -15,7 +15,7 @@ from experiments.web.worker import houses
 from experiments.web.worker.clock import Send
 from experiments.web.worker.drawing import Drawer
 from experiments.web.worker.live_session import LiveSession
-from experiments.web.worker.snapshots import SnapshotStream, scene_of
+from experiments.web.worker.snapshots import SnapshotStream, field_of_view, scene_of
 from hud.projection import CameraView, project
 from hud.state import HudState
 from mjsim.actions import Pick
@@ -53,7 +53,7 @@ class BrowserViewer(Viewer):
             self.drawer.set_view(self.view)
 
     def camera(self, world: World) -> CameraView | None:
-        """The eye camera, for a pointer to targets out of view: as wide as the person sees, in the view's shape."""
+        """The eye camera, for a pointer to targets out of view: as wide as the picture, in the view's shape."""
         view = self.view
         if view is None:
             return None
@@ -62,7 +62,8 @@ class BrowserViewer(Viewer):
         eye = np.array(eye_position(x, y, heading, pitch, person.eye_height))
         c, s, cp, sp = math.cos(heading), math.sin(heading), math.cos(pitch), math.sin(pitch)
         rotation = np.array([[s, -c * sp, -c * cp], [-c, -s * sp, -s * cp], [0.0, cp, -sp]])
-        fovy = 2.0 * math.atan(math.tan(person.field_of_view / 2.0) / aspect)
+        angle = person.field_of_view if self.live is None else field_of_view(self.live, view)
+        fovy = 2.0 * math.atan(math.tan(angle / 2.0) / aspect)
         return CameraView(eye, rotation, fovy, max(1, round(HEIGHT * aspect)), HEIGHT)
 
     def look(self) -> None:
@@ -116,8 +117,8 @@ class BrowserViewer(Viewer):
         self._shown_to, self._shown, self._step, self._snapshots = (view, live), None, -1, None
         self._sent.clear()
         if view.codec == "none":
-            self._snapshots = SnapshotStream(live, view.width / view.height)
-            self._send(scene_of(live))
+            self._snapshots = SnapshotStream(live, view)
+            self._send(scene_of(live, view))
             floor_plan = "minimap" in live.config.assistance
             self._send(Pictures(houses.encoded_pictures(live.config.house, floor_plan)))
 

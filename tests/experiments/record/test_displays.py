@@ -33,6 +33,9 @@ def test_columns_are_medians_over_the_trial():
     assert found["drawn_by_browser"] == pytest.approx(2 / 3)
     assert found["display_renderer"] == "ANGLE (Intel)" and found["display_width"] == 1200.0
     assert (found["display_frames_per_s"], found["display_latency_ms"]) == (50.0, 40.0)
+    assert found["display_field_of_view"] is None
+    chosen = displays([display(field_of_view=1.5), display(field_of_view=1.7), slow])
+    assert chosen["display_field_of_view"] == pytest.approx(1.6)
     assert found["display_dropped"] == pytest.approx(100 / (5 * 120 + 100))
 
 

@@ -418,14 +418,14 @@ def test_another_view_of_the_same_run(film, house, tmp_path, options):
     ],
 )
 def test_a_film_has_the_shape_of_the_page(run, draw, view, frame):
-    display = {"event": "display", "draw": draw, "width": view[0], "height": view[1]}
+    display = {"event": "display", "draw": draw, "width": view[0], "height": view[1], "field_of_view": 1.9}
     log = json.dumps(display).encode() + b"\n"
     config = as_seen(dataclasses.replace(read_run(run), log=log), "draft")
     assert (config.beside, config.profile) == (frame is not None, "draft")
     if frame is None:
         assert config.frame_size == (640, 480)
         return
-    assert (config.width, config.height) == frame
+    assert (config.width, config.height, config.field_of_view) == (*frame, 1.9)
     assert config.frame_size > frame and all(side % 2 == 0 for side in config.frame_size)
 
 

@@ -166,6 +166,12 @@ def test_the_person_seed_reaches_the_participant(house, monkeypatch):
         ({"seed": 0, "capacity": 3}, "capacity is 3"),
         ({"seed": 0, "points": 0}, "points is 0"),
         ({"seed": 0, "objects": 12, "points": 6}, "objects is 12; it must be 1 to 6"),
+        (
+            {"seed": 0, "field_of_view_range": "1.9,1.2"},
+            "field_of_view_range is '1.9,1.2'; it must be two angles",
+        ),
+        ({"seed": 0, "field_of_view_range": "70,110"}, "from 0.3491 to 2.618 rad"),
+        ({"seed": 0, "field_of_view_range": "1.2"}, "such as 1.2,1.9"),
     ],
 )
 def test_unusable_configurations(options, fault):

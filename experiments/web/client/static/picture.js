@@ -1,6 +1,6 @@
 // The picture of the apartment: drawn by this browser, or frames that the server draws.
 
-/** @import { Codec, Draw, Input, View } from "./protocol.js" */
+/** @import { Codec, Draw, Input, Scene, View } from "./protocol.js" */
 /** @import { Received } from "./connection.js" */
 /** @import { Drawn } from "./drawn_view.js" */
 
@@ -9,6 +9,7 @@ import { DrawnView } from "./drawn_view.js";
 import { Meter } from "./meter.js";
 import { Screen, bestCodec } from "./screen.js";
 
+const DEGREE = Math.PI / 180; // rad
 const SLOWEST = 20; // pictures a second below which the server draws instead
 
 /**
@@ -30,6 +31,9 @@ export class Picture {
   #told = { width: 0, height: 0 }; // px
   /** @type {Codec} */
   #codec = "jpeg";
+  #degrees = 0; // of the field of view that the person chose; 0 where none was chosen
+  /** @type {number | null} */
+  #chosen = null; // how wide the picture is, rad; null where that cannot be chosen
   #frame = ""; // what the last frame was
 
   /** @param {string} wanted `auto`, `browser` or `server` @param {Events} events */
@@ -71,7 +75,7 @@ export class Picture {
   /** What the server is told. @returns {View} */
   get view() {
     this.#told = this.#screen.size;
-    return { type: "view", ...this.#told, codec: this.drawn ? "none" : this.#codec };
+    return { type: "view", ...this.#told, codec: this.drawn ? "none" : this.#codec, ...(this.#degrees && { field_of_view: this.#degrees * DEGREE }) };
   }
 
   /** What draws, in words; empty before there is anything to see. */
@@ -89,6 +93,7 @@ export class Picture {
         this.#events.loaded();
         break;
       case "scene":
+        this.#offer(message);
         drawn?.load(message).then(this.#events.loaded, (error) => this.fallBack(`house not loaded: ${error.message}`));
         break;
       case "snapshot":
@@ -127,8 +132,9 @@ export class Picture {
     const slow = seen.frames_per_s < SLOWEST && !document.hidden;
     const draw = /** @type {"browser" | "server"} */ (this.drawn ? "browser" : "server");
     const { renderer } = this;
+    const field = this.#chosen === null ? {} : { field_of_view: this.#chosen };
     if (slow && this.drawn && this.#wanted === "auto") this.fallBack("slow");
-    return { draw, renderer, ...seen };
+    return { draw, renderer, ...field, ...seen };
   }
 
   /** Lets the server draw from now on. @param {string} reason */
@@ -138,10 +144,30 @@ export class Picture {
       this.#events.failed(reason);
       return;
     }
-    this.drawn = null;
+    this.drawn = this.#chosen = null;
+    byId("field-of-view", HTMLElement).hidden = true;
     this.#show(false);
     this.#events.send({ type: "draw", draw: "server", reason });
     this.#sendView();
+  }
+
+  /** Asks for another field of view; the scene that follows says what counts. @param {number} degrees 0 for the usual one */
+  setFieldOfView(degrees) {
+    if (degrees === this.#degrees) return;
+    this.#degrees = degrees;
+    if (this.drawn) this.#sendView();
+  }
+
+  /** Offers to choose the field of view, where that is left to the person. @param {Scene} message */
+  #offer({ field_of_view_range: range, field_of_view: angle }) {
+    this.#chosen = range && this.drawn && angle;
+    const row = byId("field-of-view", HTMLElement);
+    row.hidden = this.#chosen === null;
+    const [input, output] = [row.querySelector("input"), row.querySelector("output")];
+    if (!range || !input || !output) return;
+    [input.min, input.max] = [`${Math.ceil(range[0] / DEGREE)}`, `${Math.floor(range[1] / DEGREE)}`];
+    input.value = `${Math.round(angle / DEGREE)}`;
+    output.value = `${input.value}°`;
   }
 
   /** The server has to know the size, if it has changed. */

@@ -279,9 +279,10 @@ if (view && "headset" in page.dataset) {
   view.headset = new HeadsetPage(view.world, inputs);
   view.headset.offer(byId("headset-button", HTMLElement), () => view.heading);
 }
-new Settings(byId("settings", HTMLFormElement), ({ sensitivity, inverted, sounds: audible, calm, text }) => {
+new Settings(byId("settings", HTMLFormElement), ({ sensitivity, inverted, sounds: audible, calm, text, degrees }) => {
   Object.assign(mouse, { sensitivity, inverted });
   sounds.on = audible;
+  picture.setFieldOfView(degrees);
   if (picture.drawn) picture.drawn.calm = calm;
   document.documentElement.classList.toggle("calm", calm);
   document.documentElement.style.fontSize = `${100 * text}%`;

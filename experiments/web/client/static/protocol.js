@@ -3,7 +3,7 @@
 /** @typedef {"jpeg" | "h264" | "none"} Codec */
 /** @typedef {"asked" | "hidden" | "disconnected" | "silent" | "restarted" | "taken over"} PauseReason */
 /** @typedef {"loading" | "ready" | "running" | "paused" | "over" | "failed"} Phase */
-/** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none" }} View How a page wants to see the session: size in px, and how frames are compressed; `none` where it draws itself. */
+/** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; field_of_view?: number | null }} View How a page wants to see the session: size in px, and how frames are compressed; `none` where it draws itself. */
 /** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page, which may reconnect, its trial and its view. */
 /** @typedef {{ type: "takeover" }} TakeOver Continue here with a session that is open in another page; the answer to `occupied`. */
 /** @typedef {{ type: "run"; until?: number | null }} Run Start the clock, or let it run again; a page that will promise its inputs promises here what it has, or 0. */
@@ -11,7 +11,7 @@
 /** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs What the person pressed, in order, each once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen The browser has shown a frame, by its number. */
 /** @typedef {{ type: "beat" }} Beat A sign of life: the server sends one twice a second, and the page sends one back. */
-/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null }} Display How well the person saw the session in the last 5 s; this is only logged. */
+/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display How well the person saw the session in the last 5 s; this is only logged. */
 /** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw Who draws from now on, and why no longer the other one; this is only logged. */
 /** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "restarted" | "silent" | "taken over" }} Pause Stop the clock; the reason is logged. */
 /** @typedef {{ type: "blur"; away: boolean }} Blur The page lost the keyboard to another window, or got it back; this is only logged. */
@@ -20,7 +20,7 @@
 /** @typedef {{ type: "taken"; input: number; step: number }} Taken Everything up to this input and control step counts, and is safe on the disk. */
 /** @typedef {{ max_speed: number; max_turn: number; max_look: number; acceleration: number; turn_acceleration: number; dt: number; substeps: number; mass: number; walk_gain: number; walk_force: number; inertia: number; turn_gain: number; turn_force: number; head_inertia: number; head_stiffness: number; head_damping: number; head_force: number; lowest: number; highest: number; radius: number; eye_height: number; eye_forward: number }} Gait Limits and servos of walking, as the field of `mjsim.fidelity.kinematics.Gait`; SI units. */
 /** @typedef {{ walking_speed: number; turning_speed: number; looking_speed: number }} Speeds Speeds of the person at full deflection of the controls, m/s and rad/s. */
-/** @typedef {{ type: "scene"; path: string | null; floor: string | null; gait: Gait; speeds: Speeds; field_of_view: number; step_duration: number }} Scene What a client that draws needs once: where the files of the scene are, and how the person moves. */
+/** @typedef {{ type: "scene"; path: string | null; floor: string | null; gait: Gait; speeds: Speeds; field_of_view: number; field_of_view_range: [number, number] | null; step_duration: number }} Scene What a client that draws needs once: where the files of the scene are, and how the person moves. */
 /** @typedef {{ type: "snapshot"; step: number; input: number; time: number; busy: boolean; body: Array<number>; eye: Array<number>; hands: Array<Array<number>>; held: [string | null, string | null]; objects: Record<string, Array<number>>; models: Record<string, string>; gone: Array<string> }} Snapshot The state at the start of a control step, for clients that draw; once a step. */
 /** @typedef {{ shape: "box" | "cylinder" | "sphere"; position: [number, number, number]; size: [number, number, number]; rgba: [number, number, number, number]; role: string; x_ray: boolean; object: string | null; outlined: boolean }} Marker A world-locked digital object. */
 /** @typedef {{ type: "markers"; markers: Array<Marker> }} Markers The markers of the HUD, for clients that draw; when they change. */

@@ -4,7 +4,7 @@ import { load, save } from "./store.js";
 
 const NAME = "mjsim-settings";
 
-/** @typedef {{ sensitivity: number, inverted: boolean, sounds: boolean, calm: boolean, text: number }} Values sensitivity of the mouse and size of text as factors; calm: turns in steps, dark edges while moving */
+/** @typedef {{ sensitivity: number, inverted: boolean, sounds: boolean, calm: boolean, text: number, degrees: number }} Values sensitivity of the mouse and size of text as factors; degrees: field of view, 0 where none was chosen; calm: turns in steps, dark edges while moving */
 
 export class Settings {
   /** @type {Values} */
@@ -14,7 +14,7 @@ export class Settings {
   /** @param {HTMLFormElement} form @param {(values: Values) => void} changed is called now and with every change */
   constructor(form, changed) {
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    this.values = { sensitivity: 1, inverted: false, sounds: true, calm, text: 1 };
+    this.values = { sensitivity: 1, inverted: false, sounds: true, calm, text: 1, degrees: 0 };
     this.#changed = changed;
     const kept = load(NAME) ?? {};
     for (const [name, value] of Object.entries(this.values)) {

@@ -113,7 +113,7 @@ async function played(delay, lost) {
     (until) => up.send({ inputs: unsent.splice(0), until }, now),
     () => {},
   );
-  const scene = { path: "/", floor: "/floor", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, step_duration: DT };
+  const scene = { path: "/", floor: "/floor", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, field_of_view_range: null, step_duration: DT };
   await view.load(/** @type {Scene} */ ({ type: "scene", ...scene }));
   view.begin(0);
   up.send({ run: true }, 0);

@@ -15,7 +15,7 @@ vi.mock("../static/drawing/world.js", () => ({ World3D: vi.fn(function () { retu
 
 /** @type {Scene} */
 const SCENE = {
-  type: "scene", path: "/scene/1/", floor: "/scene/1/floor.json", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, step_duration: 0.04,
+  type: "scene", path: "/scene/1/", floor: "/scene/1/floor.json", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, field_of_view_range: null, step_duration: 0.04,
 };
 /** @param {Partial<Snapshot>} more @returns {Snapshot} */
 const state = (more) => ({

@@ -11,7 +11,7 @@ vi.mock("../static/drawing/world.js", () => fake);
 vi.mock("../static/vendor/three.js", () => three);
 const { World3D, world } = fake;
 
-const SCENE = { type: "scene", path: "/scene/1/", floor: "/floor.json", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, step_duration: 0.04 };
+const SCENE = { type: "scene", path: "/scene/1/", floor: "/floor.json", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, field_of_view_range: null, step_duration: 0.04 };
 const STATE = {
   type: "snapshot", step: 0, input: 0, time: 0, busy: false, body: new Array(16).fill(0), eye: [],
   hands: [[0.3, 0.2, 1], [0.3, -0.2, 1]], held: [null, null], objects: {}, models: {}, gone: [],
@@ -366,6 +366,46 @@ describe("a browser that draws", () => {
     expect(socket().all("draw")).toEqual([{ type: "draw", draw: "server", reason }]);
     expect(socket().all("view")).toMatchObject([{ codec: "jpeg" }]);
     expect(part("world").hidden).toBe(true);
+  });
+
+  describe("with a choice of the field of view", () => {
+    const CHOICE = { ...SCENE, field_of_view_range: [1.2, 2] };
+    const slider = () => /** @type {HTMLInputElement} */ (document.querySelector("[name=degrees]"));
+    /** @param {string} degrees */
+    const slide = (degrees) => {
+      slider().value = degrees;
+      slider().dispatchEvent(new Event("change"));
+    };
+
+    test("offers it only where the study does", async () => {
+      await running({ draw: "auto" });
+      expect(part("field-of-view").hidden).toBe(true);
+      socket().receive(CHOICE);
+      expect(part("field-of-view").hidden).toBe(false);
+      expect([slider().min, slider().max, slider().value]).toEqual(["69", "114", "86"]);
+      expect(socket().all("view")).toEqual([]);
+      world.onLost();
+      expect(part("field-of-view").hidden).toBe(true);
+    });
+
+    test("asks for it, shows what the server allows, and remembers it", async () => {
+      await running({ draw: "auto" });
+      socket().receive(CHOICE);
+      slide("100");
+      expect(socket().all("view")).toMatchObject([{ codec: "none", field_of_view: expect.closeTo(1.745, 3) }]);
+      socket().receive({ ...CHOICE, field_of_view: 1.745 });
+      await settled();
+      expect(world.setFieldOfView).toHaveBeenLastCalledWith(1.745);
+      expect(part("field-of-view").textContent).toContain("100°");
+      for (let step = 0; step < 125; step++) {
+        vi.advanceTimersByTime(40);
+        socket().receive({ ...STATE, step });
+      }
+      expect(socket().all("display")).toMatchObject([{ field_of_view: 1.745 }]);
+      vi.resetModules();
+      await opened({ draw: "auto" });
+      expect(socket().sent[0].view.field_of_view).toBeCloseTo(1.745, 3);
+    });
   });
 
   test("lets the server draw a house that it cannot load", async () => {

@@ -18,11 +18,16 @@ STILL = 6.0  # s after which messages have faded, and the page has told its size
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("width", "height"), [(1280, 720), (800, 600)])
-def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, height):
+@pytest.mark.parametrize(
+    ("width", "height", "degrees"), [(1280, 720, None), (800, 600, None), (1280, 720, 105)]
+)
+def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, height, degrees):
     page = chromium_page
     page.resize(width, height)
-    with PlayProcess(tmp_path / "visits", "--objects", "6", "--assistance", "optimal", *FAST) as server:
+    options = ["--objects", "6", "--assistance", "optimal", *FAST]
+    if degrees:
+        options += ["--field-of-view-range", "1.0,2.0"]
+    with PlayProcess(tmp_path / "visits", *options) as server:
         page.goto(server.url)
         page.hold("Enter")  # the button has the focus
         page.wait_for("location.pathname.startsWith('/play/')")
@@ -31,6 +36,11 @@ def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, h
         choose(page, "Skip the training")
         choose(page, "Start")
         page.wait_for("document.querySelectorAll('#list li').length > 0")
+        if degrees:
+            page.evaluate(
+                f"const slider = document.querySelector('[name=degrees]'); slider.value = {degrees};"
+                " slider.dispatchEvent(new Event('change'))"
+            )
         time.sleep(STILL)  # where the episode begins, so that every run of this test compares the same
         seen = decoded(page.picture("#world"))
         page.hold("p")
@@ -42,6 +52,7 @@ def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, h
     film = tmp_path / "film.mp4"
     replay(run, film=ReplayFilm(film, None))
     config = as_seen(read_run(run), "fast")
+    assert config.field_of_view == (degrees and pytest.approx(np.deg2rad(degrees)))
     assert seen.shape == (config.height, config.width, 3), "the film has the shape of the view"
     with av.open(str(film)) as video:
         *_, last = video.decode(video=0)

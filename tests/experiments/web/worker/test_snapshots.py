@@ -10,6 +10,7 @@ import pytest
 
 from experiments.trials.trial_config import TrialConfig
 from experiments.web.controls import Input
+from experiments.web.protocol import View
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.snapshots import LINGERING, SnapshotStream
 from mjsim.model.avatar import EYE
@@ -19,7 +20,7 @@ from mjsim.render.cameras import CameraPose, camera_pose
 AHEAD = 10  # control steps before an object is seen at which it is known: a round trip of 0.4 s
 FEW = 3  # px
 EVERY = 5  # control steps between two pictures
-SIZES = {16 / 9: (320, 180), 9 / 16: (144, 256)}  # px by aspect
+WIDE, TALL = (320, 180), (144, 256)  # px
 
 
 def restless(live, rng):
@@ -48,10 +49,11 @@ class Told:
     seen: dict[str, int]
 
 
-def walk(live, aspect, steps, rng):
-    """What a client is told in each control step of a walk, and what it shows."""
-    stream, told, known = SnapshotStream(live, aspect), [], set()
-    width, height = SIZES[aspect]
+def walk(live, size, angle, steps, rng):
+    """What a client is told in each control step of a walk, and what it shows in a view of some width, rad."""
+    width, height = size
+    stream, told, known = SnapshotStream(live, View(width, height, "none", angle)), [], set()
+    aspect = width / height
     owner, names = live.scene.index.geom_owner, live.scene.index.names
     with Renderer(live.scene.model, width=width, height=height, profile="draft") as renderer:
         inputs = restless(live, rng)
@@ -62,7 +64,7 @@ def walk(live, aspect, steps, rng):
             seen = {}
             if step % EVERY == 0:
                 pose = camera_pose(live.world.model, live.world.data, EYE, aspect)
-                fovy = 2.0 * math.atan(math.tan(live.scene.person.field_of_view / 2.0) / aspect)
+                fovy = 2.0 * math.atan(math.tan(angle / 2.0) / aspect)
                 ids = renderer.segmentation(live.world.data, CameraPose(pose.position, pose.rotation, fovy))
                 owners = owner[ids[ids >= 0]]
                 seen = dict(Counter(names[i] for i in owners[owners >= 0].tolist()))
@@ -71,11 +73,21 @@ def walk(live, aspect, steps, rng):
     return told
 
 
-@pytest.mark.parametrize(("seed", "aspect"), [(3, 16 / 9), (4, 16 / 9), (5, 9 / 16)])
-def test_nothing_pops_up(house, tmp_path, seed, aspect):
-    config = TrialConfig(objects=16, assistance="none", seed=seed, user="human", live=True, fidelity="event")
+@pytest.mark.parametrize(("seed", "size", "angle"), [(3, WIDE, None), (4, WIDE, 2.2), (5, TALL, None)])
+def test_nothing_pops_up(house, tmp_path, seed, size, angle):
+    limits = None if angle is None else f"1.0,{angle}"
+    config = TrialConfig(
+        objects=16,
+        assistance="none",
+        seed=seed,
+        user="human",
+        live=True,
+        fidelity="event",
+        field_of_view_range=limits,
+    )
     live = LiveSession(open_journal(tmp_path), house, config)
-    told = walk(live, aspect, 1500, np.random.default_rng(seed))
+    angle = angle or live.scene.person.field_of_view
+    told = walk(live, size, angle, 1500, np.random.default_rng(seed))
     live.close()
     pops = [
         (step, name, pixels)
@@ -111,7 +123,7 @@ def one_object(house, tmp_path):
 
 def test_an_object_that_cannot_come_into_view_any_more_is_gone_after_a_while(one_object):
     live, name, place, told = one_object
-    stream, stand = SnapshotStream(live, 16 / 9), place[:2] + np.array([1.5, 0.0])
+    stream, stand = SnapshotStream(live, View(*WIDE, "none")), place[:2] + np.array([1.5, 0.0])
     assert told(stream, 0, stand, math.pi).models.keys() == {name}
     snapshots = [told(stream, step, stand, 0.0) for step in range(1, LINGERING + 3)]
     assert [snapshot.gone for snapshot in snapshots].index([name]) + 1 == LINGERING

@@ -147,6 +147,31 @@ def test_a_moment_names_the_room_and_what_the_action_key_would_take(shown):
     assert np.allclose(reach.place, seen.object_positions[seen.object_names.index(item.name)], atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("limits", "view", "angle"),
+    [
+        (None, View(1920, 1080, "none", 2.0), None),
+        ("1.0,1.9", View(1920, 1080, "none", 1.7), 1.7),
+        ("1.0,1.9", View(1920, 1080, "none", 2.0), 1.9),
+        ("1.0,1.9", View(1920, 1080, "none", 0.5), 1.0),
+        ("1.0,1.9", DRAWS, None),
+        ("1.0,1.3", DRAWS, 1.3),
+        ("1.0,1.9", View(640, 480, "jpeg", 1.7), None),
+    ],
+)
+def test_a_person_chooses_how_wide_the_view_is_within_limits(shown, limits, view, angle):
+    shown.live.config = msgspec.structs.replace(CONFIG, field_of_view_range=limits)
+    shown.viewer.set_view(view)
+    shown.live.session.show()
+    angle = angle or shown.live.scene.person.field_of_view
+    camera = shown.viewer.camera(shown.live.world)
+    aspect = 16 / 9 if view.codec == "none" else 4 / 3
+    assert 2.0 * np.arctan(aspect * np.tan(camera.fovy / 2.0)) == pytest.approx(angle)
+    for scene in of_kind(shown, Scene):
+        assert scene.field_of_view == angle
+        assert scene.field_of_view_range == (limits and tuple(map(float, limits.split(","))))
+
+
 @pytest.mark.parametrize(("view", "aspect"), [(DRAWS, 16 / 9), (View(640, 360), 4 / 3)])
 def test_a_camera_is_as_wide_as_the_person_sees_whatever_the_shape_of_the_view(shown, view, aspect):
     shown.viewer.set_view(view)
