@@ -37,7 +37,8 @@ from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
 from experiments.web.server.visits import VISIT, Visits, token_hash
 
 TASK = TrialConfig(objects=6, assistance="optimal", seed=0, user="human", live=True).settings()
-SCENE = protocol.Scene("/scene/0123/", None, protocol.Gait(*[1.0] * 22), protocol.Speeds(1.0, 1.0, 1.0), 1.5, 0.04)
+GAIT, SPEEDS = protocol.Gait(*[1.0] * 22), protocol.Speeds(1.0, 1.0, 1.0)
+SCENE = protocol.Scene("/scene/0123/", None, GAIT, SPEEDS, 1.5, None, 0.04)
 TRIALS = {"training": {**TASK, "objects": 1}, "task": TASK}
 
 
