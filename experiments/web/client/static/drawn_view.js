@@ -66,6 +66,7 @@ export class DrawnView {
   async load(message) {
     const { path } = message;
     if (path === null) throw new Error("the server has no files of it");
+    if (this.#scene) this.world.setObjects((this.#things = {})); // all that may be known comes anew
     if (this.#house.path !== path) this.prepare(path);
     await this.#house.loaded;
     const floor = message.floor === null ? null : await fetch(message.floor);

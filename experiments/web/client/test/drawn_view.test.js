@@ -82,6 +82,13 @@ describe("a view that this browser draws", () => {
     expect(sent.at(-1)).toBe(6);
   });
 
+  test("forgets objects when a scene comes anew, as after a resize", async () => {
+    view.take(state({ objects: { a: [0, 0, 0, 1, 0, 0, 0], b: [1, 0, 0, 1, 0, 0, 0] }, models: { a: "mug", b: "mug" } }), 10);
+    await view.load(SCENE);
+    view.take(state({ step: 1, objects: { b: [2, 0, 0, 1, 0, 0, 0] }, models: { b: "mug" } }), 50);
+    expect(Object.keys(world.setObjects.mock.lastCall?.[0] ?? {})).toEqual(["b"]);
+  });
+
   test("waits for a server that is behind", () => {
     view.begin(0);
     view.take(state({}), 10);
