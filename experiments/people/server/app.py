@@ -13,7 +13,6 @@ from typing import Any
 from urllib.parse import parse_qsl
 
 from starlette.applications import Starlette
-from starlette.background import BackgroundTask
 from starlette.datastructures import ImmutableMultiDict
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
@@ -267,7 +266,7 @@ class StudyServer:
         if visit is None:
             return self._message(request, "full")
         settings = visit.settings(visit.phase)
-        answer = page(
+        return page(
             request,
             "play",
             trial=visit.phase,
@@ -277,8 +276,6 @@ class StudyServer:
             wait=self._minimum[visit.phase],
             leave=f"{request.url.path}/withdrawal",
         )
-        answer.background = BackgroundTask(self._sessions.open, visit)
-        return answer
 
     async def _end(self, request: Request, person: Person, shown: Page) -> Response:
         back = self._recruiter.way_back("finished", await self._store.identity(person.id))

@@ -12,7 +12,6 @@ from urllib.parse import parse_qs
 
 from msgspec.structs import replace
 from starlette.applications import Starlette
-from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
@@ -202,7 +201,7 @@ class PlayServer:
             return page(request, "film", wait=wait)
         if visit.phase in PLAYED:
             settings = visit.settings(visit.phase)
-            answer = page(
+            return page(
                 request,
                 "play",
                 trial=visit.phase,
@@ -212,8 +211,6 @@ class PlayServer:
                 wait=wait,
                 xr=self._config.xr,
             )
-            answer.background = BackgroundTask(self.sessions.open, visit)
-            return answer
         again = visit.settings(TASK)["episode"] is None  # else there is but one, whose best way was shown
         return page(
             request, "result", metrics=visit.metrics(TASK), again=again, token=request.path_params["token"]

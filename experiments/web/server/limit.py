@@ -18,18 +18,13 @@ class SessionLimit:
         """How many sessions wait."""
         return len(self._waiting)
 
-    @property
-    def free(self) -> bool:
-        """Whether a session would get a place at once."""
-        return self._free > 0 and not self._waiting
-
     def position(self, on_position: OnPosition) -> int | None:
         """Position in the queue, 1 for the next one; None for a session that does not wait."""
         return list(self._waiting).index(on_position) + 1 if on_position in self._waiting else None
 
     async def acquire(self, on_position: OnPosition) -> None:
         """Wait for a place; `on_position` is called whenever the position in the queue changes."""
-        if self.free:
+        if self._free and not self._waiting:
             self._free -= 1
             return
         turn = self._waiting[on_position] = asyncio.get_running_loop().create_future()

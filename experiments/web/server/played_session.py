@@ -81,12 +81,6 @@ class PlayedSession:
         self._view: View | None = None
         self._taken = self._step = 0  # number of the last input that is safe, and the next control step
 
-    def open(self) -> None:
-        """Open the session if there is a place: a page that was just sent will ask for it."""
-        if self._task is None and self._limit.free:
-            self.heard = time.monotonic()
-            self._task = asyncio.create_task(self._run())
-
     def attach(self, browser: Browser, view: View) -> None:
         """Connect a browser; it replaces the one before."""
         if self.browser is not None:

@@ -33,10 +33,6 @@ class Sessions:
             )
         return self._sessions[visit.name]
 
-    async def open(self, visit: Visit) -> None:
-        """Open the session of a visit whose page was just sent, so that it is ready when the page connects."""
-        self.of(visit).open()
-
     def scene(self, settings: Mapping[str, Any]) -> str | None:
         """Folder of the files that the page of a trial will probably draw; None where that is not known."""
         return None if settings["draw"] == "server" else self._scenes.get(settings["house"])

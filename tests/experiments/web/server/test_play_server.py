@@ -607,28 +607,6 @@ def test_beyond_the_limit_people_wait_in_a_queue(client):
         until_phase(second, "ready")
 
 
-def test_a_session_is_open_before_its_page_connects(client, pool):
-    link = new_visit(client)
-    client.get(link)
-    (worker,) = pool.workers
-    with connected(client, link) as socket:
-        started(socket)
-    assert pool.workers == [worker]
-    assert len([told for told in worker.told if isinstance(told, Open)]) == 1
-
-
-def test_a_page_that_never_connects_keeps_no_place_from_those_who_wait(tmp_path, monkeypatch, pool):
-    monkeypatch.setattr("experiments.web.server.sessions.MAX_AWAY", 0.1)
-    monkeypatch.setattr("experiments.web.server.sessions.WATCH_PERIOD", 0.05)
-    with serving(tmp_path, pool) as client:
-        client.get(new_visit(client))
-        client.get(new_visit(client))  # gets none, nor a place in the queue
-        assert len(pool.workers) == 1
-        with connected(client, new_visit(client)) as socket:
-            socket.send_json(hello())
-            until_phase(socket, "ready")
-
-
 def test_a_page_names_the_scene_that_its_house_had_before(tmp_path, pool):
     with serving(tmp_path, pool, sessions=2) as client:
         link = new_visit(client)
