@@ -54,11 +54,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve until a signal comes."""
     require_extra("people")
     from experiments.people.phases import phases_of_study
+    from experiments.people.recruitment import recruiter
     from experiments.people.study_file import read_people_study
     from experiments.study.simulate import study_path
 
     study = read_people_study(study_path(arguments.study))
     phases_of_study(study)  # own ones may be missing
+    recruiter(study.settings.recruitment)  # codes may be missing
     check_public_url(arguments.public_url)
     arguments.out.mkdir(parents=True, exist_ok=True)
     prepare_process()

@@ -67,8 +67,8 @@ def post(client, path, **data):
     return client.post(path, data=data, headers={"Origin": ORIGIN})
 
 
-def begin(client):
-    answer = post(client, "/begin")
+def begin(client, **ids):
+    answer = post(client, "/begin", **ids)
     assert answer.status_code == 303
     return answer.headers["location"]
 
