@@ -46,6 +46,7 @@ BASES = {
     "study init": "study init out.toml",
     "study serve": "study serve study.toml --port 0 --no-open --out out",
     "study collect": "study collect study.toml served --out out",
+    "study pay": "study pay study.toml served",
     "study backup": "study backup study.toml served --out out.db",
     "study restore": "study restore backup.db out.db",
     "study erase": "study erase study.toml served p00001 --who me",

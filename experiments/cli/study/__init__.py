@@ -11,6 +11,7 @@ SUBCOMMANDS = {
     "init": "experiments.cli.study.init",
     "serve": "experiments.cli.study.serve",
     "collect": "experiments.cli.study.collect",
+    "pay": "experiments.cli.study.pay",
     "backup": "experiments.cli.study.backup",
     "restore": "experiments.cli.study.restore",
     "erase": "experiments.cli.study.erase",
