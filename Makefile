@@ -20,7 +20,7 @@ test: $(READY) ## Set up, then run the tests but for the slow ones; COVERAGE=1 m
 	$(BIN)/python -m pytest -n $(WORKERS) $(if $(COVERAGE),--cov --cov-report=term:skip-covered --cov-fail-under=0)
 
 test-slow: $(READY) ## Run the slow tests; COVERAGE=1 adds to what `make test` measured, and checks the sum
-	$(BIN)/python -m pytest -n $(WORKERS) -m slow $(if $(COVERAGE),--cov --cov-append --cov-report=term:skip-covered)
+	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m slow $(if $(COVERAGE),--cov --cov-append --cov-report=term:skip-covered)
 
 check: check-client site ## Lint, strict types, import contracts, the site
 	$(BIN)/ruff check .

@@ -123,12 +123,15 @@ FAULTS = (
 )
 
 
+MANY = int(os.environ.get("MJSIM_FAULTS", 3 * len(FAULTS)))  # for each fidelity
+
+
 @pytest.mark.parametrize(
     ("count", "words"),
     [
         (len(FAULTS), FAST),
-        pytest.param(120, FAST, marks=pytest.mark.slow),
-        pytest.param(80, (), marks=pytest.mark.slow),
+        pytest.param(MANY, FAST, marks=pytest.mark.slow),
+        pytest.param(MANY, (), marks=pytest.mark.slow),
     ],
 )
 def test_faults_lose_and_double_no_acknowledged_input(tmp_path, count, words):
