@@ -22,11 +22,12 @@ test: $(READY) ## Set up, then run the tests but for the slow ones; COVERAGE=1 m
 test-slow: $(READY) ## Run the slow tests; COVERAGE=1 adds to what `make test` measured, and checks the sum
 	$(BIN)/python -m pytest -n $(WORKERS) --maxschedchunk=1 -m slow $(if $(COVERAGE),--cov --cov-append --cov-report=term:skip-covered)
 
-check: check-client site ## Lint, strict types, import contracts, the site
+check: check-client site ## Lint, strict types, import contracts, security, the site
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/bandit --quiet --recursive --configfile pyproject.toml mjsim planner hud experiments studies
 
 check-client: $(READY) ## Types, lint and unit tests of the client of `mjsim play`
 	PYTHON=$(abspath $(BIN)/python) .ci/check-client

@@ -91,9 +91,8 @@ async def _copy(source: Database, target: Database) -> None:
                 if rows:
                     await writing.execute(insert(table), rows)
                 if target.kind == "postgresql":  # it counts ids apart from the rows
-                    last = f"(SELECT COALESCE(MAX(id), 0) + 1 FROM {table.name})"
-                    await writing.execute(
-                        text(f"SELECT setval(pg_get_serial_sequence('{table.name}', 'id'), {last}, false)")
-                    )
+                    last = (await writing.execute(select(func.max(table.c.id)))).scalar() or 0
+                    after = f"pg_get_serial_sequence('{table.name}', 'id'), {last + 1}, false"
+                    await writing.execute(text(f"SELECT setval({after})"))
 
         await target.write(work)

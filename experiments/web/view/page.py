@@ -8,7 +8,6 @@ from typing import Any
 
 import msgspec
 from jinja2 import Environment, FileSystemLoader
-from markupsafe import Markup
 
 from experiments.house import House
 from experiments.record.reader import Record
@@ -63,8 +62,8 @@ def view_page(
     models = {placed.model for placed in record.episode.objects}
     page: str = _template().render(
         title=_title(record),
-        style=Markup((STATIC / "style.css").read_text("utf-8")),
-        modules=Markup(msgspec.json.encode({"imports": modules}).decode()),
+        style=(STATIC / "style.css").read_text("utf-8"),
+        modules=msgspec.json.encode({"imports": modules}).decode(),
         entry=ENTRY,
         run=_packed(_run(record, house, seen)),
         scene=_packed(_scene(house, models)),
