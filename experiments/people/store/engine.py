@@ -2,6 +2,7 @@
 
 import asyncio
 import random
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -49,6 +50,7 @@ class Database:
         self.url = _parsed(url)
         self._engine = _engine(self.url)
         self._sqlite = self.kind == "sqlite"
+        self.on_write: Callable[[float], None] = lambda _: None  # is told how long each write took, s
         # Writers of SQLite that wait for its lock sleep, and whoever wakes first goes on; here they queue.
         self._turn = asyncio.Lock()
 
@@ -138,9 +140,12 @@ class Database:
 
         Raises StoreError where the database cannot do it.
         """
+        began = time.monotonic()
         for attempt in range(1, TRIES + 1):
             try:
-                return await self._transaction(work)
+                result = await self._transaction(work)
+                self.on_write(time.monotonic() - began)
+                return result
             except SQLAlchemyError as error:
                 if attempt == TRIES or not _again(error, attempt):
                     raise StoreError(advice(error, self.name)) from error
@@ -187,13 +192,18 @@ def _engine(url: URL) -> AsyncEngine:
             raise StoreError(
                 f"There is no folder {Path(url.database).parent} for the database: make it first."
             )
-        engine = create_async_engine(url, connect_args={"timeout": PATIENCE_S})
+        engine = create_async_engine(url, hide_parameters=True, connect_args={"timeout": PATIENCE_S})
         event.listen(engine.sync_engine, "connect", _prepare)
         event.listen(engine.sync_engine, "begin", _begin)
         return engine
     # Every statement sees what is committed; rows that must not change meanwhile are locked by name.
     return create_async_engine(
-        url, isolation_level="READ COMMITTED", pool_pre_ping=True, pool_timeout=PATIENCE_S, pool_size=10
+        url,
+        hide_parameters=True,
+        isolation_level="READ COMMITTED",
+        pool_pre_ping=True,
+        pool_timeout=PATIENCE_S,
+        pool_size=10,
     )
 
 

@@ -75,6 +75,22 @@ class BrowserSocket:
                 with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError):
                     await task
 
+    async def watch(self, session: PlayedSession) -> None:
+        """Show a session to a spectator until the page is gone, or says anything: nothing is taken from it."""
+        sending = asyncio.create_task(self._send_all())
+        receiving = asyncio.create_task(self._socket.receive())
+        session.spectators.join(self)
+        try:
+            await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
+            self.close(protocol.REFUSED, "")
+            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)
+        finally:
+            session.spectators.leave(self)
+            for task in (sending, receiving):
+                task.cancel()
+                with suppress(asyncio.CancelledError, WebSocketDisconnect, OSError, RuntimeError):
+                    await task
+
     async def _send_all(self) -> None:
         with suppress(WebSocketDisconnect, RuntimeError, OSError):  # the browser is gone
             while isinstance(item := await self._waiting.get(), WireMessage):

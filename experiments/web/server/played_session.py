@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from collections import deque
 from collections.abc import Mapping, MutableMapping
 from contextlib import suppress
 from typing import Any, Protocol
@@ -30,9 +31,11 @@ from experiments.web.protocol import (
     WireMessage,
 )
 from experiments.web.server.limit import SessionLimit
+from experiments.web.server.meter import Meter
 from experiments.web.server.pool import WorkerPool, WorkerProcess
+from experiments.web.server.spectators import Spectators
 from experiments.web.server.visits import PLAYED, Visit
-from experiments.web.state import FAILED, LOADING, READY, Trigger
+from experiments.web.state import FAILED, LOADING, READY, RUNNING, Trigger
 
 LOG = logging.getLogger("mjsim.play")
 MAX_CRASHES = 3  # of workers in a row, without an input taken in between, after which a session fails
@@ -61,6 +64,8 @@ class PlayedSession:
         browser: The one that is connected, or None.
         heard: When the person last did something, as `time.monotonic` has it.
         state: Copy of the worker's state.
+        display: How well the person sees the session, by the page; None before it says so.
+        spectators: Who watches.
     """
 
     def __init__(
@@ -70,16 +75,23 @@ class PlayedSession:
         limit: SessionLimit,
         minimum: Mapping[str, float],
         scenes: MutableMapping[str, str],
+        meter: Meter | None = None,
     ) -> None:
         self.visit, self._minimum, self._scenes = visit, minimum, scenes
+        self._meter = meter or Meter()
         self.browser: Browser | None = None
         self.heard = time.monotonic()
         self.state = State()
+        self.display: Display | None = None
+        self.spectators = Spectators()
         self._pool, self._limit = pool, limit
         self._task: asyncio.Task[None] | None = None
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
         self._taken = self._step = 0  # number of the last input that is safe, and the next control step
+        self._came: deque[tuple[int, float]] = deque(
+            maxlen=MAX_AHEAD
+        )  # inputs that are not safe yet, and when
 
     def attach(self, browser: Browser, view: View) -> None:
         """Connect a browser; it replaces the one before."""
@@ -123,6 +135,10 @@ class PlayedSession:
                     return error
                 numbers = [new.number for new in inputs]
                 self.state = msgspec.structs.replace(self.state, input=max(self.state.input, *numbers, 0))
+                if numbers and self.state.phase is RUNNING:
+                    self._came.append((numbers[-1], time.monotonic()))
+            case Display():
+                self.display = message
             case Run() | Leave() if self.state.phase is LOADING:
                 return Error("too early", "the session is not ready")
             case Leave() if wait := self.visit.wait(self._minimum):
@@ -137,6 +153,7 @@ class PlayedSession:
 
     async def release(self) -> None:
         """Give worker and place back; the journal holds everything."""
+        self.spectators.close()
         task, self._task = self._task, None
         if task is not None:
             task.cancel()
@@ -176,6 +193,7 @@ class PlayedSession:
     def _tell(self, message: protocol.WireMessage) -> None:
         if self.browser is not None:
             self.browser.send(message)
+        self.spectators.tell(message)
 
     def _set(self, state: State) -> None:
         self.state = state
@@ -203,6 +221,7 @@ class PlayedSession:
         """Play a trial to its end, with another worker whenever one dies."""
         visit, crashes, safe = self.visit, 0, 0
         self._taken = self._step = 0
+        self._came.clear()
         opening = Open(
             str(visit.journal(trial)), str(visit.run(trial)), visit.settings(trial), visit.before(trial)
         )
@@ -224,6 +243,7 @@ class PlayedSession:
                     case Taken(number, step):
                         crashes = 0 if step > safe else crashes
                         self._taken, safe, self._step = number, step, max(self._step, step)
+                        self._measure(number)
                     case Scene(path=str(path)):
                         self._scenes[opening.config["house"]] = path
                     case Snapshot(step):
@@ -234,10 +254,17 @@ class PlayedSession:
                         return
                 self._tell(message)
             LOG.warning("session %s: its worker died", visit.name[:12])
+            self._meter.worker_lost()
+            self._came.clear()
             opening = msgspec.structs.replace(opening, restarted=True)
             self._discard_worker()
             crashes += 1
         raise OSError(f"the worker crashed {MAX_CRASHES} times in a row")
+
+    def _measure(self, safe: int) -> None:
+        """Note how long it took until inputs were safe."""
+        while self._came and self._came[0][0] <= safe:
+            self._meter.acknowledged(time.monotonic() - self._came.popleft()[1])
 
     def _finish(self, trial: str) -> None:
         visit = self.visit

@@ -7,6 +7,7 @@ from typing import Any
 
 from experiments.web import protocol
 from experiments.web.server.limit import SessionLimit
+from experiments.web.server.meter import Meter
 from experiments.web.server.played_session import PlayedSession
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.visits import Visit
@@ -19,9 +20,15 @@ class Sessions:
     """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back."""
 
     def __init__(
-        self, pool: WorkerPool, limit: SessionLimit, idle: float, minimum: Mapping[str, float]
+        self,
+        pool: WorkerPool,
+        limit: SessionLimit,
+        idle: float,
+        minimum: Mapping[str, float],
+        meter: Meter | None = None,
     ) -> None:
         self._pool, self._limit, self._idle, self._minimum = pool, limit, idle, minimum
+        self._meter = meter
         self._sessions: dict[str, PlayedSession] = {}
         self._scenes: dict[str, str] = {}  # by house, of those that a worker has named
 
@@ -29,9 +36,19 @@ class Sessions:
         """The session of a visit."""
         if visit.name not in self._sessions:
             self._sessions[visit.name] = PlayedSession(
-                visit, self._pool, self._limit, self._minimum, self._scenes
+                visit, self._pool, self._limit, self._minimum, self._scenes, self._meter
             )
         return self._sessions[visit.name]
+
+    @property
+    def under_way(self) -> Mapping[str, PlayedSession]:
+        """Sessions by the names of their visits."""
+        return self._sessions
+
+    @property
+    def waiting(self) -> int:
+        """How many of them wait for a place."""
+        return self._limit.waiting
 
     def scene(self, settings: Mapping[str, Any]) -> str | None:
         """Folder of the files that the page of a trial will probably draw; None where that is not known."""
