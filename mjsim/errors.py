@@ -3,6 +3,7 @@
     MjsimError
     ├── AssetError        a model, texture or catalogue entry is missing or malformed
     ├── EpisodeError      an episode file does not describe a valid episode
+    ├── HouseError        no house can be generated of this seed or recipe
     ├── SamplingError     no disorganized house satisfies the constraints
     ├── ActionError       an action's numbers are unusable (a refusal is not an error)
     ├── PersonError       a value of a person is out of range
@@ -26,6 +27,10 @@ class AssetError(MjsimError):
 
 class EpisodeError(MjsimError):
     """An episode file does not describe a valid episode."""
+
+
+class HouseError(MjsimError):
+    """No house can be generated as asked, or a recipe is of another generator."""
 
 
 class SamplingError(MjsimError):
