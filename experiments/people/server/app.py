@@ -10,10 +10,8 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qsl
 
 from starlette.applications import Starlette
-from starlette.datastructures import ImmutableMultiDict
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
@@ -22,15 +20,17 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from experiments.errors import StoreError
-from experiments.people.phases.base import Again, FormData, Page
+from experiments.people.phases.base import Again, Page
 from experiments.people.phases.played import Played
 from experiments.people.recruitment.base import Arrival, Leaving, Preview, Recruiter, Refusal
 from experiments.people.server.procedure import Now, Procedure
 from experiments.people.store import Person
 from experiments.people.study_file import CONSENT
 from experiments.web.server.browser_socket import BrowserSocket
+from experiments.web.server.form import sent_form
 from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
 from experiments.web.server.limit import SessionLimit
+from experiments.web.server.meter import Meter
 from experiments.web.server.pages import page
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.scene_files import scene_route
@@ -45,7 +45,6 @@ BEAT_PERIOD = 60.0  # s between two notes that somebody is still there
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
 NEVER = 1e9  # s; as good as for ever
 MAX_FORM = 64 * 1024  # bytes
-MAX_FIELDS = 500
 
 
 @dataclass(frozen=True)
@@ -56,15 +55,21 @@ class Serving:
         secret: Key from which tokens of people with a platform's id are made.
         film: Of the house, if the study shows one.
         proxies: Whose word about the address of a person is believed.
+        meter: Is told what sessions measure.
     """
 
     secret: bytes
     film: Path | None = None
     proxies: tuple[Network, ...] = ()
+    meter: Meter | None = None
 
 
 class StudyServer:
-    """Pages and sockets of a study."""
+    """Pages and sockets of a study.
+
+    Attributes:
+        sessions: Those under way.
+    """
 
     def __init__(
         self, procedure: Procedure, recruiter: Recruiter, pool: WorkerPool, serving: Serving
@@ -75,7 +80,9 @@ class StudyServer:
         self._pool = pool
         optional = self._study.settings.optional
         self._minimum = {name: 0.0 if name in optional else NEVER for name in PLAYED}
-        self._sessions = Sessions(pool, SessionLimit(limits.sessions), limits.idle, self._minimum)
+        self.sessions = Sessions(
+            pool, SessionLimit(limits.sessions), limits.idle, self._minimum, serving.meter
+        )
         self._new = Rate(*NEW_PEOPLE)
         self._locks: dict[str, asyncio.Lock] = {}
 
@@ -108,14 +115,14 @@ class StudyServer:
 
     @asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        watching = asyncio.create_task(self._sessions.watch())
+        watching = asyncio.create_task(self.sessions.watch())
         try:
             yield
         finally:
             watching.cancel()
             with suppress(asyncio.CancelledError):
                 await watching
-            await self._sessions.release()
+            await self.sessions.release()
             await self._pool.close()
             await self._store.close()
 
@@ -143,7 +150,9 @@ class StudyServer:
     async def _begin(self, request: Request) -> Response:
         if not self._new.allows(request.client.host if request.client else ""):
             return self._message(request, "paused", 429)
-        came = self._recruiter.arrive({name: str(value) for name, value in (await _form(request)).items()})
+        came = self._recruiter.arrive(
+            {name: str(value) for name, value in (await sent_form(request)).items()}
+        )
         if not isinstance(came, Arrival):
             return self._message(request, "unknown", 400)
         token = new_token() if came.key is None else self._token(came.key)
@@ -166,7 +175,7 @@ class StudyServer:
         person = await self._person(request)
         if person is None:
             return self._message(request, "unknown", 404)
-        form = await _form(request)
+        form = await sent_form(request)
         async with self._lock(person):
             now = await self._procedure.now(person, request.url.path)
             refused = await self._procedure.submit(now, str(form.get("phase", "")), form)
@@ -178,7 +187,7 @@ class StudyServer:
         person = await self._person(request)
         if person is None:
             return Response(status_code=404)
-        form = await _form(request)
+        form = await sent_form(request)
         now = await self._procedure.now(person, request.url.path)
         await self._procedure.save(now, str(form.get("phase", "")), form)
         return Response(status_code=204)
@@ -194,9 +203,9 @@ class StudyServer:
         person = await self._person(request)
         if person is None or not person.active:
             return self._message(request, "unknown", 404)
-        form = await _form(request)
+        form = await sent_form(request)
         async with self._lock(person):
-            await self._sessions.release(lambda session: session.visit.name == person.token_hash)
+            await self.sessions.release(lambda session: session.visit.name == person.token_hash)
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 
@@ -218,7 +227,7 @@ class StudyServer:
         await socket.accept()
         beating = asyncio.create_task(self._beat(person))
         try:
-            await BrowserSocket(socket).serve(self._sessions.of(visit), visit.phase)
+            await BrowserSocket(socket).serve(self.sessions.of(visit), visit.phase)
         finally:
             beating.cancel()
             with suppress(asyncio.CancelledError):
@@ -272,7 +281,7 @@ class StudyServer:
             trial=visit.phase,
             objects=settings["objects"],
             draw=settings["draw"],
-            scene=self._sessions.scene(settings),
+            scene=self.sessions.scene(settings),
             wait=self._minimum[visit.phase],
             leave=f"{request.url.path}/withdrawal",
         )
@@ -345,9 +354,3 @@ class StudyServer:
     def _keyed(self, text: str) -> bytes:
         name = self._study.settings.name
         return hmac.new(self._serving.secret, f"{name}:{text}".encode(), hashlib.sha256).digest()
-
-
-async def _form(request: Request) -> FormData:
-    """The fields of a form that was sent."""
-    text = (await request.body()).decode("utf-8", "replace")
-    return ImmutableMultiDict(parse_qsl(text, keep_blank_values=True, max_num_fields=MAX_FIELDS))

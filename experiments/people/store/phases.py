@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import insert, select, update
+from sqlalchemy import ColumnElement, insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store.endings import end
@@ -126,16 +126,21 @@ class Phases(Part):
         """Answers of a person, or of everybody, in the order in which they were given first."""
         return tuple(Answer(*row) for row in await self._rows(answer, person_id))
 
+    async def answers_to(self, phase: str, item: str) -> tuple[Answer, ...]:
+        """Final answers of everybody to one item."""
+        asked = (answer.c.phase == phase, answer.c.item == item, answer.c.final.is_(True))
+        return tuple(Answer(*row) for row in await self._rows(answer, None, *asked))
+
     async def trials(self, person_id: int | None = None) -> tuple[TrialRow, ...]:
         """Trials of a person, or of everybody."""
         return tuple(TrialRow(*row) for row in await self._rows(trial, person_id))
 
-    async def _rows(self, table: Any, person_id: int | None) -> Any:
+    async def _rows(self, table: Any, person_id: int | None, *which: ColumnElement[bool]) -> Any:
         columns = [column for column in table.c if column.name != "id"]
         query = (
             select(*columns)
             .join(person, person.c.id == table.c.person_id)
-            .where(person.c.study_id == self._study_id)
+            .where(person.c.study_id == self._study_id, *which)
             .order_by(table.c.person_id, table.c.id)
         )
         if person_id is not None:

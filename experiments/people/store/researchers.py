@@ -1,8 +1,9 @@
 """Who may see the researcher's page: passwords, roles and logins that can be revoked."""
 
 import asyncio
+import re
 from datetime import datetime
-from typing import get_args
+from typing import Any, get_args
 
 from argon2 import PasswordHasher
 from argon2.exceptions import VerifyMismatchError
@@ -14,6 +15,7 @@ from experiments.people.store.engine import Database
 from experiments.people.store.tables import login, researcher
 from experiments.people.store.values import Researcher, Role, utc_now
 
+NAME = re.compile(r"[a-z0-9][a-z0-9._@-]{0,59}")
 _FIELDS = (
     researcher.c.id,
     researcher.c.name,
@@ -31,7 +33,9 @@ class Researchers:
         self._hasher = PasswordHasher()
 
     async def add(self, name: str, password: str, role: Role, now: datetime | None = None) -> Researcher:
-        """Let somebody in. Raises StoreError if the name is taken or the role unknown."""
+        """Let somebody in. Raises StoreError if the name is taken or unusable, or the role unknown."""
+        if not NAME.fullmatch(name):
+            raise StoreError(f"{name!r} cannot be a name: use up to 60 of a-z, 0-9 and the signs . _ @ -")
         values = {"name": name, "role": _known(role), "disabled": False, "created": now or utc_now()}
         values["password"] = await self._hash(password)
 
@@ -55,9 +59,7 @@ class Researchers:
 
         It takes as long for a name that nobody has. How often it may be tried is the caller's to limit.
         """
-        async with self._database.reading() as connection:
-            query = select(*_FIELDS, researcher.c.password).where(researcher.c.name == name)
-            row = (await connection.execute(query)).first()
+        row = await self._row(name) if NAME.fullmatch(name) else None
         if row is None:
             await self._hash(password)
             return None
@@ -129,6 +131,11 @@ class Researchers:
             await connection.execute(update(login).where(*mine).values(revoked=now or utc_now()))
 
         await self._database.write(work)
+
+    async def _row(self, name: str) -> Any:
+        async with self._database.reading() as connection:
+            query = select(*_FIELDS, researcher.c.password).where(researcher.c.name == name)
+            return (await connection.execute(query)).first()
 
     async def _hash(self, password: str) -> str:
         """It takes a tenth of a second and 64 MiB, on purpose; the server goes on meanwhile."""

@@ -1,6 +1,6 @@
 """The store of a study: who takes part, how far they are, what they answered, what they are paid."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
@@ -60,6 +60,10 @@ class Store(People, Assignments, Phases, Endings, Erasure):
     async def close(self) -> None:
         """Close all connections."""
         await self._database.close()
+
+    def on_write(self, tell: Callable[[float], None]) -> None:
+        """Tell how long each transaction that writes took, s."""
+        self._database.on_write = tell
 
     async def backup(self, path: Path) -> None:
         """Write the whole database, as of one moment, to a new SQLite file; people may go on meanwhile."""
