@@ -14,12 +14,12 @@ def at_line(path: Path, text: str, message: str) -> str:
     wanted = re.sub(r"\[[^\]]*\]", "", found[1]) if found else ""
     if unknown := re.search(r"unknown field `([^`]+)`", message):
         wanted = f"{wanted}.{unknown[1]}".strip(".")
-    line = _line(text, wanted)
+    line = line_of(text, wanted)
     return f"{path}, line {line}: {message}" if line else f"{path}: {message}"
 
 
-def _line(text: str, wanted: str) -> int | None:
-    """The line of the key, or of the innermost table around it that the file names."""
+def line_of(text: str, wanted: str) -> int | None:
+    """The line of a key such as `study.pay.reward`, or of the innermost table around it that the file names."""
     table, best, depth = "", None, 0
     for number, line in enumerate(text.splitlines(), 1):
         if header := _HEADER.match(line):

@@ -39,3 +39,16 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"the right answer {self.right!r} of item {self.name!r} is none of its choices")
         if self.low > self.high:
             raise ValueError(f"item {self.name!r} has low {self.low} above high {self.high}")
+
+    def example(self) -> str:
+        """An answer that is accepted, as a form sends it; the right one where there is one."""
+        if self.right is not None:
+            return str(self.right)
+        match self.kind:
+            case "choice" | "several":
+                return self.choices[0]
+            case "number":
+                return str(self.low)
+            case "scale":
+                return "1"
+        return "-"

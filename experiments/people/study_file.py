@@ -44,6 +44,8 @@ class Pay(_Table, frozen=True):
     reward: Money = 0.0  # for the whole study
     screen_out: Money = 0.0  # for who is screened out
     bonus_for_all: Money = 0.0  # for putting everything away
+    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # of the platform, a share of the pay
+    wage: Money = 0.0  # an hour, below which `mjsim study check` calls the pay too low
     partial: bool = False  # whether who leaves after the task has begun receives a share, by phases
 
 

@@ -9,6 +9,7 @@ from experiments.cli.requirements import add_checkout_command
 # A module each, with `add_parser(commands)`; those outside the wheel need a checkout.
 SUBCOMMANDS = {
     "init": "experiments.cli.study.init",
+    "check": "experiments.cli.study.check_study",
     "serve": "experiments.cli.study.serve",
     "collect": "experiments.cli.study.collect",
     "pay": "experiments.cli.study.pay",

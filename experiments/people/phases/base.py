@@ -124,6 +124,10 @@ class FormPhase:
             }
         )
 
+    def example(self) -> dict[str, str]:
+        """A form that is accepted, as `mjsim study check` sends it; items that need no answer get none."""
+        return {item.name: item.example() for item in self.items if item.required}
+
     def drafts(self, sent: FormData) -> Answers:
         """The answers among what is in a form that is not sent yet; those that cannot be used are left out."""
         form = self._form(sent, {})

@@ -16,6 +16,10 @@ class Consent(FormPhase):
         read = super().read(visitor, sent)
         return Done({"agreed": True, **read.answers}) if isinstance(read, Done) else read
 
+    def example(self) -> dict[str, str]:
+        """Somebody agrees."""
+        return {"agree": "yes", **super().example()}
+
 
 def build(study: Study) -> Consent:
     """The phase."""

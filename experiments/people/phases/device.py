@@ -56,6 +56,13 @@ class DeviceCheck(FormPhase):
             return Again(" ".join(self.texts[name] for name in faults), {"failed": True})
         return Done(answers)
 
+    def example(self) -> dict[str, str]:
+        """A computer that just suffices."""
+        needed = self._study.settings.device
+        fits = {"frames_per_s": max(needed.frames_per_s, 1.0), "latency_ms": needed.latency_ms}
+        fits |= {"width": needed.width, "height": needed.height, "pixel_ratio": 1.0}
+        return {**{name: str(value) for name, value in fits.items()}, "keyboard": "yes", "webgl": "yes"}
+
 
 def _measured(sent: FormData) -> _Measured | None:
     """What the page measured; None where that is no measurement."""

@@ -1,0 +1,1 @@
+"""Whether a study is ready for people: `mjsim study check`."""
