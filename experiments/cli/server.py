@@ -1,20 +1,21 @@
 """What the commands that serve pages share: where they listen, who may reach them, how they run."""
 
 import argparse
+import asyncio
 import fcntl
-import logging
 import os
 import resource
 import socket
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from experiments.cli.logs import begin_logging
 from experiments.errors import ConfigError, RecordError
 
 PORT = 8000
@@ -35,6 +36,7 @@ def add_server_options(group: Any) -> None:
         metavar="ADDRESS,..",
         help="addresses or networks of proxies whose X-Forwarded-For tells who asks (docs/play.md)",
     )
+    group.add_argument("--log-json", action="store_true", help="write the log as a JSON object a line")
     group.add_argument("--no-open", action="store_true", help="open no browser")
 
 
@@ -45,17 +47,33 @@ def prepare_process() -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, MAX_FILES) if most > 0 else MAX_FILES, most))
 
 
-async def serve(app: Any, listener: socket.socket, arguments: argparse.Namespace) -> None:
-    """Print the URL of an ASGI application, open it, and serve until a signal comes."""
+async def serve(
+    app: Any,
+    listener: socket.socket,
+    arguments: argparse.Namespace,
+    beside: Sequence[tuple[Any, socket.socket]] = (),
+) -> None:
+    """Print the URL of an ASGI application, open it, and serve until a signal comes, as well as those `beside`.
+
+    The first application starts first and ends last.
+    """
+    begin_logging(as_json=arguments.log_json)
+    url = arguments.public_url or url_of(listener)
+    print(url, flush=True)
+    if not arguments.no_open:
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+    # Each hears a signal once the one after it has ended.
+    await asyncio.gather(*(http_server(one).serve([at]) for one, at in ((app, listener), *beside)))
+
+
+def http_server(app: Any) -> Any:
+    """A server of an ASGI application, with the limits that all servers here have."""
     import uvicorn  # imported here, so that other commands start fast
 
     from experiments.web.protocol import MAX_TEXT
     from experiments.web.server.connections import QuickConnection
 
-    logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
-    for name in ("mjsim.play", "mjsim.study"):
-        logging.getLogger(name).setLevel(logging.INFO)
-    server = uvicorn.Server(
+    return uvicorn.Server(
         uvicorn.Config(
             app,
             log_config=None,
@@ -73,11 +91,6 @@ async def serve(app: Any, listener: socket.socket, arguments: argparse.Namespace
             limit_concurrency=4000,
         )
     )
-    url = arguments.public_url or _url(*listener.getsockname()[:2])
-    print(url, flush=True)
-    if not arguments.no_open:
-        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-    await server.serve(sockets=[listener])
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -115,7 +128,9 @@ def check_public_url(url: str | None) -> None:
         raise ConfigError(f"public URL {url!r} must be of the form https://play.example.org")
 
 
-def _url(host: str, port: int) -> str:
+def url_of(listener: socket.socket) -> str:
+    """The URL at which this machine reaches a socket that listens."""
+    host, port = listener.getsockname()[:2]
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
 

@@ -15,6 +15,7 @@ SUBCOMMANDS = {
     "pay": "experiments.cli.study.pay",
     "backup": "experiments.cli.study.backup",
     "restore": "experiments.cli.study.restore",
+    "researcher": "experiments.cli.study.researcher",
     "erase": "experiments.cli.study.erase",
     "preregister": "experiments.cli.study.preregister",
     "simulate": "experiments.cli.study.simulate",

@@ -5,6 +5,8 @@ import asyncio
 import os
 import secrets
 import socket
+import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +17,10 @@ from experiments.cli.server import (
     check_public_url,
     listen,
     locked,
+    number,
     prepare_process,
     serve,
+    url_of,
 )
 from experiments.cli.study.database import DATABASE, add_database, sqlite_url
 from experiments.errors import ConfigError
@@ -48,6 +52,12 @@ def add_parser(commands: Any) -> None:
         "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: made once)"
     )
     add_server_options(parser.add_argument_group("server"))
+    group = parser.add_argument_group("researcher's page, health and metrics")
+    group.add_argument("--researcher-port", type=number(0, 65535), metavar="PORT", help="serve them here")
+    group.add_argument(
+        "--researcher-host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at"
+    )
+    group.add_argument("--researcher-url", metavar="URL", help="URL under which a proxy makes them public")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -62,15 +72,22 @@ def run(arguments: argparse.Namespace) -> int:
     phases_of_study(study)  # own ones may be missing
     recruiter(study.settings.recruitment)  # codes may be missing
     check_public_url(arguments.public_url)
+    check_public_url(arguments.researcher_url)
     arguments.out.mkdir(parents=True, exist_ok=True)
     prepare_process()
-    with listen(arguments.host, arguments.port) as listener, locked(arguments.out):
+    with ExitStack() as open_things:
+        listener = open_things.enter_context(listen(arguments.host, arguments.port))
+        researchers = None
+        if arguments.researcher_port is not None:
+            at = listen(arguments.researcher_host, arguments.researcher_port)
+            researchers = open_things.enter_context(at)
+        open_things.enter_context(locked(arguments.out))
         from experiments.web.server.pool import WorkerPool
 
         pool = WorkerPool(study.cells[0].trial(0).house)
         pool.warm_up()  # in parallel to the film
         film = _film(study, arguments)
-        asyncio.run(_serve(study, pool, film, listener, arguments))
+        asyncio.run(_serve(study, pool, film, (listener, researchers), arguments))
     return 0
 
 
@@ -78,7 +95,7 @@ async def _serve(
     study: "Study",
     pool: "WorkerPool",
     film: Path | None,
-    listener: socket.socket,
+    listeners: tuple[socket.socket, socket.socket | None],
     arguments: argparse.Namespace,
 ) -> None:
     import numpy as np
@@ -86,6 +103,8 @@ async def _serve(
     from experiments.people import VISITS
     from experiments.people.phases import phases_of_study
     from experiments.people.recruitment import recruiter
+    from experiments.people.researcher.app import ResearcherServer, Watched
+    from experiments.people.researcher.metrics import Metrics, Timed
     from experiments.people.server.app import Serving, StudyServer
     from experiments.people.server.procedure import Procedure
     from experiments.people.store import Store
@@ -95,9 +114,18 @@ async def _serve(
     store = await Store.open(url, study.settings.name, study.sha256)
     visits = Visits(arguments.out.absolute() / VISITS)
     procedure = Procedure(study, phases_of_study(study), store, visits, np.random.default_rng())
-    serving = Serving(_secret(arguments.out), film, arguments.trusted_proxy)
+    metrics = Metrics()
+    store.on_write(metrics.wrote)
+    serving = Serving(_secret(arguments.out), film, arguments.trusted_proxy, metrics)
     server = StudyServer(procedure, recruiter(study.settings.recruitment), pool, serving)
-    await serve(server.app(arguments.host, arguments.public_url), listener, arguments)
+    app = Timed(server.app(arguments.host, arguments.public_url), metrics)
+    beside, (listener, researchers) = [], listeners
+    if researchers is not None:
+        watched = Watched(study, store, server.sessions, metrics)
+        page = ResearcherServer(watched, arguments.researcher_url, arguments.trusted_proxy)
+        beside.append((page.app(arguments.researcher_host), researchers))
+        print(f"Researchers: {arguments.researcher_url or url_of(researchers)}", file=sys.stderr)
+    await serve(app, listener, arguments, beside)
 
 
 def _secret(folder: Path) -> bytes:

@@ -86,3 +86,14 @@ describe("the check of a computer", () => {
     expect(value("latency_ms")).toBe("999999");
   });
 });
+
+test("the numbers of the researcher's page are taken anew, and nothing else of it", async () => {
+  vi.useFakeTimers();
+  vi.stubGlobal("fetch", async () => new Response(`<p id="people" data-live>2</p><input id="wanted" value="3">`));
+  document.body.innerHTML = `<p id="people" data-live>1</p><input id="wanted" value="4">`;
+  await import("../static/study/refresh.js");
+  await vi.advanceTimersByTimeAsync(6000);
+  expect(document.getElementById("people")?.textContent).toBe("2");
+  expect(/** @type {HTMLInputElement} */ (document.getElementById("wanted")).value).toBe("4");
+  vi.useRealTimers();
+});

@@ -1,0 +1,134 @@
+"""A study with its researcher's page, served over real HTTP on two ports; trials are played by scripted workers."""
+
+import asyncio
+import re
+import threading
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from ipaddress import ip_network
+from typing import Any
+
+import httpx
+import numpy as np
+from scripted_workers import ScriptedPool
+
+from experiments.cli.server import http_server, listen, url_of
+from experiments.people.phases import phases_of_study
+from experiments.people.recruitment import recruiter
+from experiments.people.researcher.app import ResearcherServer, Watched
+from experiments.people.researcher.metrics import Metrics, Timed
+from experiments.people.server.app import Serving, StudyServer
+from experiments.people.server.procedure import Procedure
+from experiments.people.store import Store
+from experiments.people.study_file import read_people_study
+from experiments.web.server.visits import Visits
+
+HOST = "127.0.0.1"
+PASSWORD = "correct horse battery"
+ROLES = ("viewer", "assistant", "owner")  # names of researchers as well
+CELLS = """
+[[cells]]
+assistance = "optimal"
+objects = 1
+people = 40
+house_seeds = 0
+
+[study]
+name = "small"
+title = "A small study"
+institution = "a test"
+contact = "nobody@example.org"
+"""
+
+
+@dataclass
+class Site:
+    """What is served. `people` and `researchers` are the two applications."""
+
+    study: Any
+    pool: ScriptedPool = field(default_factory=ScriptedPool)
+    url: str = ""
+    researcher_url: str = ""
+    store: Any = None
+    people: Any = None
+    researchers: Any = None
+    loop: Any = None
+
+    def ask(self, coroutine):
+        """What a coroutine of the store gives."""
+        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(60)
+
+    def client(self, researcher=False, headers=None):
+        """A browser, without anything in it yet."""
+        url = self.researcher_url if researcher else self.url
+        origin = {"Origin": url.rstrip("/"), **(headers or {})}
+        return httpx.Client(base_url=url, headers=origin, timeout=60, follow_redirects=False)
+
+    def logged_in(self, name):
+        """The browser of a researcher."""
+        client = self.client(researcher=True)
+        answer = client.post("/login", data={"name": name, "password": PASSWORD})
+        assert (answer.status_code, answer.headers["location"]) == (303, "/")
+        return client
+
+    def begin(self, client, **ids):
+        """Begin the study as a new person; the path of the link."""
+        answer = client.post("/begin", data=ids)
+        assert answer.status_code == 303, answer.text
+        return answer.headers["location"]
+
+
+@contextmanager
+def served(folder, settings="", researchers=ROLES):
+    """A study with `settings` added to its file, and researchers of these names and roles."""
+    (folder / "study.toml").write_text(CELLS + settings)
+    (folder / "film.mp4").write_bytes(b"a film")
+    site, ready, servers = Site(read_people_study(folder / "study.toml")), threading.Event(), []
+    failed = []
+
+    async def main():
+        site.loop = asyncio.get_running_loop()
+        site.store = await Store.open(f"sqlite:///{folder / 'study.db'}", "small", "0" * 64)
+        known = {one.name for one in await site.store.researchers.all()}
+        for role in set(researchers) - known:
+            await site.store.researchers.add(role, PASSWORD, role)
+        metrics = Metrics()
+        site.store.on_write(metrics.wrote)
+        visits, rng = Visits(folder / "visits"), np.random.default_rng(0)
+        procedure = Procedure(site.study, phases_of_study(site.study), site.store, visits, rng)
+        proxies = (ip_network("127.0.0.1/32"),)
+        serving = Serving(b"secret", folder / "film.mp4", proxies, metrics)
+        server = StudyServer(procedure, recruiter(site.study.settings.recruitment), site.pool, serving)
+        site.people = server.app(HOST)
+        watched = Watched(site.study, site.store, server.sessions, metrics)
+        site.researchers = ResearcherServer(watched, proxies=proxies).app(HOST)
+        with listen(HOST, 0) as first, listen(HOST, 0) as second:
+            site.url, site.researcher_url = url_of(first), url_of(second)
+            servers.extend([http_server(Timed(site.people, metrics)), http_server(site.researchers)])
+            ready.set()
+            await asyncio.gather(servers[0].serve([first]), servers[1].serve([second]))
+
+    def run():
+        try:
+            asyncio.run(main())
+        except BaseException as error:
+            failed.append(error)
+            ready.set()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    ready.wait(60)
+    assert not failed, failed
+    try:
+        yield site
+    finally:
+        for server in reversed(servers):
+            server.should_exit = True
+        thread.join(60)
+        assert not failed, failed
+
+
+def phase_of(client, link):
+    """Name of the phase whose page is shown; None where there is none."""
+    found = re.search(r'name="phase" value="(\w+)"|data-trial="(\w+)"', client.get(link).text)
+    return next(name for name in found.groups() if name) if found else None
