@@ -1,0 +1,1 @@
+"""Parametric furniture: kinds, and the pieces that a generator draws of them."""

@@ -1,0 +1,400 @@
+"""What hangs on walls and ceilings and lies on floors: pictures, rugs, mirrors, curtains, radiators, lamps."""
+
+import hashlib
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.houses.furniture.builder import Builder, numbers
+from mjsim.houses.furniture.look import Look
+from mjsim.houses.furniture.piece import Kind, Picture, Piece
+from mjsim.houses.furniture.seats import _rooms
+
+_ANY = _rooms(
+    "living",
+    "bedroom",
+    "office",
+    "dining",
+    "kitchen",
+    "hall",
+    "studio",
+    "child",
+    "bathroom",
+    "toilet",
+    "utility",
+)
+CEILING = 2.6  # m
+Image = NDArray[np.float64]
+
+
+def _file(name: str, image: Image) -> Picture:
+    """An image (h, w, 3), red green blue 0 to 1, as a texture whose name tells its content."""
+    pixels = np.clip(255 * image[..., ::-1], 0, 255).astype(np.uint8)
+    png = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 2])[1].tobytes()
+    return Picture(f"{name}_{hashlib.sha256(pixels.tobytes()).hexdigest()[:10]}", png)
+
+
+def _palette(rng: np.random.Generator, look: Look, count: int) -> Image:
+    """Colours (count, 3) of a picture: some of the home's, lighter and darker."""
+    chosen = np.array(look.colours)[rng.permutation(len(look.colours))[: min(count, 5)]]
+    while len(chosen) < count:
+        chosen = np.vstack([chosen, chosen[int(rng.integers(len(chosen)))] * rng.uniform(0.5, 0.9)])
+    return np.asarray(np.clip(chosen * rng.uniform(0.85, 1.15, (len(chosen), 1)), 0, 1))
+
+
+def painting(rng: np.random.Generator, look: Look, wide: int = 128, high: int = 96) -> Picture:
+    """A picture in one of seven manners."""
+    y, x = np.mgrid[0:high, 0:wide] / np.array([high, wide]).reshape(2, 1, 1)
+    colours = _palette(rng, look, 6)
+    light = 0.75 + 0.25 * colours[0]
+    image = np.broadcast_to(light, (high, wide, 3)).copy()
+    aspect = wide / high
+    manner = int(rng.integers(7))
+    if manner in (0, 1):  # hills under a sun, or waves
+        image = light * (1 - 0.35 * y[..., None]) + 0.35 * y[..., None] * colours[1]
+        sun = np.hypot((x - rng.uniform(0.2, 0.8)) * aspect, y - rng.uniform(0.15, 0.35)) < rng.uniform(
+            0.07, 0.13
+        )
+        image[sun] = (1.0, 0.93, 0.75) if manner == 0 else (0.96, 0.6, 0.4)
+        for i in range(4):
+            phase, wave = rng.uniform(0, 6.3), rng.uniform(1.5, 5) if manner == 0 else rng.uniform(8, 16)
+            crest = 0.42 + 0.14 * i + (0.09 if manner == 0 else 0.02) * np.sin(wave * x + phase)
+            image[y > crest] = colours[1] * (1 - 0.18 * i) + 0.06 * (3 - i)
+    elif manner == 2:  # overlapping discs
+        for i in range(6):
+            at = np.hypot((x - rng.uniform(0.1, 0.9)) * aspect, y - rng.uniform(0.1, 0.9)) < rng.uniform(
+                0.1, 0.32
+            )
+            image[at] = 0.25 * image[at] + 0.75 * colours[i % len(colours)]
+    elif manner == 3:  # fields of colour
+        cuts = np.sort(rng.uniform(0.1, 0.9, 3))
+        rows = np.digitize(y + 0.01 * np.sin(20 * x), cuts)
+        for i in range(4):
+            image[rows == i] = colours[i]
+        image += 0.05 * cv2.GaussianBlur(rng.standard_normal((high, wide)), (0, 0), 2.0)[..., None]
+    elif manner == 4:  # a branch with leaves
+        side, lean = float(rng.uniform(0.4, 0.6)), float(rng.uniform(-0.15, 0.15))
+        image[np.abs(x - side - lean * (1 - y)) < 0.008] = 0.5 * colours[1]
+        for i in range(9):
+            v, turn = 0.12 + 0.085 * i, 1 if i % 2 else -1
+            u = side + lean * (1 - v)
+            a = turn * 0.7
+            p, q = (x - u - turn * 0.13) * aspect, y - v + 0.05
+            along, across = p * math.cos(a) - q * math.sin(a) * turn, p * math.sin(a) * turn + q * math.cos(a)
+            leaf = (along / 0.15) ** 2 + (across / 0.045) ** 2 < 1
+            image[leaf] = colours[1 + i % 2] * 0.8
+    elif manner == 5:  # a town
+        image = light * (1 - 0.3 * y[..., None])
+        left = 0.0
+        while left < 1:
+            w, h = rng.uniform(0.08, 0.18), rng.uniform(0.25, 0.7)
+            tower = (x >= left) & (x < left + w) & (y > 1 - h)
+            image[tower] = colours[int(rng.integers(len(colours)))] * rng.uniform(0.6, 1.0)
+            windows = (
+                tower & (np.mod((x - left) / w * 3, 1) > 0.5) & (np.mod(y * 14, 1) > 0.5) & (y > 1.06 - h)
+            )
+            image[windows] = (0.98, 0.9, 0.6)
+            left += w
+    else:  # woven lines
+        for i in range(int(rng.integers(5, 9))):
+            u, w = rng.uniform(0, 1), rng.uniform(0.02, 0.09)
+            image[np.abs((x if i % 2 else y) - u) < w] = colours[i % len(colours)]
+    return _file("picture", image)
+
+
+def carpet(rng: np.random.Generator, look: Look, round_one: bool = False) -> Picture:
+    """The pattern of a rug in one of six manners."""
+    n = 128
+    y, x = (np.mgrid[0:n, 0:n] + 0.5) / n
+    ground, one, two, three = _palette(rng, look, 4)
+    ground = 0.55 * ground + 0.45 * np.array([0.9, 0.87, 0.8]) if rng.random() < 0.6 else ground
+    image = np.broadcast_to(ground, (n, n, 3)).copy()
+    edge = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
+    manner = int(rng.integers(6))
+    if round_one:
+        edge = 0.5 - np.hypot(x - 0.5, y - 0.5)
+        rings = np.mod(edge * rng.integers(6, 12), 1)
+        image[rings < 0.35] = one
+        image[edge < 0.04] = two
+    elif manner == 0:  # stripes
+        bands = np.mod(x * rng.integers(6, 14), 1)
+        image[bands < 0.3], image[(bands > 0.5) & (bands < 0.6)] = one, two
+    elif manner == 1:  # lozenges
+        k = int(rng.integers(3, 6))
+        d = np.abs(np.mod(x * k, 1) - 0.5) + np.abs(np.mod(y * k, 1) - 0.5)
+        image[d < 0.4], image[d < 0.25], image[d < 0.1] = one, two, three
+    elif manner == 2:  # a medallion
+        d = np.hypot((x - 0.5) * 1.3, y - 0.5) * (1 + 0.07 * np.cos(12 * np.arctan2(y - 0.5, x - 0.5)))
+        image[d < 0.34], image[d < 0.26], image[d < 0.12] = one, ground, two
+    elif manner == 3:  # lines of a berber rug
+        k = int(rng.integers(2, 4))
+        zigzag = np.mod((y * k + 0.25 * np.abs(np.mod(x * 4, 2) - 1)), 0.5)
+        image[zigzag < 0.05] = 0.35 * one
+    elif manner == 4:  # checks
+        k = int(rng.integers(3, 7))
+        image[(np.floor(x * k) + np.floor(y * k)) % 2 == 0] = 0.8 * one + 0.2 * ground
+    if not round_one and manner in (1, 2, 5):  # a border
+        image[edge < 0.09], image[edge < 0.07], image[edge < 0.025] = two, one, three
+    worn = cv2.GaussianBlur(rng.standard_normal((n, n)), (0, 0), 1.2)
+    return _file("rug", image * (1 + 0.1 * worn[..., None]))
+
+
+def picture(b: Builder) -> Piece:
+    """One to three framed pictures on a wall."""
+    many = b.pick(1, 1, 1, 2, 3) if b.smaller == 0 else 1
+    frame, border = b.pick(b.wood, "black", "white", b.metal), b.pick(0.02, 0.03, 0.05)
+    w = b.pick(0.8, 1.0, 0.7) if many == 1 and not b.smaller else b.pick(0.4, 0.5)
+    h = round(w * b.pick(0.75, 1.0, 1.33), 2) if w < 0.75 else round(0.75 * w, 2)
+    middle, step = b.pick(1.5, 1.55, 1.6), w + b.pick(0.08, 0.12)
+    for i in range(many):
+        x = (i - (many - 1) / 2) * step
+        image = painting(b.rng, b.look, 128, 96 if h < w else 128 if h == w else 160)
+        b.box(frame, w, (0.0, 0.022), (middle - h / 2, middle + h / 2), x, seen=True)
+        mat = 2 * border
+        if border > 0.02 and b.chance(0.5):
+            b.box(
+                "white",
+                w - mat,
+                (0.022, 0.025),
+                (middle - h / 2 + border, middle + h / 2 - border),
+                x,
+                seen=True,
+            )
+            mat += 0.1
+        b.image(b.own(image), w - mat, (middle - h / 2 + mat / 2, middle + h / 2 - mat / 2), 0.03, x, 0.006)
+    return b.piece((w + step * (many - 1), 0.03, middle + h / 2), parts=(), stands="hangs")
+
+
+def wall_mirror(b: Builder) -> Piece:
+    """Round or high."""
+    if b.chance(0.5):
+        r = b.pick(0.28, 0.35)
+        b.disc(b.pick(b.metal, b.wood), 0, 0.01, 1.55, r, 0.02)
+        b.disc("mirror", 0, 0.022, 1.55, r - 0.03, 0.006)
+        return b.piece((2 * r, 0.03, 1.55 + r), parts=(), stands="hangs")
+    w, high = b.pick(0.4, 0.5), b.pick(1.2, 1.5)
+    b.box(b.pick(b.metal, b.wood), w, (0, 0.02), (0.35, 0.35 + high), seen=True)
+    b.image("mirror", w - 0.05, (0.375, 0.325 + high), 0.027, thick=0.007)
+    return b.piece((w, 0.03, 0.35 + high), parts=(), stands="hangs")
+
+
+def clock(b: Builder) -> Piece:
+    """A round clock."""
+    r = b.pick(0.13, 0.16, 0.19)
+    b.disc(b.pick("black", b.metal, b.wood, "white"), 0, 0.015, 1.85, r, 0.03)
+    face = f'pos="0 0.031 1.85" size="{numbers(r - 0.012, 0.004)}" xyaxes="-1 0 0 0 0 1"'
+    b.add("cylinder", "clock_face", True, face)
+    return b.piece((2 * r, 0.036, 1.85 + r), parts=(), stands="hangs")
+
+
+def pinboard(b: Builder) -> Piece:
+    """Notes on a board."""
+    w, h = b.pick(0.6, 0.9), b.pick(0.45, 0.6)
+    b.box(b.wood, w, (0, 0.018), (1.3, 1.3 + h), seen=True)
+    b.image("pinboard", w - 0.04, (1.32, 1.28 + h), 0.026)
+    return b.piece((w, 0.03, 1.3 + h), parts=(), stands="hangs")
+
+
+def wall_shelf(b: Builder) -> Piece:
+    """One or two boards with things on them, over what stands below."""
+    w = b.size(0.5, 0.9, 0.1)
+    for z in (1.45, 1.75)[: b.pick(1, 2)]:
+        b.box(b.wood, w, (0, 0.2), (z, z + 0.025), seen=True)
+        for x in (-w / 2 + 0.1, w / 2 - 0.1):
+            b.box(b.metal, 0.02, (0, 0.16), (z - 0.02, z), x, seen=True)
+        b.clutter(0.85 * w, (0.05, 0.17), z + 0.025)
+    return b.piece((w, 0.2, 2.1), parts=(), stands="hangs")
+
+
+def wall_lamp(b: Builder) -> Piece:
+    """A shade or a globe on an arm."""
+    b.box(b.metal, 0.08, (0, 0.02), (1.62, 1.74), seen=True)
+    b.rod(b.metal, (0, 0.02, 1.68), (0, 0.13, 1.7), 0.01)
+    if b.chance(0.5):
+        b.soft("bulb", (0, 0.14, 1.74), (0.08, 0.08, 0.08))
+    else:
+        b.post("shade", 0, 0.14, (1.67, 1.85), 0.09)
+    return b.piece((0.18, 0.24, 1.86), parts=(), stands="hangs")
+
+
+def _on_floor(b: Builder, w: float, d: float, material: str, round_one: bool = False) -> Piece:
+    """Flat on the floor, 3.5 mm high: a plate's bottom is higher."""
+    if round_one:
+        b.post(material, 0, d / 2, (0.0005, 0.0035), d / 2)
+    else:
+        b.box(material, w, (0, d), (0.0005, 0.0035), seen=True)
+    return b.piece((w, d, 0.0035), parts=(), stands="flat")
+
+
+def rug(b: Builder) -> Piece:
+    """A rectangle with a pattern of its own."""
+    w, d = b.pick((1.2, 0.8), (1.6, 1.1), (2.0, 1.4)) if b.smaller == 0 else (1.0, 0.7)
+    return _on_floor(b, w, d, b.own(carpet(b.rng, b.look)))
+
+
+def runner(b: Builder) -> Piece:
+    """Long and narrow."""
+    w, d = b.pick((2.2, 0.7), (1.8, 0.6)) if b.smaller == 0 else (1.3, 0.6)
+    return _on_floor(b, w, d, b.own(carpet(b.rng, b.look)))
+
+
+def round_rug(b: Builder) -> Piece:
+    """With rings."""
+    d = b.pick(1.2, 1.5) if b.smaller == 0 else 0.9
+    return _on_floor(b, d, d, b.own(carpet(b.rng, b.look, True)), True)
+
+
+def bath_mat(b: Builder) -> Piece:
+    """A towel on the floor."""
+    return _on_floor(b, b.pick(0.7, 0.8), b.pick(0.45, 0.5), b.pick("towel_a", "towel_b", "towel_white"))
+
+
+def door_mat(b: Builder) -> Piece:
+    """Behind the front door."""
+    return _on_floor(b, b.pick(0.7, 0.8), 0.45, b.pick("soil", "wicker", "dark"))
+
+
+def _window(b: Builder) -> tuple[float, float, float]:
+    return b.fit or (1.4, 0.95, 2.15)
+
+
+def curtains(b: Builder) -> Piece:
+    """Beside a window, to the floor, or to below the sill where `smaller`."""
+    w, low, high = _window(b)
+    long = b.smaller == 0
+    side, top = b.pick(0.24, 0.3), min(high + 0.14, CEILING - 0.05)
+    end = 0.03 if long else low - 0.15
+    total = w + 2 * side
+    for sign in (-1, 1):
+        for i in range(2):
+            x = sign * (w / 2 - 0.02 + side * (i + 0.5) / 2)
+            b.box(
+                "curtain", side / 2 - 0.004, (0.07 + 0.012 * i, 0.115 + 0.012 * i), (end, top), x, seen=True
+            )
+    b.add(
+        "cylinder",
+        b.metal,
+        True,
+        f'pos="{numbers(0, 0.1, top + 0.012)}" size="{numbers(0.013, total / 2 + 0.05)}" euler="0 1.5708 0"',
+    )
+    return b.piece((total + 0.1, 0.14, top + 0.03), parts=(), stands="hangs")
+
+
+def blind(b: Builder) -> Piece:
+    """Drawn a third of the way down: slats, or a roll of cloth."""
+    w, low, high = _window(b)
+    down = round(b.pick(0.2, 0.35) * (high - low), 2)
+    b.box("white", w + 0.06, (0.0, 0.06), (high, high + 0.07), seen=True)
+    if b.chance(0.5):
+        b.box(b.pick("curtain", "linen", b.cloth), w + 0.02, (0.02, 0.028), (high - down, high), seen=True)
+        b.box("white", w + 0.03, (0.015, 0.035), (high - down - 0.02, high - down), seen=True)
+    else:
+        count = max(3, round(down / 0.05))
+        for i in range(count):
+            z = high - 0.01 - down * (i + 0.5) / count
+            b.box("white", w + 0.02, (0.005, 0.05), (z, z + 0.008), seen=True)
+    return b.piece((w + 0.06, 0.06, high + 0.07), parts=(), stands="hangs")
+
+
+def radiator(b: Builder) -> Piece:
+    """Below a window: panels or ribs."""
+    w, low, _ = _window(b)
+    w, top, paint = (
+        min(w, 1.4) - 0.1,
+        min(low - 0.12, b.pick(0.6, 0.72)),
+        b.pick("white", "white", "cream", "dark"),
+    )
+    b.box(paint, w, (0.03, 0.09), (0.12, top))
+    if b.chance(0.5):
+        count = round(w / 0.09)
+        for i in range(count):
+            b.box(paint, 0.05, (0.02, 0.1), (0.11, top + 0.01), w * ((i + 0.5) / count - 0.5), seen=True)
+    else:
+        b.box("ceramic_shade", w - 0.03, (0.03, 0.095), (0.16, top - 0.04), seen=True)
+        b.box(paint, w + 0.02, (0.025, 0.1), (top - 0.02, top + 0.005), seen=True)
+    b.post("chrome", w / 2 + 0.03, 0.06, (0.01, 0.2), 0.012)
+    return b.piece((w + 0.1, 0.105, top + 0.01))
+
+
+def _lamp_class(b: Builder) -> None:
+    """What hangs from a ceiling is left out of a view from above."""
+    b.geoms = [geom.replace('class="decor"', 'class="lamp"') for geom in b.geoms]
+
+
+def ceiling_lamp(b: Builder) -> Piece:
+    """Flat under the ceiling: a disc, a bowl, a bar with spots, or a star of globes."""
+    form, z = b.pick("disc", "bowl", "spots", "globes", "square"), CEILING
+    if form == "disc":
+        b.post("bulb", 0, 0, (z - 0.06, z), b.pick(0.18, 0.24))
+        b.post(b.metal, 0, 0, (z - 0.025, z), 0.26)
+    elif form == "bowl":
+        b.post(b.metal, 0, 0, (z - 0.03, z), 0.11)
+        b.soft(b.pick("shade", "bulb"), (0, 0, z - 0.08), (0.24, 0.24, 0.08))
+    elif form == "square":
+        b.box(b.pick("white", b.wood), 0.5, (-0.25, 0.25), (z - 0.05, z), seen=True)
+        b.box("bulb", 0.46, (-0.23, 0.23), (z - 0.058, z - 0.05), seen=True)
+    else:
+        b.box(b.metal, 0.8, (-0.03, 0.03), (z - 0.03, z), seen=True)
+        for x in (-0.32, 0.0, 0.32):
+            if form == "spots":
+                b.post(b.metal, x, 0, (z - 0.13, z - 0.03), 0.045)
+                b.post("bulb", x, 0, (z - 0.135, z - 0.13), 0.04)
+            else:
+                b.soft("bulb", (x, 0, z - 0.11), (0.08, 0.08, 0.08))
+    _lamp_class(b)
+    return b.piece((0.8, 0.52, z), parts=(), stands="ceiling")
+
+
+def floor_lamp(b: Builder) -> Piece:
+    """A shade on a stem, a tripod, a globe, or a bow."""
+    form, tall, r = b.pick("stem", "tripod", "globe", "uplight"), b.pick(1.4, 1.55), 0.2
+    b.shadow(0.32, (0.04, 0.36), round_one=True)
+    b.guard(0.14, (r - 0.07, r + 0.07), (0, tall))
+    if form == "tripod":
+        for a in (0.5, 2.6, 4.7):
+            b.rod(b.wood, (0.2 * math.cos(a), r + 0.16 * math.sin(a), 0), (0, r, tall - 0.2), 0.014)
+    else:
+        b.post(b.metal, 0, r, (0, 0.025), 0.15)
+        b.post(b.metal, 0, r, (0.025, tall), 0.014)
+    if form == "globe":
+        b.soft("bulb", (0, r, tall + 0.1), (0.14, 0.14, 0.14))
+    elif form == "uplight":
+        b.soft(b.metal, (0, r, tall + 0.03), (0.17, 0.16, 0.05))
+        b.post("bulb", 0, r, (tall + 0.055, tall + 0.07), 0.12)
+    else:
+        b.post("shade", 0, r, (tall - 0.1, tall + 0.18), b.pick(0.16, 0.2))
+    return b.piece((0.4, 0.4, tall + 0.24), parts=((-0.17, 0, 0.17, 2 * r, tall),))
+
+
+def standing_mirror(b: Builder) -> Piece:
+    """A high mirror that leans on the wall."""
+    w, h = b.pick(0.45, 0.55, 0.65), b.pick(1.6, 1.75)
+    b.shadow(w, (0, 0.08))
+    b.box(b.pick(b.wood, b.metal), w, (0.01, 0.05), (0, h))
+    b.image("mirror", w - 0.07, (0.035, h - 0.035), 0.058)
+    return b.piece((w, 0.06, h), use=0.6)
+
+
+KINDS = (
+    Kind("picture", _ANY, picture, solid=False),
+    Kind("wall_mirror", _rooms("hall", "bedroom", "living"), wall_mirror, solid=False),
+    Kind("clock", _rooms("kitchen", "dining", "living", "office", "hall", "child"), clock, solid=False),
+    Kind("pinboard", _rooms("office", "child", "kitchen"), pinboard, solid=False),
+    Kind("wall_shelf", _rooms("office", "child", "bedroom", "living", "kitchen"), wall_shelf, solid=False),
+    Kind("wall_lamp", _rooms("bedroom", "living", "hall", "bathroom"), wall_lamp, solid=False),
+    Kind("rug", _ANY - {"kitchen", "bathroom", "toilet", "utility"}, rug, solid=False),
+    Kind("runner", _rooms("hall", "bedroom", "kitchen"), runner, solid=False),
+    Kind("round_rug", _rooms("child", "bedroom", "living", "office", "studio"), round_rug, solid=False),
+    Kind("bath_mat", _rooms("bathroom", "toilet"), bath_mat, solid=False),
+    Kind("door_mat", _rooms("hall"), door_mat, solid=False),
+    Kind(
+        "curtains", _rooms("living", "bedroom", "dining", "office", "child", "studio"), curtains, solid=False
+    ),
+    Kind("blind", _rooms("kitchen", "bathroom", "toilet", "office", "utility"), blind, solid=False),
+    Kind("radiator", _ANY, radiator),
+    Kind("ceiling_lamp", _ANY, ceiling_lamp, solid=False),
+    Kind("floor_lamp", _rooms("living", "bedroom", "office", "studio"), floor_lamp),
+    Kind("standing_mirror", _rooms("bedroom", "hall"), standing_mirror),
+)

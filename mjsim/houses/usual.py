@@ -1,0 +1,89 @@
+"""What rooms have, by their use: first what they must have, then what they usually have."""
+
+Options = tuple[str, ...]
+
+MUSTS: dict[str, tuple[Options, ...]] = {  # one of each
+    "bedroom": (("double_bed", "double_bed"),),
+    "child": (("single_bed", "bunk_bed"),),
+    "studio": (("double_bed", "single_bed"),),
+    "bathroom": (("bathtub", "shower"), ("toilet", "toilet"), ("washbasin", "washbasin")),
+    "shower_room": (("shower", "shower"), ("toilet", "toilet"), ("washbasin", "washbasin")),
+}
+_PLANTS: Options = ("bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
+_SHELVES: Options = ("bookcase", "low_bookcase", "cube_shelf", "ladder_shelf")
+USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this chance, while there is room
+    "bedroom": (
+        (("wardrobe", "mirror_wardrobe"), 1.0),
+        (("chest_of_drawers", "dressing_table"), 0.8),
+        (("standing_mirror", "armchair", "pouf", "bench"), 0.7),
+        (_PLANTS, 0.7),
+        ((*_SHELVES, "trunk", "television"), 0.6),
+        (("floor_lamp", "cot", "exercise_bike", "chest_of_drawers"), 0.5),
+    ),
+    "child": (
+        (("wardrobe", "chest_of_drawers"), 1.0),
+        (("toy_shelf", "low_bookcase", "cube_shelf"), 0.9),
+        (("desk",), 0.6),
+        (("pouf", "stool", "trunk", "aquarium"), 0.7),
+        (_PLANTS, 0.4),
+    ),
+    "living_room": (
+        (("armchair",), 0.8),
+        ((*_SHELVES, "sideboard", "display_cabinet"), 0.9),
+        (_PLANTS, 0.9),
+        (("floor_lamp", "side_table"), 0.8),
+        (("sideboard", "piano", "stove", "aquarium", "chest_of_drawers"), 0.8),
+        (("armchair", "pouf", "day_bed"), 0.6),
+        ((*_SHELVES, "trunk", "console"), 0.7),
+        (_PLANTS, 0.6),
+    ),
+    "studio": (
+        (("wardrobe", "chest_of_drawers"), 1.0),
+        (_SHELVES, 0.7),
+        (_PLANTS, 0.8),
+        (("floor_lamp", "armchair"), 0.6),
+    ),
+    "kitchen": (
+        (("kitchen_island", "bar_table", "larder", "dresser", "kitchen_trolley"), 0.9),
+        (("kitchen_trolley", "larder", "stool", "fridge"), 0.7),
+        (_PLANTS, 0.6),
+    ),
+    "dining_room": (
+        (("sideboard", "dresser", "display_cabinet"), 1.0),
+        (_PLANTS, 0.8),
+        (("bookcase", "ladder_shelf", "console", "stove", "piano", "bench"), 0.7),
+        (("floor_lamp", "armchair"), 0.5),
+    ),
+    "office": (
+        (("desk",), 1.0),
+        (_SHELVES, 1.0),
+        (("filing_cabinet",), 0.8),
+        (("armchair", "day_bed", "exercise_bike", "sofa"), 0.7),
+        (_PLANTS, 0.8),
+        (("floor_lamp", "side_table", *_SHELVES), 0.6),
+    ),
+    "bathroom": (
+        (("washing_machine", "washing_tower", "bath_cabinet"), 0.9),
+        (("towel_rail", "towel_shelf", "bath_cabinet"), 0.9),
+        (("snake_plant", "fern_stand", "stool", "drying_rack"), 0.6),
+    ),
+    "shower_room": ((("towel_rail", "bath_cabinet", "towel_shelf"), 0.9),),
+    "utility": (
+        (("washing_machine", "washing_tower"), 1.0),
+        (("towel_shelf", "larder", "fridge"), 1.0),
+        (("drying_rack",), 0.8),
+    ),
+    "hall": (
+        (("coat_rack", "shoe_cupboard"), 1.0),
+        (("console", "bench", "shoe_cupboard", "chest_of_drawers"), 0.9),
+        (("umbrella_stand",), 0.7),
+        (_PLANTS, 0.7),
+        (("mirror_wardrobe", "low_bookcase", "armchair", "standing_mirror"), 0.6),
+    ),
+}
+SHARES = {
+    "hall": (0.14, 0.24),
+    "utility": (0.3, 0.4),
+    "living_room": (0.3, 0.38),
+    "kitchen": (0.3, 0.38),
+}  # of the floor
