@@ -19,7 +19,7 @@ from mjsim.files import write_text_atomically
 
 TEXTS = "texts.csv"
 FREE = ("line", "text")  # kinds of items whose answers are written freely
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how what a spreadsheet would compute begins
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # how what a spreadsheet would compute begins
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,8 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
             continue
         mine = [answer for answer in answers if answer.person_id == person.id]
         passed = [phase for phase in phases if phase.person_id == person.id]
-        rows.append({**_about(person, trial, passed), **run.row, **_answers(items, mine)})
+        row = {**_about(person, trial, passed), **run.row, **_answers(items, mine)}
+        rows.append({key: harmless(value) if isinstance(value, str) else value for key, value in row.items()})
     return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable)
 
 

@@ -12,6 +12,7 @@ SUBCOMMANDS = {
     "check": "experiments.cli.study.check_study",
     "serve": "experiments.cli.study.serve",
     "collect": "experiments.cli.study.collect",
+    "export": "experiments.cli.study.export",
     "pay": "experiments.cli.study.pay",
     "backup": "experiments.cli.study.backup",
     "restore": "experiments.cli.study.restore",

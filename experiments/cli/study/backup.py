@@ -34,6 +34,9 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.study.simulate import study_path
 
     study = read_people_study(study_path(arguments.study))
+    from experiments.people.copies import note_copy
+
+    note_copy(arguments.folder, "backup", arguments.out)
     asyncio.run(_back_up(study, database_url(arguments), arguments.out))
     print(f"{arguments.out} (restore it with `mjsim study restore {arguments.out} {DATABASE}`)")
     return 0

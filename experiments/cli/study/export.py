@@ -1,0 +1,63 @@
+"""`mjsim study export`: all data of a study with people, to be kept or published."""
+
+import argparse
+import asyncio
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from experiments.cli.options import add_command, add_force
+from experiments.cli.requirements import require_extra
+from experiments.cli.study.database import add_database, add_served_study, database_url
+
+if TYPE_CHECKING:
+    from experiments.people.export import Exported
+    from experiments.people.study_file import Study
+
+DESCRIPTION = """\
+Write all data of a study to a new folder that follows Psych-DS: tidy tables (data/), the run directories of trials
+(runs/PERSON/PHASE), the meaning of each column (documentation/codebook.csv, dataset_description.json). People are
+numbers. Ids of platforms, links, their hashes and addresses are not in it, nor anybody who did not agree or wanted the
+data deleted. The folder is there whole or not at all.
+
+What people wrote freely is in a table of its own: read it before you publish it."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the subcommand."""
+    parser = add_command(
+        commands, "export", run, summary="all data of a study with people", description=DESCRIPTION
+    )
+    add_served_study(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="EXPORT", help="folder to make")
+    add_database(parser)
+    add_force(parser, "replace an earlier export")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Export; 1 if a run cannot be used."""
+    require_extra("people")
+    from experiments.people.export import check_export
+    from experiments.people.study_file import read_people_study
+    from experiments.study.simulate import study_path
+
+    study = read_people_study(study_path(arguments.study))
+    check_export(arguments.out, replace=arguments.force)
+    found = asyncio.run(_export(study, arguments))
+    for person, fault in found.collected.unusable.items():
+        print(f"mjsim: {person}: {fault}", file=sys.stderr)
+    print(f"{arguments.out} ({found.people} people, {found.runs} runs)")
+    return 1 if found.collected.unusable else 0
+
+
+async def _export(study: "Study", arguments: argparse.Namespace) -> "Exported":
+    from experiments.people.copies import note_copy
+    from experiments.people.export import export
+    from experiments.people.store import Store
+
+    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
+    try:
+        note_copy(arguments.folder, "export", arguments.out)
+        return await export(study, store, arguments.folder, arguments.out, replace=arguments.force)
+    finally:
+        await store.close()
