@@ -1,6 +1,7 @@
 """The tidy table of a study with people: a row for each person, from the store and the runs."""
 
 import csv
+import hashlib
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from experiments.people.items import Item
 from experiments.people.store import Answer, Person, PhaseRow, Store, TrialRow
 from experiments.people.study_file import SURVEY, Study
 from experiments.record.phases import TASK
+from experiments.record.run_directory import is_run, visit_folders
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.trials.batch_folder import read_trial
 from experiments.trials.table import write_tables
@@ -66,6 +68,23 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
         row = {**_about(person, trial, passed), **run.row, **_answers(items, mine)}
         rows.append({key: harmless(value) if isinstance(value, str) else value for key, value in row.items()})
     return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable)
+
+
+def collect_visits(folder: Path) -> Collected:
+    """The rows of everybody whose task is over in a folder of `mjsim play`, or of several; nobody's link is in them."""
+    rows: list[Mapping[str, Any]] = []
+    unusable: dict[str, str] = {}
+    under_way = 0
+    for visit in visit_folders(folder):
+        name = f"v{hashlib.sha256(visit.name.encode()).hexdigest()[:8]}"  # the folder's name is the hash of the link
+        if not is_run(visit / TASK):
+            under_way += 1
+            continue
+        try:
+            rows.append({"participant": name, **read_trial(visit / TASK).row})
+        except (RecordError, ReplayError, OSError) as error:
+            unusable[name] = str(error)
+    return Collected(_complete(rows), [], {"under way": under_way} if under_way else {}, unusable)
 
 
 def write_collected(collected: Collected, out: Path) -> Sequence[Path]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command, add_force
 from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import add_database, add_served_study, database_url
+from experiments.cli.study.database import DATABASE, add_database, add_served_study, database_url
 from experiments.errors import RecordError
 from experiments.trials.design import counted
 
@@ -21,8 +21,8 @@ Write what the people of a study did and answered as a tidy table, a row for eac
 and OUT/trials.csv, which `mjsim study analyze`, `compare` and `score` read, and OUT/texts.csv with what people wrote
 freely. Answers on a scale are columns likert_NAME, others answer_NAME. No id of a platform and no address is in them.
 
-DIR is the folder of `mjsim study serve`, which may run meanwhile. The folder of `mjsim play` needs no collecting:
-`mjsim study analyze` reads it as it is."""
+DIR is the folder of `mjsim study serve`, which may run meanwhile, or one of `mjsim play`, or one that holds several of
+these; people of `mjsim play` have no answers."""
 
 
 def add_parser(commands: Any) -> None:
@@ -39,28 +39,39 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Collect; 1 if a run cannot be used."""
     require_extra("people")
-    from experiments.people.collect import TEXTS, write_collected
+    from experiments.people.collect import TEXTS, collect_visits, write_collected
     from experiments.people.copies import note_copy
     from experiments.people.study_file import read_people_study
     from experiments.record.run_directory import check_file
     from experiments.study.simulate import study_path
     from experiments.trials.table import NAME
 
-    study = read_people_study(study_path(arguments.study))
     for name in (f"{NAME}.parquet", f"{NAME}.csv", TEXTS):
         check_file(arguments.out / name, replace=arguments.force)
-    found = asyncio.run(_collect(study, arguments))
+    if _is_served(arguments):
+        found = asyncio.run(_collect(read_people_study(study_path(arguments.study)), arguments))
+    else:
+        found = collect_visits(arguments.folder)
     for person, fault in found.unusable.items():
         print(f"mjsim: {person}: {fault}", file=sys.stderr)
     if not found.rows:
         raise RecordError(
             f"nobody in {arguments.folder} has finished the task yet; there is no table to write"
         )
-    note_copy(arguments.folder, "table", arguments.out)
+    if _is_served(arguments):
+        note_copy(arguments.folder, "table", arguments.out)
     table, *_ = write_collected(found, arguments.out)
     others = ", ".join(f"{number} {status.replace('_', ' ')}" for status, number in found.unfinished.items())
     print(f"{table} ({counted(len(found.rows), 'row')}; without one: {others or 'nobody'})")
     return 1 if found.unusable else 0
+
+
+def _is_served(arguments: argparse.Namespace) -> bool:
+    """Whether the folder is that of a study, and not of `mjsim play`."""
+    from experiments.record.run_directory import visit_folders
+
+    known = bool(arguments.database) or (arguments.folder / DATABASE).is_file()
+    return known or not visit_folders(arguments.folder)
 
 
 async def _collect(study: "Study", arguments: argparse.Namespace) -> "Collected":

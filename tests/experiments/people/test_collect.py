@@ -85,6 +85,22 @@ def test_a_run_that_was_changed_is_named(tmp_path, study, run):
     assert found.rows == [] and "not as written" in found.unusable["p00001"]
 
 
+def test_folders_of_play_are_collected_without_their_links(tmp_path, run, capsys):
+    for name, over in (("a" * 64, True), ("b" * 64, False)):
+        visit = tmp_path / "play" / name
+        visit.mkdir(parents=True)
+        (visit / "visit.json").write_text("{}")
+        if over:
+            shutil.copytree(run, visit / "task")
+    out = tmp_path / "table"
+    assert main(["study", "collect", "paper", str(tmp_path / "play"), "--out", str(out)]) == 0
+    assert "1 row; without one: 1 under way" in capsys.readouterr().out
+    (row,) = read_rows(out / "trials.parquet")
+    assert row["delivered"] == 1 and len(row["participant"]) == 9
+    assert not [path for path in out.iterdir() if b"a" * 64 in path.read_bytes()]
+    assert not (tmp_path / "play" / "copies.jsonl").exists()
+
+
 def test_texts_are_no_formulas():
     for text in ("=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1"):
         assert harmless(text) == f"'{text}"
