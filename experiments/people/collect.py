@@ -3,12 +3,13 @@
 import csv
 import hashlib
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.errors import RecordError, ReplayError
+from experiments.errors import ConfigError, RecordError, ReplayError
 from experiments.people.items import Item
 from experiments.people.store import Answer, Person, PhaseRow, Store, TrialRow
 from experiments.people.study_file import SURVEY, Study
@@ -22,6 +23,7 @@ from mjsim.files import write_text_atomically
 TEXTS = "texts.csv"
 FREE = ("line", "text")  # kinds of items whose answers are written freely
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # how what a spreadsheet would compute begins
+_NAME = re.compile(r"p?(\d{1,9})", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,14 @@ def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
 def person_name(person: Person) -> str:
     """The name of a person in tables: the number in the store."""
     return f"p{person.id:05d}"
+
+
+def person_number(name: str) -> int:
+    """The number in the store of a person with a name in tables; a ConfigError where that is none."""
+    found = _NAME.fullmatch(name)
+    if found is None:
+        raise ConfigError(f"{name!r} is no person; tables name people like p00012")
+    return int(found[1])
 
 
 def harmless(text: str) -> str:

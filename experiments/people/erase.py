@@ -2,15 +2,13 @@
 
 import asyncio
 import datetime
-import re
 from pathlib import Path
 
-from experiments.errors import ConfigError, StoreError
+from experiments.errors import StoreError
 from experiments.people import VISITS
+from experiments.people.collect import person_number
 from experiments.people.store import Store
 from experiments.web.server.visits import Visits
-
-_NAME = re.compile(r"p?(\d{1,9})", re.ASCII)
 
 
 async def erase(store: Store, folder: Path, name: str, who: str) -> None:
@@ -26,10 +24,7 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> None:
         ConfigError: That is no name of a person.
         StoreError: There is no such person, or the person is owed something.
     """
-    found = _NAME.fullmatch(name)
-    if found is None:
-        raise ConfigError(f"{name!r} is no person; tables name people like p00012")
-    person = await store.person(int(found[1]))
+    person = await store.person(person_number(name))
     owed = await store.ledger.owed(in_doubt_after=datetime.timedelta())
     if mine := [payment.key for payment in owed if payment.person_id == person.id]:
         raise StoreError(f"{name} is owed {', '.join(mine)}: pay first, then erase")

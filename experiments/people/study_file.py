@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from urllib.parse import urlsplit
 
 import msgspec
 
@@ -31,6 +32,16 @@ PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=86400.0)]
 Count = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
+Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
+Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]  # scheme, host, port
+
+# Settings of [study.recruitment] without which people of a platform cannot be served.
+NEEDED: Mapping[str, Sequence[str]] = {
+    "prolific": ("completed", "screened_out", "no_consent"),
+    "connect": ("completed",),
+    "external-question": ("sites",),
+}
+HERE = ("localhost", "127.0.0.1", "::1")  # what is sent there stays on this machine
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -46,7 +57,7 @@ class Pay(_Table, frozen=True):
     bonus_for_all: Money = 0.0  # for putting everything away
     fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # of the platform, a share of the pay
     wage: Money = 0.0  # an hour, below which `mjsim study check` calls the pay too low
-    partial: bool = False  # whether who leaves after the task has begun receives a share, by phases
+    partial: bool = False  # whether who leaves, or never returns, once the task has begun receives a share
 
 
 class Device(_Table, frozen=True):
@@ -60,13 +71,26 @@ class Device(_Table, frozen=True):
 
 
 class Recruitment(_Table, frozen=True):
-    """Where people come from, and the codes that the platform expects back."""
+    """Where people come from, and what their platform expects back."""
 
     platform: Literal["link", "lab", "prolific", "connect", "external-question"] = "link"
-    completed: str = ""
-    screened_out: str = ""
-    no_consent: str = ""
-    study_id: str = ""  # the platform's own
+    completed: Code = ""  # codes of the platform
+    screened_out: Code = ""
+    no_consent: Code = ""
+    study_id: Code = ""  # the platform's own; people of another one are refused
+    sites: tuple[Site, ...] = ()  # of the platform's pages; those of an ExternalQuestion embed it
+    api_url: str = ""  # of the platform's interface for programs
+
+    def __post_init__(self) -> None:
+        """Check that there is what the platform needs."""
+        for name in NEEDED.get(self.platform, ()):
+            if not getattr(self, name):
+                raise ValueError(f"the platform {self.platform} needs {name}, which is empty or missing")
+        url = urlsplit(self.api_url)
+        if self.api_url and (not url.hostname or url.scheme not in ("http", "https")):
+            raise ValueError(f"api_url is {self.api_url!r}; write it as https://HOST or https://HOST/PATH")
+        if url.scheme == "http" and url.hostname not in HERE:
+            raise ValueError(f"api_url is {self.api_url!r}; it gets a secret, so it must begin with https://")
 
 
 class Limits(_Table, frozen=True):
@@ -75,8 +99,17 @@ class Limits(_Table, frozen=True):
     sessions: Count = 20  # trials at a time; others wait
     idle: Seconds = 1800.0  # without a sign of the person, after which a trial gives its place away
     abandoned_after: Seconds = 1800.0  # without a sign of the person, after which the assignment is released
+    timed_out_after: Seconds = 14400.0  # without a sign of the person, after which the participation ends
     attempts: Count = 3  # at the comprehension check
     keep_days: Count | None = None  # after which personal data are deleted
+
+    def __post_init__(self) -> None:
+        """Check what belongs together."""
+        if self.timed_out_after < self.abandoned_after:
+            raise ValueError(
+                f"timed_out_after is {self.timed_out_after:g} s; it cannot be less than abandoned_after, "
+                f"{self.abandoned_after:g} s"
+            )
 
 
 class Settings(_Table, frozen=True):

@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command
@@ -10,6 +11,7 @@ from experiments.cli.study.database import add_database, add_served_study, datab
 from experiments.errors import ConfigError
 
 if TYPE_CHECKING:
+    from experiments.people.recruitment.payer import Payer
     from experiments.people.store import Store
     from experiments.people.study_file import Study
 
@@ -17,8 +19,10 @@ DESCRIPTION = """\
 Print who gets what by the rules of [study.pay], why, and whether it was paid. What is printed is noted in the ledger,
 where it stays: a rule that is changed later changes nothing that was decided. --dry-run notes nothing.
 
-Pay by hand, or on the pages of the platform, then note each payment: --paid KEY --reference TEXT. A payment is noted
-once; a second time is refused."""
+--send then lets the platform pay all that is owed. It may be repeated, and killed, at any time: nothing is paid twice.
+Its secret comes from the environment (MJSIM_PROLIFIC_TOKEN, MJSIM_CONNECT_KEY or MJSIM_EXTERNAL_QUESTION_TOKEN).
+Or pay by hand, then note each payment: --paid KEY --reference TEXT. A payment is noted once; a second time is refused.
+--reject PERSON --reason TEXT, before payments are decided, lets the platform reject what somebody did."""
 
 
 def add_parser(commands: Any) -> None:
@@ -28,10 +32,13 @@ def add_parser(commands: Any) -> None:
     )
     add_served_study(parser)
     parser.add_argument("--dry-run", action="store_true", help="note nothing")
+    parser.add_argument("--send", action="store_true", help="let the platform pay all that is owed")
     parser.add_argument("--paid", metavar="KEY", help="note that a payment was made, such as p00012-reward")
     parser.add_argument(
         "--reference", metavar="TEXT", help="the receipt, or the platform's number, of --paid"
     )
+    parser.add_argument("--reject", metavar="PERSON", help="reject a person who finished, such as p00012")
+    parser.add_argument("--reason", metavar="TEXT", help="what the person is told about --reject")
     add_database(parser)
 
 
@@ -43,37 +50,85 @@ def run(arguments: argparse.Namespace) -> int:
 
     if bool(arguments.paid) != bool(arguments.reference):
         raise ConfigError("--paid and --reference belong together: which payment was made, and its receipt")
-    if arguments.paid and arguments.dry_run:
-        raise ConfigError("--paid notes a payment, --dry-run notes nothing; leave out one of them")
+    if bool(arguments.reject) != bool(arguments.reason):
+        raise ConfigError("--reject and --reason belong together: who is rejected, and why")
+    wanted = [name for name in ("dry_run", "send", "paid", "reject") if getattr(arguments, name)]
+    if len(wanted) > 1:
+        first, second = (name.replace("_", "-") for name in wanted[:2])
+        raise ConfigError(f"--{first} and --{second} cannot be used at once; leave out one of them")
     study = read_people_study(study_path(arguments.study))
-    asyncio.run(_run(study, arguments))
-    return 0
+    return asyncio.run(_run(study, arguments))
 
 
-async def _run(study: "Study", arguments: argparse.Namespace) -> None:
+async def _run(study: "Study", arguments: argparse.Namespace) -> int:
+    from experiments.people.recruitment import payer
     from experiments.people.store import Store
 
+    client = payer(study.settings.recruitment) if arguments.send or arguments.reject else None
     store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
     try:
         if arguments.paid:
             await _note(store, arguments.paid, arguments.reference)
+        elif arguments.reject and client is not None:
+            await _reject(store, study, client, arguments)
         else:
             await _print(store, study, dry=arguments.dry_run)
+            if client is not None:
+                return await _send(store, study, client)
     finally:
         await store.close()
+        if client is not None:
+            await client.close()
+    return 0
 
 
 async def _print(store: "Store", study: "Study", *, dry: bool) -> None:
-    from experiments.people.payments import decide, due
+    from experiments.people.payments import decide, due, undecided
+    from experiments.people.store.ledger import by_key, paid
 
-    payments = due(study, await store.people(), await store.trials())
-    if not dry:
+    history = await store.ledger.history()
+    rejected = {event.person_id for event in history if event.kind == "rejection"}
+    payments = due(study, await store.people(), await store.trials(), rejected)
+    if dry:
+        new = undecided(payments, history)
+    else:
         await decide(store, payments)
-    paid = {event.key for event in await store.ledger.history() if event.event == "confirmed"}
-    for payment in payments:
-        print(f"{payment}  {'paid' if payment.key in paid else 'owed'}")
-    owed = sum(payment.cents for payment in payments if payment.key not in paid)
-    print(f"{owed / 100:.2f} {study.settings.pay.currency} are owed for {len(payments)} payments")
+        new, history = [], await store.ledger.history()
+    rows = [
+        (events[0].key, events[0].cents, events[0].currency, events[0].note, paid(events))
+        for events in by_key(history).values()
+    ]
+    rows += [(one.key, one.cents, one.currency, one.why, False) for one in new]
+    for key, cents, currency, why, done in sorted(rows):
+        print(f"{key}  {cents / 100:.2f} {currency}  {why}  {'paid' if done else 'owed'}")
+    owed = [cents for _, cents, _, _, done in rows if not done]
+    print(
+        f"{sum(owed) / 100:.2f} {study.settings.pay.currency} are owed in {len(owed)} of {len(rows)} payments"
+    )
+
+
+async def _send(store: "Store", study: "Study", client: "Payer") -> int:
+    """Let the platform pay; 1 if something is still owed then."""
+    from experiments.people.sending import Sender
+
+    async for sent in Sender(study.settings.name, store, client).send():
+        print(f"{sent.key}  {sent.state}  {sent.text}", flush=True)
+    left = len(await store.ledger.owed(in_doubt_after=timedelta()))
+    print(f"{left} payments are still owed" if left else "all is paid")
+    return int(left > 0)
+
+
+async def _reject(store: "Store", study: "Study", client: "Payer", arguments: argparse.Namespace) -> None:
+    from experiments.people.collect import person_number
+    from experiments.people.payments import reject
+
+    if len(arguments.reason) < client.shortest_reason:
+        raise ConfigError(
+            f"--reason has {len(arguments.reason)} characters; the platform wants at least {client.shortest_reason}"
+        )
+    person = await store.person(person_number(arguments.reject))
+    await reject(store, person, study.settings.pay.currency, arguments.reason)
+    print(f"{arguments.reject} is to be rejected; --send tells the platform")
 
 
 async def _note(store: "Store", key: str, reference: str) -> None:

@@ -39,18 +39,29 @@ class WayBack:
     Attributes:
         url: Of the platform, or empty.
         fields: Of a form that is posted there; None for a plain link.
+        label: Name of the text of the button.
+        gives_back: Whether the person has to give the task back on the platform's page.
     """
 
     code: str = ""
     url: str = ""
     fields: Mapping[str, str] | None = None
+    label: Literal["back", "next_person"] = "back"
+    gives_back: bool = False
 
 
 class Recruiter(Protocol):
-    """A platform. `parameters` are the names of what its links carry, which the first page keeps."""
+    """A platform.
+
+    Attributes:
+        platform: Its name in the study file.
+        parameters: Names of what its links carry, which the first page keeps.
+        embedded_by: Sites whose pages show the study in a frame, and to which its last form may be sent.
+    """
 
     platform: str
     parameters: tuple[str, ...]
+    embedded_by: tuple[str, ...]
 
     def arrive(self, query: Mapping[str, str]) -> Arrival | Preview | Refusal:
         """Who comes with the query of a link."""

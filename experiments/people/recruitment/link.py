@@ -9,11 +9,12 @@ class OpenLink:
     """Everybody who has the link may take part, and gets a link of their own to come back to.
 
     Args:
-        platform: `link`, or `lab`, which never offers the visit of the person before.
+        platform: `link`, or `lab`, where the last page leads to the first one for the next person.
         code: Shown at the end; empty for none.
     """
 
     parameters: tuple[str, ...] = ()
+    embedded_by: tuple[str, ...] = ()
 
     def __init__(self, platform: str = "link", code: str = "") -> None:
         self.platform, self._code = platform, code
@@ -23,5 +24,6 @@ class OpenLink:
         return Arrival()
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - nobody is known
-        """A code where there is one."""
-        return WayBack(self._code if how == "finished" else "")
+        """A code where there is one; in a lab, the first page."""
+        code = self._code if how == "finished" else ""
+        return WayBack(code, "/", label="next_person") if self.platform == "lab" else WayBack(code)

@@ -6,9 +6,8 @@ import logging
 import msgspec
 import pytest
 
-from experiments.errors import ConfigError
 from experiments.people.recruitment import recruiter
-from experiments.people.recruitment.base import Refusal
+from experiments.people.recruitment.base import Preview, Refusal
 from experiments.people.study_file import Recruitment, read_people_study
 from experiments.study.designs import FOLDER
 from tests.experiments.people.test_server import begin, phase, post, serving
@@ -43,13 +42,54 @@ def test_links_that_are_not_the_platforms_are_refused(change):
 
 @pytest.mark.parametrize("name", list(CODES))
 def test_a_missing_code_is_named(name):
-    with pytest.raises(ConfigError, match=f"study.recruitment.{name}"):
-        recruiter(msgspec.structs.replace(PROLIFIC, **{name: ""}))
+    with pytest.raises(ValueError, match=f"prolific needs {name}"):
+        msgspec.structs.replace(PROLIFIC, **{name: ""})
 
 
-def test_a_platform_that_cannot_be_served_is_named():
-    with pytest.raises(ConfigError, match="connect"):
-        recruiter(Recruitment(platform="connect"))
+def test_people_of_connect_are_known_by_their_id_and_return_to_the_page_with_the_code():
+    platform = recruiter(Recruitment(platform="connect", completed="DC6CDE9748", study_id="0123ABCD"))
+    ids = {"participantId": "P00001", "assignmentId": "A00001", "projectId": "0123ABCD"}
+    came = platform.arrive(ids)
+    assert (came.key, came.identity) == ("P00001", ids)
+    assert isinstance(platform.arrive({**ids, "projectId": "0123ABCE"}), Refusal)
+    assert isinstance(platform.arrive({**ids, "participantId": ""}), Refusal)
+    url = "https://connect.cloudresearch.com/participant/project/DC6CDE9748/complete"
+    assert platform.way_back("finished", ids).url == url
+    assert platform.way_back("screened_out", ids).gives_back
+
+
+SITE = "https://www.example.org"
+QUESTION = Recruitment(platform="external-question", sites=("https://worker.example.org", SITE))
+TASK = {"assignmentId": "3ASSIGNMENT", "hitId": "3HIT", "workerId": "A1WORKER", "turkSubmitTo": SITE}
+
+
+def test_people_of_an_external_question_preview_accept_and_submit():
+    platform = recruiter(QUESTION)
+    looking = {"assignmentId": "ASSIGNMENT_ID_NOT_AVAILABLE", "hitId": "3HIT"}
+    assert isinstance(platform.arrive(looking), Preview)
+    came = platform.arrive({**TASK, "turkSubmitTo": f"{SITE}/"})
+    assert (came.key, came.identity) == ("A1WORKER", TASK)
+    back = platform.way_back("finished", came.identity)
+    assert back.url == "https://www.example.org/mturk/externalSubmit"
+    assert back.fields["assignmentId"] == "3ASSIGNMENT"
+    assert platform.way_back("withdrawn", came.identity).gives_back
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"turkSubmitTo": "https://evil.example.org"},
+        {"turkSubmitTo": ""},
+        {"turkSubmitTo": f"{SITE}.evil.example.org"},
+        {"turkSubmitTo": f"{SITE}@evil.example.org"},
+        {"turkSubmitTo": "http://www.example.org"},
+        {"workerId": ""},
+        {"assignmentId": '"><script>'},
+    ],
+)
+def test_no_form_is_sent_where_a_link_says(change):
+    assert isinstance(recruiter(QUESTION).arrive({**TASK, **change}), Refusal)
+    assert recruiter(QUESTION).way_back("finished", {**TASK, "turkSubmitTo": "https://evil"}).url == ""
 
 
 def test_who_comes_again_is_the_same_person_and_no_id_is_shown(tmp_path, caplog):
