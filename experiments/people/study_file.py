@@ -35,12 +35,6 @@ Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
 Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
 Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]  # scheme, host, port
 
-# Settings of [study.recruitment] without which people of a platform cannot be served.
-NEEDED: Mapping[str, Sequence[str]] = {
-    "prolific": ("completed", "screened_out", "no_consent"),
-    "connect": ("completed",),
-    "external-question": ("sites",),
-}
 HERE = ("localhost", "127.0.0.1", "::1")  # what is sent there stays on this machine
 
 
@@ -82,10 +76,7 @@ class Recruitment(_Table, frozen=True):
     api_url: str = ""  # of the platform's interface for programs
 
     def __post_init__(self) -> None:
-        """Check that there is what the platform needs."""
-        for name in NEEDED.get(self.platform, ()):
-            if not getattr(self, name):
-                raise ValueError(f"the platform {self.platform} needs {name}, which is empty or missing")
+        """Check where secrets are sent."""
         url = urlsplit(self.api_url)
         if self.api_url and (not url.hostname or url.scheme not in ("http", "https")):
             raise ValueError(f"api_url is {self.api_url!r}; write it as https://HOST or https://HOST/PATH")

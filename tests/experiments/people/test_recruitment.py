@@ -6,6 +6,7 @@ import logging
 import msgspec
 import pytest
 
+from experiments.errors import ConfigError
 from experiments.people.recruitment import recruiter
 from experiments.people.recruitment.base import Preview, Refusal
 from experiments.people.study_file import Recruitment, read_people_study
@@ -42,8 +43,8 @@ def test_links_that_are_not_the_platforms_are_refused(change):
 
 @pytest.mark.parametrize("name", list(CODES))
 def test_a_missing_code_is_named(name):
-    with pytest.raises(ValueError, match=f"prolific needs {name}"):
-        msgspec.structs.replace(PROLIFIC, **{name: ""})
+    with pytest.raises(ConfigError, match=f"study.recruitment.{name} is empty"):
+        recruiter(msgspec.structs.replace(PROLIFIC, **{name: ""}))
 
 
 def test_people_of_connect_are_known_by_their_id_and_return_to_the_page_with_the_code():

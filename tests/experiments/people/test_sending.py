@@ -258,9 +258,8 @@ def test_a_kill_while_the_platform_answers_pays_once(paid, when):
     paid.check()
 
 
-def test_settings_that_a_platform_needs_are_named_with_their_line(tmp_path):
+def test_settings_of_a_platform_are_named_with_their_line(tmp_path):
     for before, after, line, text in (
-        ('completed = "C0MPLETE"', 'completed = ""', "[study.recruitment]", "needs completed"),
         ('completed = "C0MPLETE"', 'completed = "a b"', "completed", "completed"),
         ('sites = ["https://site"]', 'sites = ["site; *"]', "sites", "sites"),
         ('api_url = "https://site"', 'api_url = "http://site"', "[study.recruitment]", "http://site"),
