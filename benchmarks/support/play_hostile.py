@@ -45,7 +45,7 @@ def measure_hostile(folder: Path, number: int, seconds: float, *words: str, ngin
         words: Further words of the server's command line.
         nginx: Whether all come through NGINX.
     """
-    front, port = _free_ports(2)
+    front, port = free_ports(2)
     proxy = ("--public-url", f"http://127.0.0.1:{front}", "--trusted-proxy", "127.0.0.1") if nginx else ()
     server = PlayProcess(folder / "visits", *TASK_ALONE, "--sessions", "3", *proxy, *words)
     server.url = f"http://127.0.0.1:{port}"
@@ -64,7 +64,7 @@ def _nginx(folder: Path, port: int, server: int) -> Iterator[None]:
     process = subprocess.Popen([str(NGINX), "-c", str(folder / "nginx.conf")], stderr=subprocess.DEVNULL)
     try:
         until = time.monotonic() + PATIENCE
-        while not _listens(port) and time.monotonic() < until:
+        while not listens(port) and time.monotonic() < until:
             time.sleep(0.05)
         yield
     finally:
@@ -72,12 +72,14 @@ def _nginx(folder: Path, port: int, server: int) -> Iterator[None]:
         process.wait()
 
 
-def _listens(port: int) -> bool:
+def listens(port: int) -> bool:
+    """Whether a port of this machine takes connections."""
     with socket.socket() as probe:
         return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
-def _free_ports(number: int) -> list[int]:
+def free_ports(number: int) -> list[int]:
+    """Ports of this machine that are free now."""
     with ExitStack() as stack:
         probes = [stack.enter_context(socket.socket()) for _ in range(number)]
         for probe in probes:

@@ -1,11 +1,13 @@
 """The database of a study, as commands name it."""
 
 import argparse
+import os
 from pathlib import Path
 
 from experiments.errors import ConfigError, RecordError
 
 DATABASE = "study.db"
+URL = "MJSIM_STUDY_DATABASE"  # environment variable
 
 
 def add_served_study(parser: argparse.ArgumentParser) -> None:
@@ -19,8 +21,9 @@ def add_database(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--database",
         metavar="URL",
+        default=os.environ.get(URL),
         help="database of people and answers, such as postgresql://USER:PASSWORD@HOST/NAME or mysql://... (default: "
-        f"{DATABASE} in the study's folder)",
+        f"what {URL} says, which no list of processes shows, else {DATABASE} in the study's folder)",
     )
 
 
