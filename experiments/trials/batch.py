@@ -23,6 +23,7 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import SEEDS, TrialConfig
 from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor
 from mjsim.files import remove_leftovers
+from mjsim.model.house import MAX_HOUSES
 
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
 
@@ -182,9 +183,9 @@ def _together(
             yield None if failure is None else f"{path.name}: {failure}"
 
 
-@functools.cache
+@functools.lru_cache(MAX_HOUSES)
 def _house(name: str) -> House:
-    """Loaded once per process; the garbage collector need not look at it, or at what was imported, again."""
+    """A few are kept per process; the garbage collector need not look at them, or at what was imported, again."""
     house = House.load(name)
     gc.freeze()
     return house

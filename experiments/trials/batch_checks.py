@@ -17,7 +17,9 @@ from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
 from mjsim.episode import POINTS, Episode
 from mjsim.errors import EpisodeError, PersonError
+from mjsim.houses.recipe import is_generated
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.house import MAX_HOUSES
 from mjsim.model.scene import compose
 from mjsim.person_parameters import PersonParameters
 from planner.solver import solver
@@ -42,7 +44,7 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
     """What each trial depends on; raises the error of a trial that cannot be run, as far as that shows beforehand."""
     check_names(trials)
     catalogue = functools.cache(Catalogue.load)
-    house = functools.cache(House.load)
+    house = functools.lru_cache(MAX_HOUSES)(House.load)
     for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():
         _check_episode(trial, catalogue(trial.house))
     for name, seed, points in dict.fromkeys(
@@ -57,7 +59,8 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
 
 def _may_be_small(trial: TrialConfig) -> bool:
     """The houses that come with the package have room for the usual points."""
-    return trial.episode is None and (trial.house.endswith(".toml") or trial.points > POINTS)
+    own = trial.house.endswith((".toml", ".json")) or is_generated(trial.house)
+    return trial.episode is None and (own or trial.points > POINTS)
 
 
 def _check_episode(trial: TrialConfig, catalogue: Catalogue) -> None:

@@ -46,7 +46,13 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     assistance: Annotated[str, _about("Assistance condition.", metavar="NAME")]
     user: Annotated[str, _about("Participant.", metavar="NAME")] = DEFAULT_PARTICIPANT
     house: Annotated[
-        str, _about("Name of a house, or path of its catalogue.toml or folder.", metavar="NAME", path=True)
+        str,
+        _about(
+            "Name of a house, path of its catalogue.toml or folder, or a seed of a generated one: `generated:7`, "
+            "`generated:7?rooms=5` (docs/houses.md).",
+            metavar="NAME",
+            path=True,
+        ),
     ] = "apartment"
     planner: Annotated[str, _about("Solver of the routing problem.", metavar="NAME")] = DEFAULT_SOLVER
     time_limit: Annotated[
@@ -174,7 +180,9 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         self._set("seed", None)
         self._set("house", house_name(self.house))
         for name in PATHS:
-            if (path := getattr(self, name)) is not None and (name != "house" or path.endswith(".toml")):
+            if (path := getattr(self, name)) is not None and (
+                name != "house" or path.endswith((".toml", ".json"))
+            ):
                 self._set(name, str(Path(path).absolute()))
         self._set("phases", ",".join(phases_of(self.phases)))
         self._check()

@@ -7,8 +7,10 @@ from typing import Annotated, Any, TypeVar
 
 import msgspec
 
+from mjsim.episode import POINTS
 from mjsim.errors import AssetError, brief
 from mjsim.files import is_file
+from mjsim.houses.recipe import is_generated
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue_files import catalogue_path, house_name, read_tables
 from mjsim.model.model_files import content_hash
@@ -62,6 +64,7 @@ class Catalogue:
         categories: Category key -> category.
         receptacles: Receptacle key -> receptacle.
         objects: Object model key -> object model.
+        points: How many points for objects the house is meant to have at most; None where it does not say.
         content: Hash over the catalogue and every model, mesh and texture file that it leads to.
     """
 
@@ -73,6 +76,7 @@ class Catalogue:
     receptacles: Mapping[str, Receptacle]
     objects: Mapping[str, ObjectModel]
     content: str
+    points: int | None = None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Catalogue) and self.content == other.content
@@ -82,19 +86,21 @@ class Catalogue:
 
     @property
     def is_shipped(self) -> bool:
-        """Whether it comes with the package: it was loaded by a name, not by a path."""
-        return not self.name.endswith(".toml")
+        """Whether it comes with the package: it was neither loaded by a path nor generated."""
+        return not self.name.endswith((".toml", ".json")) and not is_generated(self.name)
 
     @classmethod
     def load(cls, house: str = "apartment") -> "Catalogue":
         """Read and check the catalogue of a house.
 
         Args:
-            house: Name of a folder under `models/houses`, or the path of a `catalogue.toml` or its folder.
+            house: Name of a folder under `models/houses`, the path of a `catalogue.toml` or its folder, the seed of
+                a generated house (`generated:7`, `generated:7?rooms=5`), or the path of its recipe.
 
         Raises:
             AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused
                 or used twice; the message names the culprit.
+            HouseError: A house cannot be generated as asked.
 
         Example:
             >>> catalogue = Catalogue.load("apartment")
@@ -129,6 +135,10 @@ class _ModelEntry(msgspec.Struct):
     model: _Text
 
 
+class _HouseEntry(_ModelEntry):
+    points: Annotated[int, msgspec.Meta(ge=1, le=POINTS)] | None = None
+
+
 class _ObjectEntry(_ModelEntry):
     category: _Text | None = None  # instead of being listed there
 
@@ -150,7 +160,7 @@ class _Reader:
     def __init__(self, path: Path, raw: dict[str, Any]) -> None:
         self._path = path
         tables = self._convert(raw, _Tables, "catalogue")
-        self._house = self._convert(tables.house, _ModelEntry, "house")
+        self._house = self._convert(tables.house, _HouseEntry, "house")
         self._rooms = {k: self._convert(v, _Label, f"rooms.{k}") for k, v in tables.rooms.items()}
         self._categories = self._entries(tables.categories, _CategoryEntry, "categories")
         self._receptacles = self._entries(tables.receptacles, _ReceptacleEntry, "receptacles")
@@ -173,6 +183,7 @@ class _Reader:
             receptacles=receptacles,
             objects=objects,
             content=content_hash(text, models),
+            points=self._house.points,
         )
 
     def _error(self, where: str, message: str) -> AssetError:

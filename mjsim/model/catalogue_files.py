@@ -6,6 +6,7 @@ from typing import Any
 
 from mjsim.errors import AssetError, brief
 from mjsim.files import is_file, read_text
+from mjsim.houses.recipe import is_generated, parse_name
 from mjsim.model.assets import models_root
 
 CATALOGUE = "catalogue.toml"
@@ -13,13 +14,18 @@ MAX_EXTENDS = 20  # catalogues, each of which extends the next
 
 
 def house_name(house: str, folder: Path = Path()) -> str:
-    """A house as it is recorded: by its name if it comes with the package, else by the path of its catalogue.
+    """A house as it is recorded: by its name if it is generated or comes with the package, else by a path.
 
     Args:
-        house: Name of a house, path of a `catalogue.toml`, or of the folder that holds one.
+        house: Name of a house, path of a `catalogue.toml`, of the folder that holds one, or of a recipe.
         folder: Folder that relative paths start from.
+
+    Raises:
+        HouseError: It is generated, but named wrongly or of another version of the generator.
     """
-    if house.endswith(".toml"):
+    if is_generated(house):
+        return str(parse_name(house))
+    if house.endswith((".toml", ".json")):
         return str(folder / house)
     is_path = Path(house).name != house
     if house and (is_path or not is_file(models_root() / "houses" / house / CATALOGUE)):
@@ -30,8 +36,17 @@ def house_name(house: str, folder: Path = Path()) -> str:
 
 
 def catalogue_path(house: str, folder: Path = Path()) -> Path:
-    """File of a catalogue, given as `house_name` takes it; `AssetError` where there is none."""
+    """File of a catalogue, given as `house_name` takes it; a generated house is made where that is needed.
+
+    Raises:
+        AssetError: There is no such house.
+        HouseError: It cannot be generated.
+    """
     name = house_name(house, folder)
+    if is_generated(name) or name.endswith(".json"):
+        from mjsim.houses.generated import generated_catalogue  # OR-Tools takes a while to load
+
+        return generated_catalogue(name, models_root())
     if name.endswith(".toml"):
         if not is_file(Path(name)):
             raise AssetError(

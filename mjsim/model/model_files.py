@@ -8,7 +8,8 @@ from pathlib import Path
 import mujoco
 
 from mjsim.errors import AssetError
-from mjsim.files import read_bytes
+from mjsim.files import is_file, read_bytes
+from mjsim.model.assets import models_root
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
@@ -19,13 +20,18 @@ def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
         raise AssetError(f"cannot read model {path}: {error}") from error
     if body is not None and (spec.body(body) is None or spec.body(body).parent != spec.worldbody):
         raise AssetError(f"model {path} has no top-level body {body!r}")
-    for mesh in spec.meshes:
-        mesh.file = _absolute(path.parent, spec.compiler.meshdir, mesh.file)
-    for texture in spec.textures:
-        texture.file = _absolute(path.parent, spec.compiler.texturedir, texture.file)
-        for face, file in enumerate(texture.cubefiles):
-            texture.cubefiles[face] = _absolute(path.parent, spec.compiler.texturedir, file)
+    name_files(spec, path.parent)
     return spec
+
+
+def name_files(spec: mujoco.MjSpec, folder: Path) -> None:
+    """Name the asset files of a spec absolutely, in place; `folder` is that of its file."""
+    for mesh in spec.meshes:
+        mesh.file = _absolute(folder, spec.compiler.meshdir, mesh.file)
+    for texture in spec.textures:
+        texture.file = _texture(folder, spec.compiler.texturedir, texture.file)
+        for face, file in enumerate(texture.cubefiles):
+            texture.cubefiles[face] = _texture(folder, spec.compiler.texturedir, file)
 
 
 def elements(path: Path) -> Iterator[ET.Element]:
@@ -46,7 +52,9 @@ def content_hash(text: str, models: Iterable[Path]) -> str:
             for name in [name for name in element.attrib if name.startswith("file")]:
                 kind = "texturedir" if element.tag == "texture" else "meshdir"
                 folder = settings.get(kind, settings.get("assetdir", ""))
-                _read(f"{model.parent}/{folder}/{element.get(name)}", files)
+                file = f"{model.parent}/{folder}/{element.get(name)}"
+                if not _read(file, files) and element.tag == "texture":
+                    _read(_texture(model.parent, folder, element.get(name, "")), files)
     # In the order in which they are referred to: two files that swap their contents are another house.
     digests = [hashlib.sha256(content).digest() for content in files.values()]
     return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
@@ -75,6 +83,12 @@ def _read(path: str, files: dict[str, bytes]) -> bool:
         except OSError as error:
             raise AssetError(f"cannot read {path}: {error.strerror}; give a file") from error
     return True
+
+
+def _texture(folder: Path, subfolder: str, file: str) -> str:
+    """A texture beside the model, else of those that come with the package."""
+    beside, shared = _absolute(folder, subfolder, file), models_root() / "textures" / file
+    return str(shared) if file and not is_file(Path(beside)) and is_file(shared) else beside
 
 
 def _absolute(folder: Path, subfolder: str, file: str) -> str:

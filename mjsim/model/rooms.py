@@ -83,6 +83,11 @@ class RoomMap:
         return self.labels[key]
 
     @property
+    def area(self) -> float:
+        """Of all rectangles, m2; what two of them share counts twice."""
+        return float(4 * self.half_sizes.prod(axis=1).sum())
+
+    @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Axis-aligned extent of all rooms: (xmin, ymin, xmax, ymax), m."""
         reach = np.einsum("kij,kj->ki", np.abs(self.axes), self.half_sizes)

@@ -59,7 +59,7 @@ def sample_episode(
         objects: How many objects: the level, 1 to `points`. Categories are equally frequent when it is a
             multiple of their number.
         seed: Not negative.
-        points: Size of the pool of points that the levels draw from.
+        points: Size of the pool of points that the levels draw from; that of the house where it has fewer.
 
     Returns:
         The episode, its objects at rest on the floor.
@@ -75,6 +75,7 @@ def sample_episode(
         >>> episode.targets
         {'object_00': 'toy_box', 'object_01': 'bookshelf'}
     """
+    points = min(points, catalogue.points or points)
     _check_arguments(objects, seed, points)
     require_usable(compiled_house(catalogue))
     if navigable is None:
@@ -102,6 +103,7 @@ def house_points(
     catalogue: Catalogue, navigable: NavigablePoints, *, seed: int, points: int = POINTS
 ) -> NDArray[np.float64]:
     """The points of a seed that its levels share, m, shape (points, 2); `SamplingError` where they do not fit."""
+    points = min(points, catalogue.points or points)
     centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
     return sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
 

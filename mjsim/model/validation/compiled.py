@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mjsim.errors import AssetError
 from mjsim.files import read_text
 from mjsim.model.footprint import outline_points
-from mjsim.model.model_files import content_hash, elements
+from mjsim.model.model_files import content_hash, elements, name_files
 from mjsim.model.validation.findings import Finding
 
 MAX_NUMBER = 1e6  # larger ones in an MJCF file are typing mistakes
@@ -98,7 +98,9 @@ def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
         # Before MuJoCo reads it: that takes NaN for a missing number, and leaves a log file.
         if found := list(check_numbers(subject, path)):
             return found
-        return Compiled.of(subject, path, mujoco.MjModel.from_xml_path(str(path)))
+        spec = mujoco.MjSpec.from_file(str(path))
+        name_files(spec, path.parent)
+        return Compiled.of(subject, path, spec.compile())
     except OSError as error:
         message, remedy = f"{path} cannot be read: {error.strerror}", "correct the path"
     except AssetError as error:

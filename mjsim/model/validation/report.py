@@ -72,7 +72,8 @@ def check_house_name(name: str) -> Report:
         "rooms": str(len(catalogue.rooms)),
         "receptacles": str(len(catalogue.receptacles)),
         "object models": str(len(catalogue.objects)),
-        "points that fit": f"{fits}{' or more' if fits == POINTS else ''}",
+        "floor": f"{house.rooms.area:.1f} m2",
+        "points that fit": f"{fits}{' or more' if fits == (catalogue.points or POINTS) else ''}",
     }
     compiled = Compiled.of("house", catalogue.house_path, house.model)
     view = floor_view(compiled, house.rooms, house.receptacles)
@@ -82,21 +83,22 @@ def check_house_name(name: str) -> Report:
 def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
     """How many points fit, and what goes wrong when objects are dropped there."""
     keep_away = np.array([r.center[:2] for r in house.receptacles.values()])
-    fits = points_that_fit(house.navigable, keep_away)
+    meant = house.catalogue.points or POINTS
+    fits = points_that_fit(house.navigable, keep_away, meant)
     found = []
-    if fits < POINTS:
+    if fits < meant:
         found.append(
             Finding(
                 "points",
                 "house",
-                f"{fits} of {POINTS} points fit at least 1 m from each other and from the receptacles",
+                f"{fits} of {meant} points fit at least 1 m from each other and from the receptacles",
                 f"sample it with --points {max(fits - 2, 1)}, or enlarge it",
                 "warning" if fits else "error",
             )
         )
     if fits:
-        pool = max(1, fits - 2 if fits < POINTS else fits)
-        objects = min(pool, len(house.catalogue.objects), POINTS)
+        pool = max(1, fits - 2 if fits < meant else fits)
+        objects = min(pool, len(house.catalogue.objects))
         try:
             sample_episode(house.catalogue, house.navigable, objects=objects, seed=0, points=pool)
         except (SamplingError, PhysicsError) as error:

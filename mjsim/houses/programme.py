@@ -1,0 +1,139 @@
+"""Which rooms a home has, how large they may be, and which of them lie side by side."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mjsim.errors import HouseError
+
+ROOMS = (1, 10)  # of a home
+
+
+@dataclass(frozen=True)
+class RoomNeeds:
+    """What a room of some use needs; docs/houses.md names the sources."""
+
+    label: str
+    area: tuple[float, float]  # m2, least and most
+    side: float  # m, least
+    aspect: float  # greatest ratio of the sides
+    daylight: bool  # whether it has an outer wall for a window
+
+
+NEEDS: Mapping[str, RoomNeeds] = {
+    "studio": RoomNeeds("Studio", (28.0, 40.0), 3.8, 1.9, True),
+    "living_room": RoomNeeds("Living room", (14.0, 32.0), 3.4, 1.9, True),
+    "kitchen": RoomNeeds("Kitchen", (7.5, 16.0), 2.4, 2.0, True),
+    "dining_room": RoomNeeds("Dining room", (9.0, 16.0), 2.75, 1.8, True),
+    "hall": RoomNeeds("Hall", (4.0, 15.0), 1.45, 6.5, False),
+    "bedroom": RoomNeeds("Bedroom", (11.5, 20.0), 2.75, 1.8, True),
+    "bedroom_2": RoomNeeds("Second bedroom", (8.0, 15.0), 2.45, 1.8, True),
+    "bedroom_3": RoomNeeds("Third bedroom", (7.5, 14.0), 2.25, 1.9, True),
+    "office": RoomNeeds("Office", (7.0, 13.0), 2.25, 1.9, True),
+    "bathroom": RoomNeeds("Bathroom", (4.4, 9.0), 1.85, 2.1, False),
+    "shower_room": RoomNeeds("Shower room", (3.0, 6.0), 1.45, 2.4, False),
+    "utility": RoomNeeds("Utility room", (3.0, 7.0), 1.45, 2.5, False),
+}
+_SMALL: Mapping[int, Sequence[tuple[str, ...]]] = {
+    1: (("studio",),),
+    2: (("studio", "bathroom"),),
+    3: (
+        ("living_room", "bedroom", "bathroom"),
+        ("studio", "bathroom", "hall"),
+        ("studio", "kitchen", "bathroom"),
+    ),
+    4: (
+        ("living_room", "kitchen", "bedroom", "bathroom"),
+        ("hall", "living_room", "bedroom", "bathroom"),
+        ("hall", "studio", "kitchen", "bathroom"),
+        ("living_room", "bedroom", "bedroom_2", "bathroom"),
+        ("living_room", "bedroom", "office", "bathroom"),
+    ),
+}
+_CORE = ("hall", "living_room", "kitchen", "bedroom", "bathroom")
+_MORE = {  # what larger homes have besides, and how usual it is
+    "bedroom_2": 3.0,
+    "office": 2.0,
+    "shower_room": 1.5,
+    "dining_room": 1.5,
+    "bedroom_3": 1.5,
+    "utility": 1.2,
+}
+_LIVELY = ("living_room", "studio", "hall")
+DOOR, WIDE = 1.3, 2.0  # m of wall that two rooms share at least, for a door or an open passage
+
+
+@dataclass(frozen=True)
+class Way:
+    """Two rooms with a way between them."""
+
+    a: str
+    b: str
+    is_wide: bool = False  # a passage without a leaf
+
+    @property
+    def wall(self) -> float:
+        """How much wall they share at least, m."""
+        return WIDE if self.is_wide else DOOR
+
+
+@dataclass(frozen=True)
+class Programme:
+    """What a floor plan is drawn for."""
+
+    areas: Mapping[str, float]  # room key -> wanted area, m2
+    ways: tuple[Way, ...]  # these connect all rooms
+    hub: str  # the room with the front door
+
+
+def use_of(key: str) -> str:
+    """What a room is for: its key without a number."""
+    return key.rstrip("0123456789").rstrip("_")
+
+
+def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
+    """Choose rooms, areas and ways; `HouseError` where the number of rooms is out of range."""
+    if not ROOMS[0] <= rooms <= ROOMS[1]:
+        raise HouseError(f"a home of {rooms} rooms cannot be generated; ask for {ROOMS[0]} to {ROOMS[1]}")
+    keys = _keys(rooms, rng)
+    # Neighbours in one home: all are rather large, or rather small.
+    size = rng.uniform(0.1, 0.7) if rooms < 9 else rng.uniform(0.1, 0.4)
+    areas = {}
+    for key in keys:
+        low, high = NEEDS[key].area
+        areas[key] = low + (high - low) * float(np.clip(rng.normal(size, 0.15), 0.03, 0.97))
+    hub = next(key for key in ("hall", *_LIVELY) if key in keys)
+    return Programme(areas, tuple(_ways(keys, hub, rng)), hub)
+
+
+def _keys(rooms: int, rng: np.random.Generator) -> tuple[str, ...]:
+    if rooms in _SMALL:
+        choices = _SMALL[rooms]
+        return choices[int(rng.integers(len(choices)))]
+    weights = np.array(list(_MORE.values()))
+    chosen = rng.choice(list(_MORE), rooms - len(_CORE), replace=False, p=weights / weights.sum())
+    more = [str(key) for key in chosen]
+    if "bedroom_3" in more and "bedroom_2" not in more:
+        more[more.index("bedroom_3")] = "bedroom_2"
+    return (*_CORE, *more)
+
+
+def _ways(keys: Sequence[str], hub: str, rng: np.random.Generator) -> list[Way]:
+    """A tree of ways, from the hub."""
+    ways = []
+    for key in keys:
+        if key == hub:
+            continue
+        behind, chance = {
+            "kitchen": ("living_room", 0.45),
+            "dining_room": ("kitchen" if rng.random() < 0.6 else "living_room", 0.8),
+            "utility": ("kitchen", 0.5),
+            "shower_room": ("bedroom", 0.55),
+            "office": ("living_room", 0.25),
+            "bedroom": ("living_room", 0.1),
+        }.get(key, ("", 0.0))
+        other = behind if behind in keys and behind != hub and rng.random() < chance else hub
+        lively = {key, other} <= {"living_room", "kitchen", "dining_room", "hall", "studio"}
+        ways.append(Way(key, other, lively and rng.random() < 0.5))
+    return ways

@@ -1,0 +1,114 @@
+"""The recipe of a generated house: all that it follows from, and how it is named."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import parse_qsl
+
+import msgspec
+
+from mjsim.errors import HouseError
+from mjsim.files import read_bytes
+from mjsim.houses.chance import stream
+from mjsim.houses.programme import ROOMS
+from mjsim.houses.values import FloorPlan
+
+PREFIX = "generated:"
+VERSION = 1  # of the generator: raised by whatever changes a house of a seed
+MAX_SEED = 2**63 - 1
+# How usual homes of 1 to 10 rooms are, bathrooms and halls counted, where no number is asked for.
+_SHARES = (0.04, 0.06, 0.09, 0.13, 0.16, 0.16, 0.14, 0.11, 0.07, 0.04)
+
+
+@dataclass(frozen=True)
+class HouseName:
+    """What `generated:7?rooms=5` names."""
+
+    seed: int
+    rooms: int
+
+    def __str__(self) -> str:
+        return f"{PREFIX}{self.seed}?rooms={self.rooms}&version={VERSION}"
+
+
+class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A house as it is stored. The floor plan is part of it, since another solver may find another one.
+
+    Attributes:
+        version: Of the generator.
+        seed: Of the house.
+        plan: Its rooms, doors and windows.
+    """
+
+    version: int
+    seed: int
+    plan: FloorPlan
+
+    @property
+    def name(self) -> str:
+        """As which it is recorded."""
+        return str(HouseName(self.seed, len(self.plan.rooms)))
+
+    def encoded(self) -> bytes:
+        """JSON, the same bytes for the same recipe."""
+        return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Read a recipe; `HouseError` where it is none, or one of another version."""
+    try:
+        text = read_bytes(path)
+        version = msgspec.json.decode(text, type=dict).get("version")
+        if isinstance(version, int):
+            _check_version(version, str(path))
+        return msgspec.json.decode(text, type=Recipe)
+    except (OSError, msgspec.DecodeError) as error:
+        raise HouseError(
+            f"{path} is no recipe of a house: {error}; give one of mjsim house generate"
+        ) from error
+
+
+def is_generated(house: str) -> bool:
+    """Whether a house is named by a seed."""
+    return house.startswith(PREFIX)
+
+
+def parse_name(house: str) -> HouseName:
+    """What `generated:SEED`, `generated:SEED?rooms=N` or a recorded name stands for.
+
+    Raises:
+        HouseError: It is malformed, or was recorded by another version of the generator.
+    """
+    found = re.fullmatch(rf"{PREFIX}(\d{{1,19}})(?:\?(.*))?", house, re.ASCII)
+    values = dict(parse_qsl(found[2], keep_blank_values=True)) if found and found[2] else {}
+    numbers = all(re.fullmatch(r"\d{1,9}", value, re.ASCII) for value in values.values())
+    if not found or int(found[1]) > MAX_SEED or not numbers or set(values) - {"rooms", "version"}:
+        raise HouseError(f"{house!r:.80} names no house; write {PREFIX}7 or {PREFIX}7?rooms=5")
+    seed = int(found[1])
+    _check_version(int(values.get("version", VERSION)), house)
+    rooms = int(values["rooms"]) if "rooms" in values else _usual_rooms(seed)
+    if not ROOMS[0] <= rooms <= ROOMS[1]:
+        raise HouseError(f"{house!r:.80} has {rooms} rooms; ask for {ROOMS[0]} to {ROOMS[1]}")
+    return HouseName(seed, rooms)
+
+
+def split_of(seed: int) -> str:
+    """`train`, `validation` or `test`: 80, 10 and 10 % of all seeds, by a hash."""
+    share = stream(seed, "split").random()
+    return next(name for name, end in _SPLITS.items() if share < end)
+
+
+_SPLITS: Mapping[str, float] = {"train": 0.8, "validation": 0.9, "test": 1.0}
+
+
+def _usual_rooms(seed: int) -> int:
+    return 1 + int(stream(seed, "rooms").choice(len(_SHARES), p=_SHARES))
+
+
+def _check_version(version: int, what: str) -> None:
+    if version != VERSION:
+        raise HouseError(
+            f"{what} is of version {version} of the generator of houses, and this is version {VERSION}; "
+            f"install the mjsim of then, or generate it anew without the version"
+        )

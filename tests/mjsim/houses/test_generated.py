@@ -1,0 +1,83 @@
+"""Generated houses: the same in every process, found by their names, and usable."""
+
+import multiprocessing
+from pathlib import Path
+
+import pytest
+
+from mjsim.errors import HouseError
+from mjsim.houses.generated import generate, house_files
+from mjsim.houses.recipe import VERSION, parse_name, read_recipe, split_of
+from mjsim.model.assets import models_root
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.sampling import sample_episode
+from mjsim.model.validation.report import check_path
+
+
+def files_of(seed: int, rooms: int) -> dict[str, bytes]:
+    return dict(house_files(*generate(seed, rooms), models_root()))
+
+
+def test_another_process_makes_the_same_bytes() -> None:
+    here = [files_of(3, 4), files_of(4, 5)]
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        there = pool.starmap(files_of, [(4, 5), (3, 4)])
+    assert here == there[::-1]
+
+
+@pytest.mark.parametrize("rooms", [1, 3, 6])
+def test_a_house_can_be_used_and_holds_as_many_objects_as_it_says(rooms: int) -> None:
+    report = check_path(f"generated:11?rooms={rooms}")
+    assert not report.findings
+    catalogue = Catalogue.load(f"generated:11?rooms={rooms}")
+    assert len(catalogue.rooms) == rooms
+    assert len(sample_episode(catalogue, objects=8, seed=5).objects) == 8
+
+
+def test_a_house_is_recorded_with_its_rooms_and_the_version() -> None:
+    catalogue = Catalogue.load("generated:11?rooms=3")
+    assert catalogue.name == f"generated:11?rooms=3&version={VERSION}"
+    assert Catalogue.load(catalogue.name) == catalogue
+    assert not catalogue.is_shipped
+
+
+def test_a_recipe_gives_the_same_house(tmp_path: Path) -> None:
+    recipe, _ = generate(11, 3)
+    path = tmp_path / "house.json"
+    path.write_bytes(recipe.encoded())
+    assert read_recipe(path) == recipe
+    assert Catalogue.load(str(path)) == Catalogue.load("generated:11?rooms=3")
+
+
+def test_a_recipe_of_another_version_is_refused(tmp_path: Path) -> None:
+    recipe, _ = generate(11, 1)
+    path = tmp_path / "house.json"
+    path.write_bytes(recipe.encoded().replace(f'"version": {VERSION}'.encode(), b'"version": 99'))
+    with pytest.raises(HouseError, match=r"version 99 .* this is version"):
+        Catalogue.load(str(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("generated:", "names no house; write generated:7"),
+        ("generated:x", "names no house"),
+        ("generated:7?rooms=11", "has 11 rooms; ask for 1 to 10"),
+        ("generated:7?size=3", "names no house"),
+        ("generated:7?rooms=5&version=99", "version 99"),
+    ],
+)
+def test_malformed_names_are_refused(name: str, message: str) -> None:
+    with pytest.raises(HouseError, match=message):
+        Catalogue.load(name)
+
+
+def test_the_number_of_rooms_follows_from_the_seed() -> None:
+    assert {parse_name(f"generated:{seed}").rooms for seed in range(200)} == set(range(1, 11))
+    assert parse_name("generated:7") == parse_name("generated:7")
+
+
+def test_most_seeds_are_for_training() -> None:
+    splits = [split_of(seed) for seed in range(1000)]
+    assert 760 < splits.count("train") < 840
+    assert 70 < splits.count("test") < 130
