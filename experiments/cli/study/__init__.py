@@ -18,6 +18,7 @@ SUBCOMMANDS = {
     "restore": "experiments.cli.study.restore",
     "researcher": "experiments.cli.study.researcher",
     "erase": "experiments.cli.study.erase",
+    "forget": "experiments.cli.study.forget",
     "preregister": "experiments.cli.study.preregister",
     "simulate": "experiments.cli.study.simulate",
     "controls": "studies.commands.controls",

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from experiments.people.study_file import Study
 
 DESCRIPTION = """\
-Delete all that a study knows of a person: the rows of the database, the journal and the runs. The audit log keeps that
-it was done, and what was paid. Backups and tables made before still hold the person: make them anew, and delete the
-old ones. Who is owed a payment must be paid first."""
+Delete all that a study knows of a person: the rows of the database, the journal and the runs, and the person in
+backups, tables and exports that were made of the study and are where they were written. The audit log keeps that it
+was done, and what was paid. Who is owed a payment must be paid first."""
 
 
 def add_parser(commands: Any) -> None:
@@ -33,17 +33,18 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.study.simulate import study_path
 
     study = read_people_study(study_path(arguments.study))
-    asyncio.run(_erase(study, arguments))
+    for line in asyncio.run(_erase(study, arguments)):
+        print(line)
     print(f"{arguments.person} is deleted")
     return 0
 
 
-async def _erase(study: "Study", arguments: argparse.Namespace) -> None:
+async def _erase(study: "Study", arguments: argparse.Namespace) -> list[str]:
     from experiments.people.erase import erase
     from experiments.people.store import Store
 
     store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
     try:
-        await erase(store, arguments.folder, arguments.person, arguments.who)
+        return await erase(store, arguments.folder, arguments.person, arguments.who)
     finally:
         await store.close()

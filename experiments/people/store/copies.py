@@ -34,11 +34,16 @@ async def back_up(source: Database, path: Path) -> None:
         await _copy(source, target)
     finally:
         await target.close()
-    with closing(sqlite3.connect(part)) as connection:
-        connection.execute("PRAGMA journal_mode = DELETE")  # no log beside it: the backup is one file
-    with part.open("rb") as file:
-        os.fsync(file.fileno())
+    one_file(part)
     part.rename(path)
+
+
+def one_file(path: Path) -> None:
+    """Let a SQLite database have no log beside it, and be on the disk."""
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("PRAGMA journal_mode = DELETE")
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
 
 
 async def restore(path: Path, url: str) -> None:

@@ -81,11 +81,20 @@ class Database:
         async with self._connection(**options) as connection:
             yield connection
 
-    async def empty_log(self) -> None:
-        """Move what SQLite has in its log into the file, so that nothing that was deleted is left there."""
-        if self._sqlite:
-            async with self._alone(), self._connection(begin="") as connection:
-                await connection.execute(text("PRAGMA wal_checkpoint(TRUNCATE)"))
+    async def scrub(self) -> None:
+        """Let SQLite write its file anew and empty its log, so that nothing that was deleted is left in them.
+
+        Raises StoreError if others use the database all the time, so that its log cannot be emptied.
+        """
+        if not self._sqlite:
+            return
+        async with self._alone(), self._connection(begin="") as connection:
+            await connection.execute(text("VACUUM"))
+            emptied = (await connection.execute(text("PRAGMA wal_checkpoint(TRUNCATE)"))).one()
+        if emptied[0]:
+            raise StoreError(
+                f"The log of {self.name} is in use, and holds what was deleted: do it again later."
+            )
 
     async def check(self) -> None:
         """Raise StoreError if the file of a SQLite database is damaged."""

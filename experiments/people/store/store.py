@@ -1,6 +1,9 @@
 """The store of a study: who takes part, how far they are, what they answered, what they are paid."""
 
-from collections.abc import Callable, Mapping
+import shutil
+import sqlite3
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
@@ -8,8 +11,9 @@ from typing import Any, Self
 from sqlalchemy import insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
+from experiments.errors import StoreError
 from experiments.people.store.assignments import Assignments
-from experiments.people.store.copies import back_up
+from experiments.people.store.copies import back_up, one_file
 from experiments.people.store.endings import Endings
 from experiments.people.store.engine import Database
 from experiments.people.store.erasure import Erasure
@@ -103,6 +107,37 @@ class Store(People, Assignments, Phases, Endings, Erasure):
         query = select(*columns).where(audit.c.study_id == self._study_id).order_by(audit.c.id)
         async with self._database.reading() as connection:
             return tuple(AuditRow(*row) for row in await connection.execute(query))
+
+
+async def rewrite_backup(path: Path, study_name: str, work: Callable[[Store], Awaitable[bool]]) -> bool:
+    """Change what a backup holds of a study, whole or not at all; whether something was changed.
+
+    Args:
+        path: A file that :meth:`Store.backup` wrote.
+        study_name: Name of the study.
+        work: Changes it, and says whether there was something to change.
+    """
+    part = path.with_name(f"{path.name}.part")
+    shutil.copyfile(path, part)
+    try:
+        with closing(sqlite3.connect(part)) as connection:
+            row = connection.execute("SELECT file_hash FROM study WHERE name = ?", (study_name,)).fetchone()
+        if row is None:
+            return False
+        store = await Store.open(f"sqlite:///{part}", study_name, row[0])
+        try:
+            changed = await work(store)
+        finally:
+            await store.close()
+        if changed:
+            one_file(part)
+            part.replace(path)
+        return changed
+    except sqlite3.DatabaseError as error:
+        raise StoreError(f"{path} is no backup that can be read ({error}): delete it.") from error
+    finally:
+        for left in path.parent.glob(f"{part.name}*"):
+            left.unlink()
 
 
 async def _study_id(database: Database, name: str, file_hash: str) -> int:

@@ -1,0 +1,85 @@
+"""Deleting by date who people are: `keep_days` of the study file."""
+
+import asyncio
+import datetime
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.people.collect import person_name
+from experiments.people.copies import copies
+from experiments.people.erase import erase
+from experiments.people.store import Store, rewrite_backup, utc_now
+
+WHO = "keep_days"  # in the audit log
+
+
+@dataclass(frozen=True)
+class Retained:
+    """What was deleted.
+
+    Attributes:
+        forgotten: People of whom nobody can tell any more who they are.
+        erased: People who wanted their data deleted, and of whom nothing is left.
+        unpaid: People who are kept until they are paid.
+    """
+
+    forgotten: tuple[str, ...]
+    erased: tuple[str, ...]
+    unpaid: tuple[str, ...]
+
+
+async def forget_old(
+    store: Store, visits: Path, keep_days: int, *, dry: bool = False, now: datetime.datetime | None = None
+) -> Retained:
+    """Delete who people are `keep_days` after their last sign: ids of platforms, keys and links.
+
+    People who wanted their data deleted are erased; of the others, what they did and answered stays under their
+    number. Who is owed a payment is kept until it is made. Backups that the study knows of are written anew.
+
+    Args:
+        store: The store.
+        visits: The folder of visits in the study's folder.
+        keep_days: Days.
+        dry: Only say what would be deleted.
+        now: The time, with its zone.
+    """
+    before = (now or utc_now()) - datetime.timedelta(days=keep_days)
+    owed = {p.person_id for p in await store.ledger.owed(in_doubt_after=datetime.timedelta())}
+    people = [await store.person(number) for number in await store.known(before)]
+    paid = [person for person in people if person.id not in owed]
+    deleted, kept = ([p for p in paid if p.delete_wanted is wanted] for wanted in (True, False))
+    if not dry:
+        for person in deleted:
+            await erase(store, visits.parent, person_name(person), WHO)
+        if kept:
+            await _forget(store, visits, {person.id: person.token_hash for person in kept})
+    return Retained(
+        tuple(map(person_name, kept)),
+        tuple(map(person_name, deleted)),
+        tuple(person_name(person) for person in people if person.id in owed),
+    )
+
+
+async def _forget(store: Store, visits: Path, hashes: dict[int, str]) -> None:
+    study = await store.study()
+    # A new name for the hash of the link: with the study's secret, the hash follows from the platform's id.
+    names = {
+        number: hashlib.sha256(f"{study.name} {study.created} {number}".encode()).hexdigest()
+        for number in hashes
+    }
+
+    async def gone(backup: Store) -> bool:
+        known = {person.id for person in await backup.people()} & set(hashes)
+        identified = known & set(await backup.known(datetime.datetime.max.replace(tzinfo=datetime.UTC)))
+        if identified:
+            await backup.forget(sorted(identified), [names[number] for number in sorted(identified)], WHO)
+        return bool(identified)
+
+    for copy in copies(visits.parent):
+        if copy.kind == "backup" and Path(copy.path).is_file():
+            await rewrite_backup(Path(copy.path), study.name, gone)
+    for number, name in names.items():  # done again after a stop: who is moved already is not there
+        if (folder := visits / hashes[number]).is_dir():
+            await asyncio.to_thread(folder.rename, visits / name)
+    await store.forget(list(names), list(names.values()), WHO)
