@@ -3,15 +3,20 @@
 import asyncio
 import datetime
 import hashlib
+import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
+from experiments.errors import StoreError
 from experiments.people.collect import person_name
 from experiments.people.copies import copies
 from experiments.people.erase import erase
 from experiments.people.store import Store, rewrite_backup, utc_now
 
+LOG = logging.getLogger("mjsim.study")
 WHO = "keep_days"  # in the audit log
+DAY = 86400.0  # s
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,18 @@ async def forget_old(
         tuple(map(person_name, deleted)),
         tuple(person_name(person) for person in people if person.id in owed),
     )
+
+
+async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
+    """Do so once a day, for as long as the server runs."""
+    while True:
+        try:
+            found = await forget_old(store, visits, keep_days)
+            if found.forgotten or found.erased:
+                LOG.info("%d people forgotten, %d erased", len(found.forgotten), len(found.erased))
+        except (StoreError, OSError) as error:  # tomorrow it may work
+            LOG.warning("%s", error)
+        await asyncio.sleep(DAY)
 
 
 async def _forget(store: Store, visits: Path, hashes: dict[int, str]) -> None:

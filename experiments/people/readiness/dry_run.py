@@ -20,7 +20,7 @@ from experiments.people.phases.base import Phase
 from experiments.people.phases.comprehension import Comprehension
 from experiments.people.phases.played import Played
 from experiments.people.readiness.server import serving
-from experiments.people.recruitment.base import Recruiter
+from experiments.people.recruitment.base import Leaving, Recruiter
 from experiments.people.server.app import Serving, StudyServer
 from experiments.people.server.procedure import Procedure
 from experiments.people.store import Person, Store
@@ -32,7 +32,7 @@ from experiments.web.server.visits import Visits, token_hash
 MINIMUM = 1.0  # s; the longest that the dry run waits in a phase
 TASK_TIME = 1.0  # s that the task lasts
 PATIENCE = 180.0  # s for a trial, the compiling of kernels included
-SUBMIT_TO = "https://workersandbox.mturk.com"
+STUDY_IDS = ("STUDY_ID", "projectId", "hitId")  # as platforms call it
 
 Photograph = Callable[[str, str], Awaitable[None]]  # takes a name and a URL
 
@@ -101,18 +101,18 @@ class _DryRun:
         self._walked = Walked()
 
     async def walk(self) -> Walked:
-        names, codes = [phase.name for phase in self._procedure.phases], self._study.settings.recruitment
+        names = [phase.name for phase in self._procedure.phases]
         await self._try(self._to_the_end)
         if CONSENT in names:
             refuses = {"agree": "no"}
-            await self._try(self._ends, CONSENT, refuses, 1, "no_consent", codes.no_consent)
+            await self._try(self._ends, CONSENT, refuses, 1, "no_consent")
         if DEVICE in names:
             device = self._phase(DEVICE)
             slow = {**_example(device), "latency_ms": "999999", "give_up": "yes"}
-            await self._try(self._ends, DEVICE, slow, 1, "screened_out", codes.screened_out)
+            await self._try(self._ends, DEVICE, slow, 1, "screened_out")
         if wrong := self._wrong(COMPREHENSION):
             attempts = self._study.settings.limits.attempts
-            await self._try(self._ends, COMPREHENSION, wrong, attempts, "screened_out", codes.screened_out)
+            await self._try(self._ends, COMPREHENSION, wrong, attempts, "screened_out")
         await self._try(self._withdraws)
         return self._walked
 
@@ -135,7 +135,7 @@ class _DryRun:
                 await self._play(link, phase.name)
             else:
                 await self._check_form(link, phase)
-        await self._check_end(link, "finished", self._study.settings.recruitment.completed)
+        await self._check_end(link, "finished")
         found = await collect(self._study, self._store, self._folder)
         for why in found.unusable.values():
             self._fault(f"the run that was recorded cannot be used: {why}")
@@ -163,7 +163,7 @@ class _DryRun:
         names = [phase.name for phase in self._procedure.phases]
         await self._page(link, names[names.index(name) + 1])
 
-    async def _ends(self, name: str, sent: Mapping[str, str], times: int, status: str, code: str) -> None:
+    async def _ends(self, name: str, sent: Mapping[str, str], times: int, status: Leaving) -> None:
         """Somebody leaves the study in a phase by sending something."""
         link = await self._arrive()
         for phase in self._procedure.phases:
@@ -177,15 +177,16 @@ class _DryRun:
         await self._page(link, name)
         for _ in range(times):
             await self._send(link, name, sent)
-        await self._check_end(link, status, code, f"{name}-{status}")
+        await self._check_end(link, status, f"{name}-{status}")
 
     async def _withdraws(self) -> None:
         link = await self._arrive()
         await self._photograph("withdrawal", f"{self._url(link)}/withdrawal")
         await self._client.post(f"{link}/withdrawal", data={"data": "delete"})
-        await self._check_end(link, "withdrawn", "")
+        await self._check_end(link, "withdrawn")
 
-    async def _check_end(self, link: str, status: str, code: str, name: str = "") -> None:
+    async def _check_end(self, link: str, status: Leaving, name: str = "") -> None:
+        code = self._recruiter.way_back(status, {}).code
         page = await self._client.get(link)
         person = await self._person(link)
         if person.status != status:
@@ -199,7 +200,8 @@ class _DryRun:
     async def _arrive(self, shown: bool = False) -> str:
         """Begin as a new person; the path of that person's pages."""
         self._people += 1
-        own = {"STUDY_ID": self._study.settings.recruitment.study_id, "turkSubmitTo": SUBMIT_TO}
+        settings = self._study.settings.recruitment
+        own = {**dict.fromkeys(STUDY_IDS, settings.study_id), "turkSubmitTo": next(iter(settings.sites), "")}
         some = f"dryrun{self._people:018d}"
         query = {name: own.get(name) or some for name in self._recruiter.parameters}
         first = await self._client.get("/", params=query)

@@ -23,6 +23,7 @@ from experiments.errors import StoreError
 from experiments.people.phases.base import Again, Page
 from experiments.people.phases.played import Played
 from experiments.people.recruitment.base import Arrival, Leaving, Preview, Recruiter, Refusal
+from experiments.people.retention import forget_daily
 from experiments.people.server.procedure import Now, Procedure
 from experiments.people.store import Person
 from experiments.people.study_file import CONSENT
@@ -115,13 +116,17 @@ class StudyServer:
 
     @asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        watching = asyncio.create_task(self.sessions.watch())
+        tasks = [asyncio.create_task(self.sessions.watch())]
+        if days := self._study.settings.limits.keep_days:
+            visits = self._procedure.visits.folder
+            tasks.append(asyncio.create_task(forget_daily(self._store, visits, days)))
         try:
             yield
         finally:
-            watching.cancel()
-            with suppress(asyncio.CancelledError):
-                await watching
+            for task in tasks:
+                task.cancel()
+                with suppress(asyncio.CancelledError):
+                    await task
             await self.sessions.release()
             await self._pool.close()
             await self._store.close()

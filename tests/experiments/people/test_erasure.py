@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from experiments.cli.main import main
+from experiments.people import retention
 from experiments.people.retention import forget_old
 from experiments.people.store import Store, utc_now
 from experiments.people.study_file import read_people_study
@@ -171,3 +172,20 @@ def test_forgetting_that_was_interrupted_is_finished_later(served, tmp_path, mon
     assert len(folders) == 3 and all(
         (tmp_path / "served" / path / "events.jsonl").is_file() for path in folders
     )
+
+
+def test_the_server_forgets_every_day(served, tmp_path, monkeypatch):
+    times = iter([utc_now() + datetime.timedelta(days=days) for days in (29, 31, 32)])
+    monkeypatch.setattr(retention, "utc_now", lambda: next(times))
+    monkeypatch.setattr(retention, "DAY", 0.0)
+
+    async def days():
+        store = await _open(served)
+        try:
+            await retention.forget_daily(store, tmp_path / "served" / "visits", 30)
+        finally:
+            await store.close()
+
+    with pytest.raises((StopIteration, RuntimeError)):
+        asyncio.run(days())
+    assert traces(tmp_path, "bert-PID", "b" * 64) == []

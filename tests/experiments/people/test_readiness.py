@@ -148,6 +148,27 @@ async def _play_nothing(self, link, trial):
     await self._client.get(link)
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        'platform = "prolific"\ncompleted = "CODE1"\nscreened_out = "CODE2"\nno_consent = "CODE3"\nstudy_id = "5f00000000"',
+        'platform = "connect"\ncompleted = "CODE1"\nstudy_id = "5f00000000"',
+        'platform = "external-question"\nsites = ["https://platform.example.org"]',
+        'platform = "lab"',
+    ],
+)
+def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
+    monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
+    phases = 'phases = ["consent", "task", "debriefing", "completion"]'
+    changed = with_text(
+        tmp_path,
+        phases=("minutes = 10", f"minutes = 10\n{phases}\n[study.recruitment]\n{settings}"),
+        minimum=("story = 20", ""),
+    )
+    walked, _ = _walked(changed, tmp_path, monkeypatch)
+    assert [fault for fault in walked.faults if "cannot be used" not in fault] == []
+
+
 def test_a_dry_run_finds_a_phase_that_takes_anything(study, tmp_path, monkeypatch):
     monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
     phases = [_Sloppy(study, "survey") if p.name == "survey" else p for p in phases_of_study(study)]
