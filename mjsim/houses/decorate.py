@@ -180,7 +180,13 @@ def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[
     """Free stretches of a wall, m."""
     blocked = [(a, b) for s, a, b, _ in space.hung if s == side]
     deep = space.room.floor.along(side, low, high, 0.0, 0.4)
-    for x0, y0, x1, y1, top in space.solids:
+    tiled = [
+        (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # tiles over worktops
+        for piece, at in space.stood
+        for part in piece.parts
+        if "kitchen" in piece.kind
+    ]
+    for x0, y0, x1, y1, top in (*space.solids, *tiled):
         if top > LOW and x0 < deep.x1 and deep.x0 < x1 and y0 < deep.y1 and deep.y0 < y1:
             blocked.append((x0 - 0.05, x1 + 0.05) if side in ("south", "north") else (y0 - 0.05, y1 + 0.05))
     found, at = [], low + WALL_GAP

@@ -14,11 +14,12 @@ from mjsim.houses.furniture.look import Look, draw_look
 from mjsim.houses.furniture.piece import Mount as Holder
 from mjsim.houses.furniture.piece import Piece, flattened, moved
 from mjsim.houses.space import Place, Space
-from mjsim.houses.usual import MUSTS, SHARES, USUAL
+from mjsim.houses.usual import MUSTS, OFTEN, ROUNDS, SHARES, USUAL
 from mjsim.houses.values import FloorPlan, Furnishing, Mount, Palette, Placement, Rectangle, Side
 
 ATTEMPTS = 6
-SIZES = 4  # how often a piece is made smaller for a lack of space
+SIZES = 4  # a piece is made so often, each time smaller, for a lack of space
+IN_VAIN = 4  # so many tries, and a room is left as it is
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 BINS = {  # receptacle -> width, depth, height, m, and the uses of rooms that it belongs to, the best first
     "recycling_bin": (
@@ -77,7 +78,7 @@ class Home:
     def put(self, space: Space, kind: str, *, smallest: int = SIZES - 1, number: int = 0) -> bool:
         """Put a piece of a kind into a room, smaller and smaller until it fits."""
         rng = stream(self.seed, "furniture", space.room.key, kind, str(number), str(self.attempt))
-        for smaller in range(max(0, self.attempt - 2) if smallest else 0, smallest + 1):
+        for smaller in range(min(max(0, self.attempt - 2), smallest), smallest + 1):
             for sides in AXES if kind == "lounge" else ((*AXES[0], *AXES[1]),):
                 fit = (space.depth(sides[0]), 0.0, 0.0) if kind == "lounge" else None
                 piece = KINDS[kind].make(rng, self.look, smaller=smaller, fit=fit)
@@ -117,22 +118,34 @@ class Home:
 
     def must(self) -> None:
         """What every home has; `HouseError` where something finds no place."""
-        self._first(("corner_kitchen", "straight_kitchen"), COOKING, "a kitchen")
+        if not self.rooms(("bathroom", "shower_room")):
+            self._first(("wash_corner",), ("studio", "bedroom", "living_room"), "a place to wash")
+        cooking = next((space.room.use for space in self.rooms(COOKING)), "")
+        kitchen = self._first(("corner_kitchen", "straight_kitchen", "kitchenette"), (cooking,), "a kitchen")
+        if kitchen == "kitchenette":
+            self._first(("fridge",), (cooking, "utility"), "a fridge")
         for space in self.spaces:
-            for kinds in MUSTS.get(self.uses[space.room.key], ()):
-                self._any(space, kinds)
+            musts = MUSTS.get(self.uses[space.room.key], ())
+            for i in space.rng.permutation(len(musts)) if self.attempt > 1 else range(len(musts)):
+                self._any(space, musts[i])
         self._first(("dining", "bar_table"), DINING, "a table")
         late = self.attempt % 2
         if not late:
             self._lounge()
+        self._bins()
+        if late:
+            self._lounge()
+        self._seats(sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1)
+
+    def _bins(self) -> None:
         if "office_box" in self.bins:
             self._first(("desk",), WORKING, "a desk")
         for receptacle in self.bins:
             if not self.put_bin(receptacle):
                 raise HouseError(f"no place for the bin {receptacle!r} in seed {self.seed}")
-        if late:
-            self._lounge()
-        wanted = sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1
+
+    def _seats(self, wanted: int) -> None:
+        """More seats where there are too few."""
         for number, space in enumerate(
             2 * self.rooms(("living_room", "studio", "dining_room", "kitchen", "bedroom"))
         ):
@@ -141,12 +154,13 @@ class Home:
         if self.seats < wanted:
             raise HouseError(f"only {self.seats} of {wanted} seats found a place in seed {self.seed}")
 
-    def _first(self, kinds: Sequence[str], uses: Sequence[str], what: str) -> None:
-        """One of some kinds in the first room of some uses that has a place."""
+    def _first(self, kinds: Sequence[str], uses: Sequence[str], what: str) -> str:
+        """The first of some kinds that has a place, in the first such room of some uses."""
         for space in self.rooms(uses):
             order = [kind for kind in kinds if kind != "corner_kitchen" or self._for_corner(space)]
-            if any(self.put(space, kind) for kind in order):
-                return
+            for kind in order:
+                if self.put(space, kind):
+                    return kind
         raise HouseError(f"no place for {what} in seed {self.seed}")
 
     def _for_corner(self, space: Space) -> bool:
@@ -173,11 +187,20 @@ class Home:
         for space in self.spaces:
             use = self.uses[space.room.key]
             rng = stream(self.seed, "usual", space.room.key)
-            share = float(rng.uniform(*SHARES.get(use, (0.28, 0.36))))
-            for number, (kinds, chance) in enumerate(USUAL.get(use, ())):
-                order = [kinds[i] for i in rng.permutation(len(kinds))]
-                if rng.random() < chance and (space.share < share or number == 0):
-                    _ = any(self.put(space, kind, smallest=2, number=number) for kind in order[:3])
+            share = float(rng.uniform(*SHARES.get(use, (0.3, 0.38))))
+            in_vain = 0
+            for number, (kinds, chance) in enumerate(ROUNDS * USUAL.get(use, ())):
+                order = [kinds[i] for i in rng.permutation(len(kinds))][:IN_VAIN]
+                if rng.random() < chance and (space.share < share or number == 0) and in_vain < IN_VAIN:
+                    in_vain += not self._one_more(space, order, number)
+
+    def _one_more(self, space: Space, kinds: Sequence[str], number: int) -> bool:
+        """The first of some kinds that has a place and is not yet there often enough."""
+        there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
+        for kind in kinds:
+            if there.count(kind) < OFTEN.get(kind, 1) and self.put(space, kind, smallest=1, number=number):
+                return True
+        return False
 
     def furnishing(self) -> Furnishing:
         """Everything that stands, hangs and lies."""
@@ -276,6 +299,7 @@ _NAMES = {
     "dining": "dining table",
     "straight_kitchen": "kitchen counter",
     "corner_kitchen": "kitchen counter",
+    "kitchenette": "kitchen counter",
     "double_bed": "bed",
     "single_bed": "bed",
 }

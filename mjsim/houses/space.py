@@ -98,19 +98,22 @@ class Space:
             sides: Walls that it may stand at.
             near: A point, m, that it shall be near to.
         """
-        places = self._free_places() if piece.stands == "free" else self._wall_places(piece, sides)
-        if not places:
+        free = piece.stands == "free"
+        places = self._free_places() if free else self._wall_places(piece, sides)
+        if not len(places):
             return None
         boxes, uses = (_moved(spots, places) for spots in ([part.spot for part in piece.parts], piece.use))
         tops = np.array([part.top for part in piece.parts])
-        fits = np.flatnonzero(self._fits(boxes, tops, uses, piece.stands == "free"))
-        scores = self._scores(boxes[fits], places, fits, near, piece.stands == "free")
+        fits = np.flatnonzero(self._fits(boxes, tops, uses, free))
+        scores = self._scores(boxes[fits], places[fits], near, free)
         best: list[int] = fits[np.argsort(-scores, kind="stable")[:TRIES]].tolist()
         for k in best:
             spots, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, uses))
             if self.connected(spots, zones):
-                self.stand(piece, places[k], spots, zones)
-                return places[k]
+                x, y, turns, along = places[k].tolist()
+                place = Place(x, y, int(turns), None if free else SIDES[int(turns)], along)
+                self.stand(piece, place, spots, zones)
+                return place
         return None
 
     def stand(self, piece: Piece, place: Place, spots: Iterable[Spot], zones: Iterable[Spot]) -> None:
@@ -121,10 +124,10 @@ class Space:
         self.use.extend(zones)
         self.stood.append((piece, place))
 
-    def _wall_places(self, piece: Piece, sides: Sequence[Side]) -> list[Place]:
-        """All places along walls."""
+    def _wall_places(self, piece: Piece, sides: Sequence[Side]) -> Floats:
+        """All places along walls: x, y, m, quarter turns, and where along the wall, m, shape (n, 4)."""
         floor, half = self.room.floor, piece.size[0] / 2
-        found = []
+        found = [np.empty((0, 4))]
         for side in sides:
             low, high = floor.wall(side)
             first, last = low + half + WALL_GAP, high - half - WALL_GAP
@@ -136,16 +139,18 @@ class Space:
                 along = np.array([first if at_low else last])
             else:
                 along = np.unique(np.round([*np.arange(first, last, STEP), last], 3))
-            for t in along.tolist():
-                x, y = floor.along(side, t, t, WALL_GAP, WALL_GAP).center
-                found.append(Place(x, y, turns, side, t))
-        return found
+            x, y = floor.along(side, first, first, WALL_GAP, WALL_GAP).center
+            rows = np.tile((x, y, turns, 0.0), (len(along), 1))
+            rows[:, 0 if side in ("south", "north") else 1] = rows[:, 3] = along
+            found.append(rows)
+        return np.concatenate(found)
 
-    def _free_places(self) -> list[Place]:
-        """All places on a grid, in two directions; the origin is the middle of the back edge."""
+    def _free_places(self) -> Floats:
+        """All places on a grid, in two directions, as `_wall_places`; x and y are of the middle of the back edge."""
         floor = self.room.floor
         xs, ys = np.arange(floor.x0, floor.x1, 2 * STEP), np.arange(floor.y0, floor.y1, 2 * STEP)
-        return [Place(float(x), float(y), turns, None) for x in xs for y in ys for turns in (0, 1)]
+        grid = np.stack(np.meshgrid(xs, ys, (0.0, 1.0), (0.0,), indexing="ij"), axis=-1)
+        return grid.reshape(-1, 4)
 
     def _fits(self, boxes: Floats, tops: Floats, uses: Floats, free: bool) -> NDArray[np.bool_]:
         """Which places (n) are free, by the boxes (n, k, 4) of the parts and the places of use (n, u, 4)."""
@@ -162,18 +167,11 @@ class Space:
             ok &= ~_overlap(boxes[:, tops > sill], np.array([zone]))
         return ok
 
-    def _scores(
-        self,
-        boxes: Floats,
-        places: list[Place],
-        fits: NDArray[np.intp],
-        near: tuple[float, float] | None,
-        free: bool,
-    ) -> Floats:
+    def _scores(self, boxes: Floats, places: Floats, near: tuple[float, float] | None, free: bool) -> Floats:
         """How good places are: snug or apart from what stands, near what they belong to, and some chance."""
         floor = self.room.floor
-        score = 1.2 * self.rng.random(len(fits))
-        if len(fits) == 0:
+        score = 1.2 * self.rng.random(len(places))
+        if len(places) == 0:
             return score
         walls = np.stack(
             [
@@ -191,8 +189,7 @@ class Space:
         if not free:
             score += 0.7 * np.minimum((gaps <= SNUG).sum(axis=(1, 2)) - boxes.shape[1], 2)
         if near is not None:
-            at = np.array([[places[k].x, places[k].y] for k in fits])
-            score -= 0.9 * np.hypot(*(at - near).T)
+            score -= 0.9 * np.hypot(*(places[:, :2] - near).T)
         elif free:
             middle = np.abs((boxes[..., :2].min(axis=1) + boxes[..., 2:].max(axis=1)) / 2 - floor.center).sum(
                 axis=1
@@ -224,11 +221,10 @@ class Space:
         return True
 
 
-def _moved(spots: Sequence[Spot], places: Sequence[Place]) -> Floats:
+def _moved(spots: Sequence[Spot], places: Floats) -> Floats:
     """Rectangles of a piece at each of n places, shape (n, k, 4)."""
     turned = np.array([[moved(spot, 0.0, 0.0, turns * math.pi / 2) for spot in spots] for turns in range(4)])
-    at = np.array([[place.x, place.y, place.x, place.y] for place in places])
-    return np.asarray(turned.reshape(4, -1, 4)[[place.turns for place in places]] + at[:, None])
+    return np.asarray(turned.reshape(4, -1, 4)[places[:, 2].astype(int)] + places[:, None, [0, 1, 0, 1]])
 
 
 def _spot(box: Sequence[float]) -> Spot:

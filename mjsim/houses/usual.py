@@ -81,9 +81,17 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (("mirror_wardrobe", "low_bookcase", "armchair", "standing_mirror"), 0.6),
     ),
 }
-SHARES = {
-    "hall": (0.14, 0.24),
-    "utility": (0.3, 0.4),
-    "living_room": (0.3, 0.38),
-    "kitchen": (0.3, 0.38),
-}  # of the floor
+ROUNDS = 3  # through these lists
+OFTEN = {
+    "armchair": 2,
+    "bush": 2,
+    "bookcase": 2,
+    "low_bookcase": 2,
+    "wardrobe": 2,
+    "sideboard": 2,
+}  # in one room
+SHARES = {  # of the floor that is furnished
+    "hall": (0.15, 0.25),
+    "living_room": (0.31, 0.38),
+    "studio": (0.33, 0.4),
+}

@@ -1,13 +1,13 @@
 """Bathrooms and laundries."""
 
 from mjsim.houses.furniture.builder import Builder
-from mjsim.houses.furniture.piece import Kind, Piece
+from mjsim.houses.furniture.piece import Kind, Member, Piece, group
 from mjsim.houses.furniture.seats import _rooms
 
 
 def toilet(b: Builder) -> Piece:
     """With a cistern, or hung in front of a wall, in three sizes."""
-    w, d = b.pick(0.37, 0.4), b.pick(0.62, 0.68)
+    w, d = b.pick(0.37, 0.4), b.pick(0.62, 0.68) if b.smaller < 2 else 0.58
     b.shadow(w, (0, d))
     hung = b.chance(0.4)
     if hung:
@@ -25,13 +25,13 @@ def toilet(b: Builder) -> Piece:
     b.soft("ceramic", (0, y, 0.3), (w / 2 - 0.01, r, 0.12 if hung else 0.14))
     b.soft("white", (0, y, 0.41), (w / 2, r + 0.01, 0.025))
     b.soft("ceramic_shade", (0, y, 0.424), (w / 2 - 0.05, r - 0.05, 0.016))
-    if b.chance(0.5):
+    if b.smaller == 0:
         b.rod("chrome", (-w / 2 - 0.12, 0.0, 0.7), (-w / 2 - 0.12, 0.08, 0.7), 0.008)
         b.rod("linen", (-w / 2 - 0.17, 0.08, 0.7), (-w / 2 - 0.07, 0.08, 0.7), 0.05)
-    wide = 0.5 if hung else w + 0.02
+    wide, aside = 0.5 if hung else w + 0.02, 0.35 - 0.05 * b.smaller
     return b.piece(
-        (max(wide, w + 0.34), d, 1.1 if hung else 0.82),
-        use=((-0.35, d, 0.35, d + 0.55),),
+        (max(wide, w + 0.34) if b.smaller == 0 else wide, d, 1.1 if hung else 0.82),
+        use=((-aside, d, aside, d + 0.55),),
         parts=((-wide / 2, 0, wide / 2, d, 1.1 if hung else 0.82),),
     )
 
@@ -43,15 +43,21 @@ def _tap(b: Builder, x: float, y: float, z: float) -> None:
 
 def washbasin(b: Builder) -> Piece:
     """On a cupboard, with a foot, or a double one, with a mirror over it."""
-    form = b.pick("cupboard", "foot", "bowl") if b.smaller else b.pick("cupboard", "foot", "bowl", "double")
-    w = {"cupboard": b.size(0.6, 0.8, 0.1), "foot": 0.55, "bowl": b.size(0.7, 0.9, 0.1), "double": 1.2}[form]
-    d = 0.46
+    form = (
+        b.pick("cupboard", "foot", "bowl", "double") if b.smaller == 0 else b.pick("cupboard", "foot", "bowl")
+    )
+    w, d = (
+        {"cupboard": b.size(0.6, 0.8, 0.1), "foot": 0.55, "bowl": b.size(0.7, 0.9, 0.1), "double": 1.2}[form],
+        0.46,
+    )
+    if b.smaller > 1:
+        form, w, d = "foot", 0.45, 0.4
     b.shadow(w, (0, d))
     if form == "foot":
-        b.guard(0.4, (0.02, 0.4), (0, 0.75))
+        b.guard(0.4, (0.02, 0.38), (0, 0.75))
         b.post("ceramic", 0, 0.2, (0, 0.75), 0.09)
         b.box("ceramic", w, (0, d), (0.75, 0.86))
-        b.soft("ceramic_shade", (0, 0.26, 0.862), (0.2, 0.15, 0.012))
+        b.soft("ceramic_shade", (0, d / 2 + 0.03, 0.862), (w / 2 - 0.06, d / 2 - 0.08, 0.012))
     else:
         paint, low = b.pick(b.wood, b.front, "white"), b.pick(0.0, 0.3)
         top = 0.78 if form == "bowl" else 0.8
@@ -80,7 +86,8 @@ def washbasin(b: Builder) -> Piece:
         b.image("mirror", w - 0.03, (1.185, 1.915), 0.021)
     if mirror != "cabinet":
         b.rod("bulb", (-0.2, 0.06, 2.0), (0.2, 0.06, 2.0), 0.025, shape="capsule")
-    return b.piece((w + 0.02, d, 2.03), use=((-0.35, d, 0.35, d + 0.6),))
+    aside = 0.35 - 0.05 * b.smaller
+    return b.piece((w + 0.02, d, 2.03), use=((-aside, d, aside, d + 0.6),))
 
 
 def bathtub(b: Builder) -> Piece:
@@ -142,6 +149,21 @@ def shower(b: Builder) -> Piece:
     return b.piece(
         (w, d + 0.03, 2.09), use=((-0.35, d + 0.03, 0.35, d + 0.58),), stands="left" if side < 0 else "right"
     )
+
+
+def wash_corner(b: Builder) -> Piece:
+    """Shower, toilet and washbasin in a row behind a screen, where a home has no bathroom."""
+    row = [draw(Builder(name, b.rng, b.look, 1)) for name, draw in (("shower", shower), ("toilet", toilet))]
+    row.append(washbasin(Builder("washbasin", b.rng, b.look, 1)))
+    side = 1 if row[0].stands == "left" else -1  # away from the corner
+    members: list[Member] = []
+    at = 0.0
+    for piece in row:
+        members.append((piece, side * (at + piece.size[0] / 2), 0.0, 0.0))
+        at += piece.size[0] + 0.02
+    b.box(b.pick(b.wood, b.front, "white"), 0.04, (0, 1.2), (0, 2.0))
+    members.append((b.piece((0.04, 1.2, 2.0)), side * (at + 0.05), 0.0, 0.0))
+    return group(b.kind, members, stands=row[0].stands)
 
 
 def _machine(b: Builder, z: float, glass: str) -> None:
@@ -250,6 +272,7 @@ KINDS = (
     Kind("washbasin", _rooms("bathroom", "toilet"), washbasin, frozenset({"washbasin"})),
     Kind("bathtub", _rooms("bathroom"), bathtub, frozenset({"bath"})),
     Kind("shower", _rooms("bathroom"), shower, frozenset({"bath"})),
+    Kind("wash_corner", _rooms("studio"), wash_corner, frozenset({"toilet", "washbasin", "bath"})),
     Kind("washing_machine", _rooms("bathroom", "utility", "kitchen"), washing_machine),
     Kind("washing_tower", _rooms("bathroom", "utility"), washing_tower),
     Kind("towel_rail", _rooms("bathroom"), towel_rail),

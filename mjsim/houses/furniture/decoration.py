@@ -324,27 +324,27 @@ def _lamp_class(b: Builder) -> None:
 
 
 def ceiling_lamp(b: Builder) -> Piece:
-    """Flat under the ceiling: a disc, a bowl, a bar with spots, or a star of globes."""
-    form, z = b.pick("disc", "bowl", "spots", "globes", "square"), CEILING
+    """Flat under the ceiling, above the light that casts shadows: a disc, a bowl, a square, a bar, a star."""
+    form, z = b.pick("disc", "bowl", "square", "bar", "star"), CEILING
     if form == "disc":
-        b.post("bulb", 0, 0, (z - 0.06, z), b.pick(0.18, 0.24))
-        b.post(b.metal, 0, 0, (z - 0.025, z), 0.26)
+        b.post("bulb", 0, 0, (z - 0.05, z), b.pick(0.18, 0.24))
+        b.post(b.metal, 0, 0, (z - 0.02, z), 0.27)
     elif form == "bowl":
-        b.post(b.metal, 0, 0, (z - 0.03, z), 0.11)
-        b.soft(b.pick("shade", "bulb"), (0, 0, z - 0.08), (0.24, 0.24, 0.08))
+        b.soft(b.pick("shade", "bulb"), (0, 0, z - 0.022), (0.24, 0.24, 0.03))
+        b.post(b.metal, 0, 0, (z - 0.052, z), 0.02)
     elif form == "square":
-        b.box(b.pick("white", b.wood), 0.5, (-0.25, 0.25), (z - 0.05, z), seen=True)
-        b.box("bulb", 0.46, (-0.23, 0.23), (z - 0.058, z - 0.05), seen=True)
+        b.box(b.pick("white", b.wood), 0.5, (-0.25, 0.25), (z - 0.04, z), seen=True)
+        b.box("bulb", 0.44, (-0.22, 0.22), (z - 0.05, z - 0.04), seen=True)
     else:
-        b.box(b.metal, 0.8, (-0.03, 0.03), (z - 0.03, z), seen=True)
-        for x in (-0.32, 0.0, 0.32):
-            if form == "spots":
-                b.post(b.metal, x, 0, (z - 0.13, z - 0.03), 0.045)
-                b.post("bulb", x, 0, (z - 0.135, z - 0.13), 0.04)
+        for i in range(3):
+            if form == "bar":
+                b.post("bulb", 0.32 * (i - 1), 0, (z - 0.05, z - 0.02), 0.09)
             else:
-                b.soft("bulb", (x, 0, z - 0.11), (0.08, 0.08, 0.08))
+                x, y = 0.2 * math.cos(2.1 * i), 0.2 * math.sin(2.1 * i)
+                b.soft("bulb", (x, y, z - 0.02), (0.11, 0.11, 0.025))
+        b.box(b.metal, 0.8 if form == "bar" else 0.12, (-0.06, 0.06), (z - 0.025, z), seen=True)
     _lamp_class(b)
-    return b.piece((0.8, 0.52, z), parts=(), stands="ceiling")
+    return b.piece((0.8, 0.62, z), parts=(), stands="ceiling")
 
 
 def floor_lamp(b: Builder) -> Piece:

@@ -37,7 +37,7 @@ class Run:
                 top = self._hang(x)
             self.parts.append((x - WIDE / 2, 0.0, x + WIDE / 2, DEEP, top))
         use = ((-self.w / 2, DEEP, self.w / 2, DEEP + 0.9),)
-        size = (self.w, DEEP, max(part[4] for part in self.parts))
+        size = (self.w, DEEP, max(LOW, *(part[4] for part in self.parts)))
         return self.b.piece(size, use=use, parts=self.parts, mounts=self.mounts)
 
     def _base(self, x: float, top: float = 0.86) -> float:
@@ -192,14 +192,22 @@ def straight_kitchen(b: Builder) -> Piece:
     return Run(b, modules if b.chance(0.5) else modules[::-1], b.smaller < 3 or b.chance(0.5)).write()
 
 
+def kitchenette(b: Builder) -> Piece:
+    """Sink, cooker and the place for dishes; the fridge stands elsewhere."""
+    modules = b.pick(("sink", "rack", "cooker"), ("cooker", "rack", "sink"), ("rack", "sink", "cooker"))
+    return Run(b, modules, b.smaller < 2).write()
+
+
 def corner_kitchen(b: Builder) -> Piece:
     """Two runs that meet in a corner."""
     b.handle = b.pick("bar", "knob", "none")
     side = b.pick(-1, 1)
     longer = b.pick(("rack", "sink", "dishwasher", "fridge"), ("sink", "rack", "drawers", "doors", "fridge"))
     if b.smaller:
-        longer = ("rack", "sink", "fridge")
+        longer = ("rack", "sink", "fridge") if b.smaller < 3 else ("sink", "fridge")
     other = b.pick(("cooker", "drawers"), ("drawers", "cooker", "doors")) if b.smaller < 2 else ("cooker",)
+    if b.smaller == 3:
+        other = ("rack", "cooker")
     # the corner itself: a closed module that both runs touch
     modules = ("doors", *longer) if side < 0 else (*longer[::-1], "doors")
     run = Run(Builder("straight_kitchen", b.rng, b.look), modules, b.smaller < 2)
@@ -268,6 +276,7 @@ _KITCHEN = frozenset({"cooker", "sink", "fridge"})
 KINDS = (
     Kind("straight_kitchen", _rooms("kitchen", "studio"), straight_kitchen, _KITCHEN),
     Kind("corner_kitchen", _rooms("kitchen"), corner_kitchen, _KITCHEN),
+    Kind("kitchenette", _rooms("kitchen", "studio"), kitchenette, frozenset({"cooker", "sink"})),
     Kind("kitchen_island", _rooms("kitchen"), kitchen_island),
     Kind("fridge", _rooms("kitchen", "utility"), fridge, frozenset({"fridge"})),
     Kind("kitchen_trolley", _rooms("kitchen", "dining"), kitchen_trolley),
