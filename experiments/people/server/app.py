@@ -2,9 +2,11 @@
 
 import asyncio
 import base64
+import datetime
 import hashlib
 import hmac
 import logging
+import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
@@ -25,7 +27,7 @@ from experiments.people.phases.played import Played
 from experiments.people.recruitment.base import Arrival, Leaving, Preview, Recruiter, Refusal
 from experiments.people.retention import forget_daily
 from experiments.people.server.procedure import Now, Procedure
-from experiments.people.store import Person
+from experiments.people.store import Person, utc_now
 from experiments.people.study_file import CONSENT
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.form import sent_form
@@ -43,6 +45,7 @@ from mjsim.scene_export.store import scenes_folder
 LOG = logging.getLogger("mjsim.study")
 NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s
 BEAT_PERIOD = 60.0  # s between two notes that somebody is still there
+SWEEP_PERIOD, CLOCK_SET = 60.0, 30.0  # s between two sweeps; by which the clock then is off if it was set
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
 NEVER = 1e9  # s; as good as for ever
 MAX_FORM = 64 * 1024  # bytes
@@ -108,7 +111,13 @@ class StudyServer:
                 Middleware(
                     TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, public), www_redirect=False
                 ),
-                Middleware(Guards, public=public, proxies=self._serving.proxies, max_body=MAX_FORM),
+                Middleware(
+                    Guards,
+                    public=public,
+                    proxies=self._serving.proxies,
+                    max_body=MAX_FORM,
+                    embedded_by=self._recruiter.embedded_by,
+                ),
             ],
             exception_handlers={404: self._unknown, StoreError: self._out_of_order},
             lifespan=self._lifespan,
@@ -116,7 +125,7 @@ class StudyServer:
 
     @asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        tasks = [asyncio.create_task(self.sessions.watch())]
+        tasks = [asyncio.create_task(task) for task in (self.sessions.watch(), self._sweep())]
         if days := self._study.settings.limits.keep_days:
             visits = self._procedure.visits.folder
             tasks.append(asyncio.create_task(forget_daily(self._store, visits, days)))
@@ -131,6 +140,24 @@ class StudyServer:
             await self._pool.close()
             await self._store.close()
 
+    async def _sweep(self) -> None:
+        """End the participation of people who never return. Time in which this server did not run does not count."""
+        away = self._study.settings.limits.timed_out_after
+        since, before = time.monotonic(), utc_now()
+        while True:
+            await asyncio.sleep(SWEEP_PERIOD)
+            now = utc_now()
+            if abs((now - before).total_seconds() - SWEEP_PERIOD) > CLOCK_SET:
+                since = time.monotonic()  # signs of life are noted by that clock
+            before = now
+            if time.monotonic() - since < away:
+                continue
+            try:
+                if gone := await self._store.time_out(now - datetime.timedelta(seconds=away)):
+                    LOG.info("%d people did not return", gone)
+            except StoreError as error:  # the next sweep may find them
+                LOG.warning("%s", error)
+
     async def _welcome(self, request: Request) -> Response:
         came = self._recruiter.arrive(request.query_params)
         if isinstance(came, Refusal):
@@ -139,7 +166,7 @@ class StudyServer:
         if isinstance(came, Arrival) and came.key is not None:
             token = self._token(came.key)
             if await self._store.find(token_hash(token)) is not None:
-                return RedirectResponse(f"/play/{token}", 303)
+                return await self._arrive(came, token)
         if (closed := await self._closed()) is not None:
             return self._message(request, closed)
         given = {name: request.query_params.get(name, "") for name in self._recruiter.parameters}
@@ -149,6 +176,7 @@ class StudyServer:
             section=self._study.texts["welcome"],
             parameters=given,
             remembers=self._recruiter.platform == "link",
+            forgets=self._recruiter.platform == "lab",
             preview=isinstance(came, Preview),
         )
 
@@ -163,11 +191,16 @@ class StudyServer:
         token = new_token() if came.key is None else self._token(came.key)
         if await self._store.find(token_hash(token)) is None and (closed := await self._closed()) is not None:
             return self._message(request, closed)
+        return await self._arrive(came, token)
+
+    async def _arrive(self, came: Arrival, token: str) -> Response:
+        """Note who comes, or comes again."""
         key = None if came.key is None else self._keyed(f"key:{came.key}").hex()
         person = await self._store.arrive(
             self._recruiter.platform, key, came.identity, token_hash(token), self._procedure.phases[0].name
         )
-        LOG.info("person %d arrives", person.id)
+        if not person.returning:
+            LOG.info("person %d arrives", person.id)
         return RedirectResponse(f"/play/{token}", 303)
 
     async def _show(self, request: Request) -> Response:
@@ -295,9 +328,7 @@ class StudyServer:
         back = self._recruiter.way_back("finished", await self._store.identity(person.id))
         section = self._study.texts["completion"]
         values = {**shown.values, "paragraphs": section.paragraphs(), "completion": section}
-        return self._page(
-            request, shown.template, **values, code=back.code, back=back.url, fields=back.fields
-        )
+        return self._page(request, shown.template, **values, back=back)
 
     def _left(self, request: Request, person: Person) -> Response:
         """The last page of somebody who did not finish."""
@@ -306,7 +337,7 @@ class StudyServer:
             "withdrawn": ("withdrawal", "left", "withdrawn"),
             "screened_out": (person.phase, "failed", "screened_out"),
         }
-        section, text, how = names.get(person.status, ("welcome", "unknown", "timed_out"))
+        section, text, how = names.get(person.status, ("welcome", "timed_out", "timed_out"))
         words = self._study.texts[section]
         back = self._recruiter.way_back(how, {})
         heading = {"title": words[f"{text}_title"]}
@@ -316,9 +347,7 @@ class StudyServer:
             section=heading,
             paragraphs=[words[text]],
             completion=self._study.texts["completion"],
-            code=back.code,
-            back=back.url,
-            fields=back.fields,
+            back=back,
         )
 
     def _message(self, request: Request, name: str, status: int = 200) -> Response:

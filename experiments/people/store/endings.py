@@ -3,7 +3,7 @@
 from datetime import datetime
 
 from sqlalchemy import delete as delete_rows
-from sqlalchemy import update
+from sqlalchemy import select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store.part import Part, lock_study
@@ -32,6 +32,22 @@ class Endings(Part):
                 return False
             await end(connection, self._study_id, person_id, status)
             return True
+
+        return await self._database.write(work)
+
+    async def time_out(self, before: datetime) -> int:
+        """End the participations under way of whom there is no sign of life since `before`; how many.
+
+        Their places go to the next people.
+        """
+        gone = (person.c.study_id == self._study_id, person.c.status.in_(ACTIVE), person.c.seen < before)
+
+        async def work(connection: AsyncConnection) -> int:
+            await lock_study(connection, self._study_id)
+            found = (await connection.execute(select(person.c.id).where(*gone))).scalars().all()
+            for person_id in found:
+                await end(connection, self._study_id, person_id, "timed_out")
+            return len(found)
 
         return await self._database.write(work)
 

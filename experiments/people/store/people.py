@@ -45,7 +45,8 @@ class People(Part):
         Args:
             platform: Where the person comes from, such as `prolific`; at most 20 characters.
             key: HMAC-SHA-256 of the platform's id with the study's secret, hexadecimal; None for links without an id.
-            identity: The platform's own ids. They are kept apart, and never exported.
+            identity: The platform's own ids. They are kept apart, and never exported. Those of the last arrival before
+                the end of the participation stay.
             token_hash: SHA-256 of the link's token, hexadecimal.
             phase: The first phase of the study.
             now: The time, with its zone.
@@ -56,7 +57,11 @@ class People(Part):
         async def work(connection: AsyncConnection) -> Person:
             known = (await connection.execute(self._select(same))).first()
             if known is not None:
-                return replace(_person(known), returning=True)
+                found = replace(_person(known), returning=True)
+                if found.active:  # who gave a task back and accepted it again is paid for the new one
+                    mine = ids.c.person_id == found.id
+                    await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
+                return found
             made = await connection.execute(
                 insert(person).values(
                     study_id=self._study_id,

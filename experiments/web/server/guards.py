@@ -28,7 +28,7 @@ HEADERS = {
 }
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; media-src 'self'; "
-    "connect-src 'self' blob: {sockets}; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    "connect-src 'self' blob: {sockets}; base-uri 'none'; form-action {forms}; frame-ancestors {frames}"
 )
 
 
@@ -59,12 +59,19 @@ class Guards:
     """ASGI middleware: checks `Host` and `Origin`, limits bodies, adds headers, tells who asks.
 
     What a request that comes from one of the `proxies` says about its sender is believed as far as the proxy wrote it.
+    Only pages of `embedded_by`, sites like https://example.org, may show these pages in frames, and get forms of them.
     """
 
     def __init__(
-        self, app: ASGIApp, public: str | None, proxies: Sequence[Network] = (), max_body: int = MAX_BODY
+        self,
+        app: ASGIApp,
+        public: str | None,
+        proxies: Sequence[Network] = (),
+        max_body: int = MAX_BODY,
+        embedded_by: Sequence[str] = (),
     ) -> None:
         self._app, self._proxies, self._max_body = app, proxies, max_body
+        self._embedded_by = tuple(embedded_by)
         self._public = urlsplit(public or "")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -84,7 +91,7 @@ class Guards:
 
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
-                _add_headers(MutableHeaders(scope=message), origin, cache)
+                _add_headers(MutableHeaders(scope=message), origin, cache, self._embedded_by)
             await send(message)
 
         if scope["type"] == "http" and refusal is None:
@@ -172,8 +179,14 @@ def _refusal(scope: Scope, headers: Mapping[str, str], origin: str, max_body: in
     return None
 
 
-def _add_headers(headers: MutableHeaders, origin: str, cache: str) -> None:
+def _add_headers(headers: MutableHeaders, origin: str, cache: str, embedded_by: Sequence[str]) -> None:
     for name, value in HEADERS.items():
         headers[name] = value
+    if embedded_by:
+        del headers["X-Frame-Options"]  # knows no other sites
     headers.setdefault("Cache-Control", cache)
-    headers["Content-Security-Policy"] = POLICY.format(sockets=origin.replace("http", "ws", 1))
+    headers["Content-Security-Policy"] = POLICY.format(
+        sockets=origin.replace("http", "ws", 1),
+        forms=" ".join(("'self'", *embedded_by)),
+        frames=" ".join(embedded_by) or "'none'",
+    )

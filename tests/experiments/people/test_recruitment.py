@@ -2,6 +2,8 @@
 
 import dataclasses
 import logging
+import sqlite3
+import time
 
 import msgspec
 import pytest
@@ -11,7 +13,7 @@ from experiments.people.recruitment import recruiter
 from experiments.people.recruitment.base import Preview, Refusal
 from experiments.people.study_file import Recruitment, read_people_study
 from experiments.study.designs import FOLDER
-from tests.experiments.people.test_server import begin, phase, post, serving
+from tests.experiments.people.test_server import begin, go_to, phase, post, serving
 
 CODES = {"completed": "C0MPLETE", "screened_out": "SCREEN0UT", "no_consent": "N0C0NSENT"}
 PROLIFIC = Recruitment(platform="prolific", study_id="study0000001", **CODES)
@@ -117,3 +119,69 @@ def test_who_comes_again_is_the_same_person_and_no_id_is_shown(tmp_path, caplog)
         + " ".join(path.name for path in tmp_path.rglob("*"))
     )
     assert not any(value in shown for value in IDS.values())
+
+
+def with_recruitment(recruitment, **limits):
+    study = read_people_study(FOLDER / "paper.toml")
+    settings = msgspec.structs.replace(study.settings, recruitment=recruitment, minimum={})
+    limits = msgspec.structs.replace(settings.limits, **limits)
+    return dataclasses.replace(study, settings=msgspec.structs.replace(settings, limits=limits))
+
+
+def test_a_task_is_looked_at_before_it_is_accepted_and_given_back_and_accepted_again(tmp_path):
+    with serving(tmp_path, with_recruitment(QUESTION)) as client:
+        looking = client.get("/", params={**TASK, "assignmentId": "ASSIGNMENT_ID_NOT_AVAILABLE"})
+        assert "This is a preview" in looking.text and "<form" not in looking.text
+        assert post(client, "/begin", assignmentId="ASSIGNMENT_ID_NOT_AVAILABLE").status_code == 400
+        link = begin(client, **TASK)
+        again = client.get("/", params={**TASK, "assignmentId": "4ASSIGNMENT"})
+        assert again.headers["location"] == link
+        with sqlite3.connect(tmp_path / "study.db") as database:
+            assert "4ASSIGNMENT" in database.execute("SELECT ids FROM identity").fetchone()[0]
+            database.execute("UPDATE person SET phase = 'completion', status = 'finished'")
+        database.close()
+        end = client.get(link)
+        assert f'action="{SITE}/mturk/externalSubmit"' in end.text and "4ASSIGNMENT" in end.text
+        client.get("/", params={**TASK, "assignmentId": "5ASSIGNMENT"})
+        assert "4ASSIGNMENT" in client.get(link).text, "what was submitted is what is paid"
+
+
+def test_only_the_platform_may_embed_the_study(tmp_path):
+    for recruitment, frames in ((QUESTION, " ".join(QUESTION.sites)), (PROLIFIC, "'none'")):
+        folder = tmp_path / recruitment.platform
+        folder.mkdir()
+        with serving(folder, with_recruitment(recruitment)) as client:
+            headers = client.get("/", params=TASK).headers
+            assert f"frame-ancestors {frames}" in headers["content-security-policy"]
+            assert ("x-frame-options" in headers) is (recruitment is PROLIFIC)
+
+
+def test_in_a_lab_nothing_leads_back_to_the_person_before(tmp_path):
+    with serving(tmp_path, with_recruitment(Recruitment(platform="lab"))) as client:
+        assert "start.js" not in client.get("/").text
+        first, second = begin(client), begin(client)
+        assert first != second
+        post(client, first, phase="consent", agree="no")
+        end = client.get(first)
+        assert "Next participant" in end.text and 'href="/"' in end.text and "data-forgets" in end.text
+        assert phase(client, second) == "consent"
+        assert all("set-cookie" not in client.get(path).headers for path in ("/", first, second))
+
+
+def test_who_never_comes_back_has_timed_out_and_gives_the_place_away(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.people.server.app.SWEEP_PERIOD", 0.1)
+    study = with_recruitment(PROLIFIC, abandoned_after=0.5, timed_out_after=0.5)
+    with serving(tmp_path, study) as client:
+        link = begin(client, **IDS)
+        go_to(client, link, study, "training")
+        until = time.monotonic() + 10.0
+        while "Your time is up" not in client.get(link).text:
+            assert time.monotonic() < until
+            time.sleep(0.1)
+        assert "give the task back" in client.get(link).text
+        assert client.get("/", params=IDS).headers["location"] == link, "there is no second participation"
+        assert client.get(f"{link}/withdrawal").status_code == 404
+        with sqlite3.connect(tmp_path / "study.db") as database:
+            assert database.execute("SELECT status FROM person").fetchall() == [("timed_out",)]
+            assert database.execute("SELECT state FROM assignment").fetchall() == [("released",)]
+        database.close()

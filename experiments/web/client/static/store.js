@@ -20,3 +20,12 @@ export function save(name, value) {
     // Nothing is kept.
   }
 }
+
+export function forgetAll() {
+  try {
+    localStorage.clear();
+    sessionStorage.clear();
+  } catch {
+    // Nothing is kept.
+  }
+}

@@ -123,6 +123,16 @@ describe("a trial", () => {
     await import("../static/start.js");
     expect(part("continue").hidden).toBe(true);
   });
+
+  test("leaves nothing of a person in a browser that people share", async () => {
+    await opened();
+    localStorage.setItem("mjsim-settings", "{}");
+    document.head.innerHTML = "<script data-forgets></script>";
+    vi.resetModules();
+    await import("../static/end.js");
+    expect(localStorage).toHaveLength(0);
+    document.head.innerHTML = "";
+  });
 });
 
 describe("while the clock runs", () => {

@@ -23,7 +23,20 @@ async def test_the_same_platform_id_is_the_same_person_whatever_the_link(store, 
     first = await arrive(1, key="a" * 64)
     again = await arrive(2, key="a" * 64)
     assert (again.id, again.token_hash) == (first.id, first.token_hash)
-    assert await store.identity(first.id) == {"participant": "p1"}
+    assert await store.identity(first.id) == {"participant": "p2"}, "a task was given back and accepted again"
+    await store.finish(first.id)
+    await arrive(3, key="a" * 64)
+    assert await store.identity(first.id) == {"participant": "p2"}, "that of the submission is paid"
+
+
+async def test_those_without_a_sign_of_life_time_out(store, arrive):
+    early, late = datetime(2026, 5, 1, 12, tzinfo=UTC), datetime(2026, 5, 1, 13, tzinfo=UTC)
+    gone, there, finished = await arrive(1, now=early), await arrive(2, now=late), await arrive(3, now=early)
+    await store.finish(finished.id, now=early)
+    assert await store.time_out(late) == 1
+    assert await store.time_out(late) == 0
+    statuses = [(await store.person(person.id)).status for person in (gone, there, finished)]
+    assert statuses == ["timed_out", "arrived", "finished"]
 
 
 async def test_500_arrivals_at_once_of_250_people_make_250(store, arrive):
