@@ -151,7 +151,7 @@ async def _play_nothing(self, link, trial):
 @pytest.mark.parametrize(
     "settings",
     [
-        'platform = "prolific"\ncompleted = "CODE1"\nscreened_out = "CODE2"\nno_consent = "CODE3"\nstudy_id = "5f000000"',
+        'platform = "prolific"\ncompleted = "C1"\nscreened_out = "C2"\nno_consent = "C3"\nstudy_id = "5f000000"',
         'platform = "connect"\ncompleted = "CODE1"\nstudy_id = "5f00000000"',
         'platform = "external-question"\nsites = ["https://platform.example.org"]',
         'platform = "lab"',
