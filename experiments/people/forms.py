@@ -6,6 +6,7 @@ from typing import Any
 from wtforms import IntegerField, RadioField, SelectMultipleField, StringField, TextAreaField
 from wtforms.fields.choices import SelectChoice
 from wtforms.form import BaseForm
+from wtforms.meta import DefaultMeta
 from wtforms.validators import InputRequired, Length, NumberRange, Optional
 from wtforms.widgets import CheckboxInput, ListWidget
 
@@ -13,9 +14,11 @@ from experiments.people.items import MAX_LINE, MAX_TEXT, Item
 from experiments.people.texts import Section
 
 
-def form_of(items: Sequence[Item], scale: Sequence[str], common: Section) -> BaseForm:
+def form_of(items: Sequence[Item], scale: Sequence[str], common: Section, language: str = "en") -> BaseForm:
     """A form with a field for each item; `scale` are the words of the points of scales."""
-    return BaseForm({item.name: _field(item, scale, common) for item in items})
+    meta = DefaultMeta()
+    meta.locales = [language]  # of WTForms' own messages
+    return BaseForm({item.name: _field(item, scale, common) for item in items}, meta=meta)
 
 
 def _field(item: Item, scale: Sequence[str], common: Section) -> Any:

@@ -14,7 +14,7 @@ import msgspec
 
 from experiments.errors import ConfigError
 from experiments.people.file_lines import at_line
-from experiments.people.texts import Texts, read_texts
+from experiments.people.texts import Texts, read_texts, story_file
 from experiments.procedure.story import story_text
 from experiments.record.origin import HUMAN
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
@@ -111,7 +111,7 @@ class Settings(_Table, frozen=True):
     institution: str
     contact: str
     minutes: Count = 25
-    language: str = "en"
+    language: Annotated[str, msgspec.Meta(pattern="^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*$")] = "en"
     texts: str | None = None
     phases: tuple[str, ...] = PHASES
     assignment: Literal["balanced", "uniform"] = "balanced"
@@ -193,22 +193,24 @@ def read_people_study(path: Path) -> Study:
         settings = msgspec.convert({"study": table}, _File).study
     except msgspec.ValidationError as error:
         raise ConfigError(at_line(path, content.decode(), str(error))) from error
-    trials = [_of_a_person(trial, settings.phases) for trial in design.trials]
+    own_texts = path.parent / settings.texts if settings.texts else None
+    texts = read_texts(settings.language, own_texts, _values(settings))
+    own = design.trials[0].story
+    usual = None if own or STORY not in settings.phases else story_file(settings.language)
+    trials = [_of_a_person(trial, settings.phases, usual) for trial in design.trials]
     cells = [Cell(tuple(group)) for _, group in itertools.groupby(trials, _without_seeds)]
     for name in ("house", "story", "training_assistance"):
         if len(values := {getattr(cell.trials[0], name) for cell in cells}) > 1:
             raise ConfigError(
                 f"{path}: cells differ in {name} ({', '.join(map(str, values))}); it is one for all"
             )
-    story = design.trials[0].story
+    story = trials[0].story
     return Study(
         path,
         hashlib.sha256(content).hexdigest(),
         settings,
         cells,
-        read_texts(
-            settings.language, path.parent / settings.texts if settings.texts else None, _values(settings)
-        ),
+        texts,
         story_text(None if story is None else Path(story)),
         design.exclusions,
     )
@@ -218,10 +220,12 @@ class _File(msgspec.Struct):
     study: Settings
 
 
-def _of_a_person(trial: TrialConfig, phases: Sequence[str]) -> TrialConfig:
-    """The trial of a real person in place of a simulated one."""
+def _of_a_person(trial: TrialConfig, phases: Sequence[str], story: Path | None) -> TrialConfig:
+    """The trial of a real person in place of a simulated one; `story` is read where the file names none."""
     before = [name for name in (STORY, FLYTHROUGH, TRAINING) if name in phases]
     settings: dict[str, Any] = {**trial.settings(), "user": HUMAN, "live": True, "behaviour": {}}
+    if story is not None and trial.story is None:
+        settings["story"] = str(story)
     return TrialConfig.of({**settings, "phases": ",".join([*before, TASK])})
 
 
@@ -232,10 +236,11 @@ def _without_seeds(trial: TrialConfig) -> str:
 def _values(settings: Settings) -> Mapping[str, str]:
     """What stands for places in texts."""
     pay = settings.pay
+    paid = {"pay": f"{Decimal(str(pay.reward)):.2f} {pay.currency}"} if pay.reward else {}
     return {
         "title": settings.title,
         "institution": settings.institution,
         "contact": settings.contact,
         "minutes": str(settings.minutes),
-        "pay": f"{Decimal(str(pay.reward)):.2f} {pay.currency}" if pay.reward else "no payment",
+        **paid,
     }

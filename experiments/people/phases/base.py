@@ -138,6 +138,7 @@ class FormPhase:
         }
 
     def _form(self, sent: FormData | None, answers: Answers) -> Any:
-        form = form_of(self.items, self.texts.scale, self._study.texts["common"])
+        study = self._study
+        form = form_of(self.items, self.texts.scale, study.texts["common"], study.settings.language)
         form.process(sent, data=dict(answers))
         return form

@@ -366,7 +366,14 @@ class StudyServer:
         section: Any = values.get("section")
         if "paragraphs" not in values:
             values["paragraphs"] = section.paragraphs()
-        return page(request, template, status, common=self._study.texts["common"], **values)
+        return page(
+            request,
+            template,
+            status,
+            common=self._study.texts["common"],
+            lang=self._study.settings.language,
+            **values,
+        )
 
     async def _closed(self) -> str | None:
         """Why nobody new may come: the name of a text; None if people may."""

@@ -1,4 +1,4 @@
-"""Texts that participants read: one TOML file for each language."""
+"""Texts that participants read: one TOML file for each language, and its story in `story.LANGUAGE.md`."""
 
 import re
 from collections.abc import Mapping
@@ -49,17 +49,23 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
     """The texts of a language, with those of a file in place of some of them.
 
     Args:
-        language: Of one of this package's files.
+        language: Of one of this package's files; for another language, `path` has all texts.
         path: A file with some sections; a section's items replace all of the original ones.
         values: What stands for `{name}` in texts.
 
     Raises:
         ConfigError: A file cannot be read, or names something that does not exist; it names the file and the value.
     """
-    if language not in languages():
-        raise ConfigError(f"no texts in language {language!r}; there are {', '.join(languages())}")
-    usual = _tables(FOLDER / f"{language}.toml")
+    known = language in languages()
+    if not known and path is None:
+        raise ConfigError(
+            f"no texts in language {language!r}; there are {', '.join(languages())}, or name a file with all `texts`"
+        )
+    usual = _tables(FOLDER / f"{language if known else 'en'}.toml")
     own = _tables(path) if path else {}
+    for name, table in {} if known else usual.items():
+        if missing := sorted(set(table) - set(own.get(name, {}))):
+            raise ConfigError(f"{path}: [{name}] lacks {missing[0]!r} in language {language!r}")
     for name, table in own.items():
         if name not in usual:
             raise ConfigError(f"{path}: no section [{name}]; there are {', '.join(usual)}")
@@ -67,9 +73,21 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
             raise ConfigError(
                 f"{path}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}"
             )
-    return {
-        name: _section(name, {**table, **own.get(name, {})}, values, path) for name, table in usual.items()
-    }
+    tables = {name: {**table, **own.get(name, {})} for name, table in usual.items()}
+    values = {"pay": tables["common"]["no_payment"], **values}
+    return {name: _section(name, table, values, path) for name, table in tables.items()}
+
+
+def story_file(language: str) -> Path | None:
+    """The story of a language but English, whose story is that of all trials; a ConfigError if there is none."""
+    if language == "en":
+        return None
+    path = FOLDER / f"story.{language}.md"
+    if not path.is_file():
+        raise ConfigError(
+            f"there is no story in language {language!r}; name a file with `story` in [all_cells]"
+        )
+    return path
 
 
 def _tables(path: Path) -> dict[str, dict[str, Any]]:

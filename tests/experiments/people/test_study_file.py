@@ -3,10 +3,14 @@
 import re
 
 import pytest
+from starlette.datastructures import ImmutableMultiDict
 
 from experiments.cli.main import main
 from experiments.errors import ConfigError
+from experiments.people.phases import phases_of_study
+from experiments.people.phases.base import Visitor
 from experiments.people.study_file import PHASES, read_people_study
+from experiments.people.texts import FOLDER as TEXTS
 from experiments.people.texts import languages, read_texts
 from experiments.study.designs import FOLDER
 from experiments.study.measures import read_measures
@@ -93,13 +97,68 @@ def test_own_texts_replace_some_and_are_checked(tmp_path):
             read_texts("en", own, values)
 
 
-def test_every_language_has_the_same_texts_and_items():
-    values = {name: name for name in ("title", "institution", "contact", "minutes", "pay")}
-    first, *others = (read_texts(language, None, values) for language in languages())
-    for other in others:
-        assert {n: (set(s.words), [i.name for i in s.items]) for n, s in other.items()} == {
-            n: (set(s.words), [i.name for i in s.items]) for n, s in first.items()
-        }
+PLACES = ("title", "institution", "contact", "minutes", "pay")
+
+
+def shape(texts):
+    """Keys, places and items of texts, without words."""
+    return {
+        name: (
+            {key: sorted(set(re.findall(r"{\w+}", words))) for key, words in section.words.items()},
+            [
+                (i.name, i.kind, len(i.choices), i.low, i.high, i.required, i.right and i.choices.index(i.right))
+                for i in section.items
+            ],
+            len(section.scale),
+        )
+        for name, section in texts.items()
+    }  # fmt: skip
+
+
+def test_every_language_has_the_same_texts_places_and_items():
+    assert languages() == ("de", "en")
+    values = {name: f"{{{name}}}" for name in PLACES}
+    german, english = (read_texts(language, None, values) for language in languages())
+    assert shape(german) == shape(english)
+    same = {
+        f"{name}.{key}" for name, section in english.items() for key, words in section.words.items()
+        if german[name].words[key] == words
+    }  # fmt: skip
+    assert same == {"welcome.title"}, "these words are not translated"
+
+
+def test_a_study_in_another_language_has_its_story_and_its_messages(tmp_path):
+    path = tmp_path / "study.toml"
+    assert main(["study", "init", str(path)]) == 0
+    path.write_text(path.read_text().replace('language = "en"', 'language = "de"'))
+    study = read_people_study(path)
+    assert "Ferienwohnung" in study.story and study.cells[0].trial(0).story.endswith("story.de.md")
+    survey = next(phase for phase in phases_of_study(study) if phase.name == "survey")
+    sent = ImmutableMultiDict({**survey.example(), "age": "7"})
+    refused = survey.read(Visitor({}, 0.0, 0, "/"), sent)
+    assert "zwischen 18 und 120" in refused.values["form"]["age"].errors[0]
+
+
+def test_a_language_of_ones_own_needs_all_texts_and_a_story(tmp_path):
+    path = tmp_path / "study.toml"
+    assert main(["study", "init", str(path)]) == 0
+    usual = path.read_text().replace('language = "en"', 'language = "nl"')
+    (tmp_path / "verhaal.md").write_text("Ruim alles op.")
+    path.write_text(usual.replace("[all_cells]", '[all_cells]\nstory = "verhaal.md"\nphases = "story,task"'))
+    with pytest.raises(ConfigError, match="name a file with all `texts`"):
+        read_people_study(path)
+    path.write_text(path.read_text().replace('# texts = "texts.toml"', 'texts = "texts.toml"'))
+    german = (TEXTS / "de.toml").read_text()
+    (tmp_path / "texts.toml").write_text(german.replace('next = "Weiter"\n', ""))
+    with pytest.raises(ConfigError, match=r"\[common\] lacks 'next'"):
+        read_people_study(path)
+    (tmp_path / "texts.toml").write_text(german)
+    told = path.read_text()
+    path.write_text(told.replace('story = "verhaal.md"\n', ""))
+    with pytest.raises(ConfigError, match="no story in language 'nl'"):
+        read_people_study(path)
+    path.write_text(told)
+    assert read_people_study(path).story == "Ruim alles op."
 
 
 def test_the_template_is_a_study(tmp_path, capsys):
