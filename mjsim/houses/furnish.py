@@ -75,10 +75,12 @@ class Home:
         """Rooms of the first use that there is, then those of the next."""
         return [space for use in uses for space in self.spaces if self.uses[space.room.key] == use]
 
-    def put(self, space: Space, kind: str, *, smallest: int = SIZES - 1, number: int = 0) -> bool:
+    def put(
+        self, space: Space, kind: str, *, largest: int = 0, smallest: int = SIZES - 1, number: int = 0
+    ) -> bool:
         """Put a piece of a kind into a room, smaller and smaller until it fits."""
         rng = stream(self.seed, "furniture", space.room.key, kind, str(number), str(self.attempt))
-        for smaller in range(min(max(0, self.attempt - 2), smallest), smallest + 1):
+        for smaller in range(min(max(largest, self.attempt - 2), smallest), smallest + 1):
             for sides in AXES if kind == "lounge" else ((*AXES[0], *AXES[1]),):
                 fit = (space.depth(sides[0]), 0.0, 0.0) if kind == "lounge" else None
                 piece = KINDS[kind].make(rng, self.look, smaller=smaller, fit=fit)
@@ -121,8 +123,8 @@ class Home:
         if not self.rooms(("bathroom", "shower_room")):
             self._first(("wash_corner",), ("studio", "bedroom", "living_room"), "a place to wash")
         cooking = next((space.room.use for space in self.rooms(COOKING)), "")
-        kitchen = self._first(("corner_kitchen", "straight_kitchen", "kitchenette"), (cooking,), "a kitchen")
-        if kitchen == "kitchenette":
+        if not any(self._kitchen(space) for space in self.rooms((cooking,))):
+            self._first(("kitchenette",), (cooking,), "a kitchen")
             self._first(("fridge",), (cooking, "utility"), "a fridge")
         for space in self.spaces:
             musts = MUSTS.get(self.uses[space.room.key], ())
@@ -154,18 +156,20 @@ class Home:
         if self.seats < wanted:
             raise HouseError(f"only {self.seats} of {wanted} seats found a place in seed {self.seed}")
 
-    def _first(self, kinds: Sequence[str], uses: Sequence[str], what: str) -> str:
+    def _first(self, kinds: Sequence[str], uses: Sequence[str], what: str) -> None:
         """The first of some kinds that has a place, in the first such room of some uses."""
         for space in self.rooms(uses):
-            order = [kind for kind in kinds if kind != "corner_kitchen" or self._for_corner(space)]
-            for kind in order:
-                if self.put(space, kind):
-                    return kind
+            if any(self.put(space, kind) for kind in kinds):
+                return
         raise HouseError(f"no place for {what} in seed {self.seed}")
 
-    def _for_corner(self, space: Space) -> bool:
-        floor = space.room.floor
-        return min(floor.width, floor.depth) > 2.3 and bool(space.rng.random() < 0.5)
+    def _kitchen(self, space: Space) -> bool:
+        """The longest run of kitchen units that has a place, straight or around a corner."""
+        narrow = min(space.room.floor.width, space.room.floor.depth) < 2.3
+        order = ["corner_kitchen", "straight_kitchen"][int(narrow or space.rng.random() < 0.4) :]
+        return any(
+            self.put(space, kind, largest=size, smallest=size) for size in range(SIZES) for kind in order
+        )
 
     def _any(self, space: Space, kinds: Sequence[str]) -> None:
         """One of some kinds, the first as often as not."""

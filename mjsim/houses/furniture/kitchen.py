@@ -33,7 +33,7 @@ class Run:
             top = getattr(self, f"_{name}")(x)
             if name not in ("fridge", "tall_oven"):
                 self.b.box("tile", WIDE, (0.0, 0.006), (TOP, LOW), x, seen=True)
-            if self.hanging and name in ("drawers", "doors", "dishwasher") and self.b.chance(0.85):
+            if self.hanging and name in ("drawers", "doors", "dishwasher", "sink") and self.b.chance(0.85):
                 top = self._hang(x)
             self.parts.append((x - WIDE / 2, 0.0, x + WIDE / 2, DEEP, top))
         use = ((-self.w / 2, DEEP, self.w / 2, DEEP + 0.9),)
