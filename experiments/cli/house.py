@@ -1,4 +1,4 @@
-"""`mjsim house`: write a disorganized house as MJCF or glTF."""
+"""`mjsim house`: write a disorganized house as MJCF or glTF, or generate a house."""
 
 import argparse
 from pathlib import Path
@@ -9,6 +9,7 @@ from experiments.errors import ConfigError
 from mjsim.episode import POINTS
 
 MJCF, GLTF = ".xml", ".glb"
+GENERATE = "generate"
 
 DESCRIPTION = """\
 Sample a disorganized house and write it, with the episode as JSON beside it, in the format that the ending of --out
@@ -16,12 +17,16 @@ names:
 
   .xml  self-contained MJCF, with meshes and textures in a folder beside it. Stock MuJoCo loads it:
         python -m mujoco.viewer --mjcf=house.xml
-  .glb  what one sees of it as one file of binary glTF 2.0, for Blender, three.js and others (docs/scene-files.md)"""
+  .glb  what one sees of it as one file of binary glTF 2.0, for Blender, three.js and others (docs/scene-files.md)
+
+With `generate`: make the house of the seed --seed as the folder --out, with MJCF, textures, catalogue.toml, recipe, a
+floor plan and a picture of each room. It is the one that --house generated:SEED?rooms=N names (docs/houses.md)."""
 
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     parser = add_command(commands, "house", run, description=DESCRIPTION)
+    parser.add_argument("what", nargs="?", choices=[GENERATE], help="make a new house instead")
     parser.add_argument(
         "--objects", type=int, default=12, metavar="N", help="misplaced objects, 1 to --points"
     )
@@ -29,8 +34,19 @@ def add_parser(commands: Any) -> None:
     add_setting(parser, "points", default=POINTS)
     add_setting(parser, "house", default="apartment")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="file to write, which ends in .xml or .glb"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="PATH",
+        help="file to write, which ends in .xml or .glb; of generate, a folder",
     )
+    parser.add_argument(
+        "--rooms",
+        type=int,
+        metavar="N",
+        help="rooms of the house to generate, 1 to 10 (default: as the seed says)",
+    )
+    parser.add_argument("--no-pictures", action="store_true", help="generate without pictures")
     add_force(parser)
 
 
@@ -40,6 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.record.run_directory import check_file
     from mjsim.model.scene import compose
 
+    if arguments.what == GENERATE:
+        return _generate(arguments)
     if arguments.out.suffix not in (MJCF, GLTF):
         raise ConfigError(
             f"cannot export to {arguments.out}: name a file that ends in {MJCF} (MJCF, for MuJoCo) or {GLTF} (glTF)"
@@ -52,6 +70,32 @@ def run(arguments: argparse.Namespace) -> int:
     _write(compose(episode, house.catalogue), arguments.out)
     episode.save(episode_file)
     print(f"{arguments.out} ({len(episode.objects)} misplaced objects, seed {arguments.seed})")
+    return 0
+
+
+def _generate(arguments: argparse.Namespace) -> int:
+    """Write the house of a seed into a folder, checked, with pictures: whole or not at all."""
+    from experiments.house import House
+    from experiments.procedure.house_pictures import draw_house
+    from mjsim.files import exchange, work_folder
+    from mjsim.model.model_files import copy_house
+
+    out: Path = arguments.out
+    if out.exists() and not (arguments.force and (out / "recipe.json").is_file()):
+        raise ConfigError(f"{out} exists; name a new folder, or replace a generated house with --force")
+    rooms = "" if arguments.rooms is None else f"?rooms={arguments.rooms}"
+    house = House.load(f"generated:{arguments.seed}{rooms}")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with work_folder(out.parent) as folder:
+        copy_house(house.catalogue.house_path, folder)
+        if not arguments.no_pictures:
+            draw_house(house, folder)
+        folder.chmod(0o755)
+        if out.exists():
+            exchange(folder, out)
+        else:
+            folder.rename(out)
+    print(f"{out} ({house.catalogue.name}: {len(house.rooms.labels)} rooms, {house.rooms.area:.0f} m2)")
     return 0
 
 

@@ -22,6 +22,7 @@ from experiments.trials.trial_config import (
     episode_settings,
 )
 from mjsim.files import read_text
+from mjsim.houses.recipe import generated_names, is_generated
 from mjsim.model.catalogue_files import house_name
 
 MAX_NUMBERS = 1_000_000
@@ -84,23 +85,32 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
     house_seeds: _Seeds = None
     person_seeds: _Seeds = None
     order_seeds: _Seeds = None
+    houses: str | list[str] | None = (
+        None  # names, or seeds of generated ones such as "generated:0:200?rooms=5"
+    )
 
-    def each(self) -> list[dict[str, int]]:
-        """The three seeds of every person; lists are gone through again for more people."""
-        lists = {name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None}
+    def each(self) -> list[dict[str, Any]]:
+        """The three seeds of every person, and the house; lists are gone through again for more people."""
+        lists: dict[str, list[Any]] = {
+            name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None
+        }
+        if self.houses is not None:
+            lists["houses"] = house_names(self.houses)
         longest = max((len(seeds) for seeds in lists.values()), default=0)
         people = longest if self.people is None else self.people
         if people == 0:
             raise ConfigError("people must be given, or seeds for each of them")
         if people < longest or people > MAX_NUMBERS:
             raise ConfigError(f"people is {people}, but there are seeds for {longest}")
-        everyone = lists.pop("seeds", range(people))
+        everyone = lists.pop("seeds", list(range(people)))
         by_name = {name: lists.get(f"{name}s", everyone) for name in SEEDS}
+        if "houses" in lists:
+            by_name["house"] = lists["houses"]
         return [{name: seeds[k % len(seeds)] for name, seeds in by_name.items()} for k in range(people)]
 
 
 _SEEDS = ("seeds", *(f"{name}s" for name in SEEDS))
-_IN_A_CELL = {*SETTINGS, "people", *_SEEDS} - {"live", *SEEDS}
+_IN_A_CELL = {*SETTINGS, "people", "houses", *_SEEDS} - {"live", *SEEDS}
 
 
 class _File(msgspec.Struct, forbid_unknown_fields=True):
@@ -162,11 +172,15 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
         raise ConfigError(f"unknown field `{unknown[0]}`; docs/designs.md lists what a design may hold")
     settings = {name: value for name, value in values.items() if name in SETTINGS}
     people = msgspec.convert({n: v for n, v in values.items() if n not in SETTINGS}, _People).each()
+    for seeds in people if "houses" in values else ():
+        seeds["house"] = house_name(seeds["house"], folder)
     for name in PATHS:
         if isinstance(path := settings.get(name), str):
             settings[name] = house_name(path, folder) if name == "house" else str(folder / path)
     if isinstance(settings.get("phases"), list):
         settings["phases"] = ",".join(map(str, settings["phases"]))
+    if "houses" in values and ("house" in settings or "episode" in settings):
+        raise ConfigError("houses says in which houses the trials are; leave out house and episode")
     if "episode" in settings:
         if "objects" in settings or "house_seeds" in values:
             raise ConfigError(
@@ -175,6 +189,13 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
         settings = {**episode_settings(Path(settings["episode"])), **settings}
         people = [{n: s for n, s in seeds.items() if n != "house_seed"} for seeds in people]
     return [TrialConfig.of({**settings, **seeds}) for seeds in people]
+
+
+def house_names(houses: str | list[str]) -> list[str]:
+    """Names of houses: one, several, or generated ones of a range of seeds, as in `generated:0:200?split=test`."""
+    if isinstance(houses, list):
+        return [name for entry in houses for name in house_names(entry)]
+    return generated_names(houses) if is_generated(houses) else [houses]
 
 
 def numbers(text: int | list[int] | str) -> list[int]:

@@ -50,14 +50,12 @@ def draw_palette(seed: int) -> Palette:
 
 
 def surfaces(seed: int, plan: FloorPlan) -> list[str]:
-    """MJCF materials `wall_<room>` and `floor_<room>`, `curtain` and the front door's."""
+    """MJCF materials `wall_<room>` and `floor_<room>`, and those of the front door."""
     rng = stream(seed, "surfaces")
     hue, planks = _hue(rng), str(rng.choice(["oak_planks", "pine_planks"]))
     tone = _PLANKS[int(rng.integers(len(_PLANKS)))]
     door = _colour(rng, _hue(rng), (0.1, 0.6), (0.2, 0.75))
-    curtain = _colour(rng, _hue(rng), (0.03, 0.35), (0.72, 0.95))
     found = [
-        f'<material name="curtain" texture="curtain" rgba="{rgba(curtain)}"/>',
         f'<material name="entrance" rgba="{rgba(door)}"/>',
         f'<material name="entrance_panel" rgba="{rgba(_lighter(door))}"/>',
     ]

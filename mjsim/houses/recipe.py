@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import parse_qsl
+from urllib.parse import parse_qsl, urlencode
 
 import msgspec
 
@@ -17,6 +17,7 @@ from mjsim.houses.values import FloorPlan
 PREFIX = "generated:"
 VERSION = 1  # of the generator: raised by whatever changes a house of a seed
 MAX_SEED = 2**63 - 1
+MAX_HOUSES = 100_000  # of a range
 # How usual homes of 1 to 10 rooms are, bathrooms and halls counted, where no number is asked for.
 _SHARES = (0.04, 0.06, 0.09, 0.13, 0.16, 0.16, 0.14, 0.11, 0.07, 0.04)
 
@@ -91,6 +92,32 @@ def parse_name(house: str) -> HouseName:
     if not ROOMS[0] <= rooms <= ROOMS[1]:
         raise HouseError(f"{house!r:.80} has {rooms} rooms; ask for {ROOMS[0]} to {ROOMS[1]}")
     return HouseName(seed, rooms)
+
+
+def generated_names(houses: str) -> list[str]:
+    """The houses of `generated:7`, of a range of seeds such as `generated:0:200` (the end not included), with any of
+    `?rooms=5` and `?split=train`, which leaves out the seeds of the other splits.
+
+    Raises:
+        HouseError: It is malformed, or names none.
+    """
+    found = re.fullmatch(rf"{PREFIX}(\d{{1,18}})(?::(\d{{1,18}}))?(?:\?(.*))?", houses, re.ASCII)
+    values = dict(parse_qsl(found[3] or "", keep_blank_values=True)) if found else {}
+    split = values.pop("split", None)
+    if not found or split not in (None, *_SPLITS):
+        raise HouseError(
+            f"{houses!r:.80} names no houses; write {PREFIX}0:200, {PREFIX}0:200?rooms=5 or "
+            f"{PREFIX}0:200?split=train ({', '.join(_SPLITS)})"
+        )
+    first = int(found[1])
+    seeds = range(first, int(found[2]) if found[2] else first + 1)
+    if len(seeds) > MAX_HOUSES:
+        raise HouseError(f"{houses!r:.80} names more than {MAX_HOUSES} houses")
+    query = f"?{urlencode(values)}" if values else ""
+    names = [str(parse_name(f"{PREFIX}{seed}{query}")) for seed in seeds if split in (None, split_of(seed))]
+    if not names:
+        raise HouseError(f"{houses!r:.80} names no house; a range's end is not included")
+    return names
 
 
 def split_of(seed: int) -> str:

@@ -1,4 +1,4 @@
-"""Floors, walls, ceilings, doors, windows and lamps of a floor plan as MJCF, in the classes of the apartment.
+"""Floors, walls, ceilings, doors and windows of a floor plan as MJCF, in the classes of the apartment.
 
 Each room lines its side of a shared wall, so that both sides have their own colour; outer walls lie outside the rooms.
 """
@@ -24,7 +24,6 @@ from mjsim.houses.values import (
 HALF = WALL / 2
 _NORMAL = {"south": "y", "north": "y", "east": "x", "west": "x"}
 _SHADOW_TURN = {"south": 0.0, "north": math.pi, "west": -math.pi / 2, "east": math.pi / 2}
-_CURTAINS = ("living_room", "bedroom", "dining_room", "studio")
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ def shell(plan: FloorPlan) -> Iterator[str]:
     for room in plan.rooms:
         cell = room.floor.grown(HALF)
         (x, y), w, d = cell.center, cell.width / 2, cell.depth / 2
-        inside = "\n".join([*_Walls(plan, room).elements(), *_lamp(room)])
+        inside = "\n".join(_Walls(plan, room).elements())
         yield (
             f'<body name="{room.key}/structure">\n{inside}\n'
             f'<geom name="{room.key}/floor" class="floor" material="floor_{room.key}" '
@@ -158,13 +157,6 @@ class _Walls:
         yield self._slab(
             side, (left - 0.03, right + 0.03), (sill - 0.03, sill), (-0.04, 0.15), "frame", "trim"
         )
-        if self._room.use in _CURTAINS:
-            low, high = self._room.floor.wall(side)
-            for start, end in ((left - 0.28, left + 0.02), (right - 0.02, right + 0.28)):
-                along = max(start, low + 0.02), min(end, high - 0.02)
-                yield self._slab(side, along, (sill - 0.12, 2.42), (-0.09, -0.045), "curtain", "trim")
-            rail = max(low, left - 0.34), min(high, right + 0.34)
-            yield self._slab(side, rail, (2.42, 2.445), (-0.08, -0.055), "steel", "trim")
 
     def _frame(self, door: Door) -> Iterator[str]:
         """The half of a door's frame that this room sees."""
@@ -195,20 +187,6 @@ class _Walls:
         for up in ((0.2, 0.9), (1.1, 1.8)):
             along = low + 0.13, high - 0.13
             yield self._slab(leaf.side, along, up, (-LEAF_DEPTH - 0.006, -LEAF_DEPTH), "door_panel", "trim")
-
-
-def _lamp(room: Room) -> Iterator[str]:
-    """A flat ceiling lamp, above the light that casts shadows; two in long rooms."""
-    x, y = room.floor.center
-    w, d = room.floor.width, room.floor.depth
-    count = 2 if max(w, d) > 5.0 else 1
-    for number in range(count):
-        shift = (number + 0.5) / count - 0.5
-        at = (x + shift * w, y) if w > d else (x, y + shift * d)
-        yield (
-            f'<geom class="lamp" type="cylinder" material="bulb" pos="{_n(at[0])} {_n(at[1])} 2.58" '
-            f'size="{0.14 if min(w, d) < 2.2 else 0.22} 0.02"/>'
-        )
 
 
 def _outside(plan: FloorPlan) -> Iterator[str]:

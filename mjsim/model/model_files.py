@@ -1,6 +1,7 @@
 """Reading MJCF files, and telling by a hash whether any file of a house has changed."""
 
 import hashlib
+import shutil
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -32,6 +33,18 @@ def name_files(spec: mujoco.MjSpec, folder: Path) -> None:
         texture.file = _texture(folder, spec.compiler.texturedir, texture.file)
         for face, file in enumerate(texture.cubefiles):
             texture.cubefiles[face] = _texture(folder, spec.compiler.texturedir, file)
+
+
+def copy_house(path: Path, folder: Path) -> None:
+    """Copy the folder of a house into another, with the textures of the package that it uses, for stock MuJoCo."""
+    shutil.copytree(path.parent, folder, dirs_exist_ok=True)
+    found = list(elements(path))
+    directory = next((e.get("texturedir", "") for e in found if e.tag == "compiler"), "")
+    for name in [name for e in found if e.tag == "texture" and (name := e.get("file"))]:
+        source = Path(_texture(path.parent, directory, name))
+        if not (folder / directory / name).exists() and is_file(source):
+            (folder / directory).mkdir(exist_ok=True)
+            shutil.copyfile(source, folder / directory / name)
 
 
 def elements(path: Path) -> Iterator[ET.Element]:

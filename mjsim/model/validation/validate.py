@@ -1,11 +1,17 @@
 """The validator of houses with their objects and receptacles, for `mjsim check` and for houses of users."""
 
+import contextlib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.errors import AssetError, MjsimError
+from mjsim.houses.recipe import is_generated
+from mjsim.kernels import cache_base
+from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import CompiledHouse
 from mjsim.model.validation.compiled import Compiled, compile_model
 from mjsim.model.validation.findings import Finding, errors, one_line
@@ -14,16 +20,34 @@ from mjsim.model.validation.floor_rules import check_floor, nowhere_to_stand
 from mjsim.model.validation.house_rules import check_house_file
 from mjsim.model.validation.object_rules import check_compiled_object
 from mjsim.model.validation.receptacle_rules import check_receptacle
+from mjsim.sources import source_digest
 
 SLOTS = 2.5  # footprints of an average object of the category that a receptacle's floor should have room for
 
 
 def require_usable(house: CompiledHouse) -> None:
-    """Check a house, once per process, unless it comes with the package; `AssetError` gives the first error."""
-    if house.catalogue.is_shipped:
+    """Check a house, unless it comes with the package; `AssetError` gives the first error.
+
+    Once per process, and a generated one once for all: its cached verdict is one on its content, by this code.
+    """
+    catalogue = house.catalogue
+    if catalogue.is_shipped:
+        return
+    verdict = _verdict(catalogue) if is_generated(catalogue.name) else None
+    if verdict is not None and verdict.is_file():
         return
     if found := errors(house.once("findings", lambda: check_house(house))):
-        raise AssetError(one_line(found, house.catalogue.name))
+        raise AssetError(one_line(found, catalogue.name))
+    if verdict is not None:
+        with contextlib.suppress(OSError):  # of a full disk: the next process checks again
+            verdict.parent.mkdir(parents=True, exist_ok=True)
+            verdict.touch()
+
+
+def _verdict(catalogue: Catalogue) -> Path:
+    """A file that is there where a house of this content was found usable."""
+    by = f"{source_digest('mjsim', 'planner')}-{mujoco.__version__}"
+    return cache_base() / "houses" / "usable" / f"{catalogue.content[:32]}-{by}"
 
 
 def check_house(house: CompiledHouse) -> list[Finding]:

@@ -7,7 +7,7 @@ import pytest
 
 from mjsim.errors import HouseError
 from mjsim.houses.generated import generate, house_files
-from mjsim.houses.recipe import VERSION, parse_name, read_recipe, split_of
+from mjsim.houses.recipe import VERSION, generated_names, parse_name, read_recipe, split_of
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.sampling import sample_episode
@@ -81,3 +81,17 @@ def test_most_seeds_are_for_training() -> None:
     splits = [split_of(seed) for seed in range(1000)]
     assert 760 < splits.count("train") < 840
     assert 70 < splits.count("test") < 130
+
+
+def test_a_range_of_seeds_names_houses_and_a_split_some_of_them() -> None:
+    assert generated_names("generated:3:5?rooms=4") == [
+        f"generated:{seed}?rooms=4&version={VERSION}" for seed in (3, 4)
+    ]
+    parts = [generated_names(f"generated:0:40?split={name}") for name in ("train", "validation", "test")]
+    assert sorted(name for part in parts for name in part) == sorted(generated_names("generated:0:40"))
+
+
+@pytest.mark.parametrize("houses", ["generated:5:5", "generated:1:x", "generated:0:9?split=mine"])
+def test_a_malformed_range_is_refused(houses: str) -> None:
+    with pytest.raises(HouseError, match="names no house"):
+        generated_names(houses)
