@@ -53,6 +53,7 @@ class Site:
     people: Any = None
     researchers: Any = None
     loop: Any = None
+    logins: int = 0
 
     def ask(self, coroutine):
         """What a coroutine of the store gives."""
@@ -65,8 +66,9 @@ class Site:
         return httpx.Client(base_url=url, headers=origin, timeout=60, follow_redirects=False)
 
     def logged_in(self, name):
-        """The browser of a researcher."""
-        client = self.client(researcher=True)
+        """The browser of a researcher, each at an address of its own."""
+        self.logins += 1
+        client = self.client(researcher=True, headers={"X-Forwarded-For": f"198.51.100.{self.logins}"})
         answer = client.post("/login", data={"name": name, "password": PASSWORD})
         assert (answer.status_code, answer.headers["location"]) == (303, "/")
         return client
