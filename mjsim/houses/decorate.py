@@ -93,7 +93,12 @@ def _dress(space: Space, window: Window, use: str, look: Look, rng: np.random.Ge
         curtains = KINDS["curtains"].make(rng, look, smaller=int(beside > 0 or rng.random() < 0.25), fit=fit)
         space.stood.append((curtains, _at_wall(space, side, window.center)))
     elif rng.random() < 0.8:
-        space.stood.append((KINDS["blind"].make(rng, look, fit=fit), _at_wall(space, side, window.center)))
+        space.stood.append(
+            (
+                KINDS[("blind", "roller_blind")[int(rng.integers(2))]].make(rng, look, fit=fit),
+                _at_wall(space, side, window.center),
+            )
+        )
 
 
 def _lamps(space: Space, look: Look, rng: np.random.Generator) -> None:

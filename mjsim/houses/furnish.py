@@ -130,6 +130,12 @@ class Home:
             musts = MUSTS.get(self.uses[space.room.key], ())
             for i in space.rng.permutation(len(musts)) if self.attempt > 1 else range(len(musts)):
                 self._any(space, musts[i])
+            if self.attempt < 3 and self.uses[space.room.key] in ("bedroom", "child", "studio"):
+                _ = (
+                    self.put(space, "wardrobe")
+                    if space.rng.random() < 0.6
+                    else self.put(space, "mirror_wardrobe")
+                )
         self._first(("dining", "bar_table"), DINING, "a table")
         late = self.attempt % 2
         if not late:

@@ -13,15 +13,14 @@ _PLANTS: Options = ("bush", "tree", "snake_plant", "palm", "cactus", "fern_stand
 _SHELVES: Options = ("bookcase", "low_bookcase", "cube_shelf", "ladder_shelf")
 USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this chance, while there is room
     "bedroom": (
-        (("wardrobe", "mirror_wardrobe"), 1.0),
-        (("chest_of_drawers", "dressing_table"), 0.8),
+        (("chest_of_drawers", "dressing_table"), 1.0),
         (("standing_mirror", "armchair", "pouf", "bench"), 0.7),
         (_PLANTS, 0.7),
         ((*_SHELVES, "trunk", "television"), 0.6),
         (("floor_lamp", "cot", "exercise_bike", "chest_of_drawers"), 0.5),
     ),
     "child": (
-        (("wardrobe", "chest_of_drawers"), 1.0),
+        (("chest_of_drawers", "toy_shelf"), 0.8),
         (("toy_shelf", "low_bookcase", "cube_shelf"), 0.9),
         (("desk",), 0.6),
         (("pouf", "stool", "trunk", "aquarium"), 0.7),
@@ -38,7 +37,7 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (_PLANTS, 0.6),
     ),
     "studio": (
-        (("wardrobe", "chest_of_drawers"), 1.0),
+        (("chest_of_drawers", "low_bookcase", "cube_shelf"), 1.0),
         (_SHELVES, 0.7),
         (_PLANTS, 0.8),
         (("floor_lamp", "armchair"), 0.6),
@@ -87,7 +86,6 @@ OFTEN = {
     "bush": 2,
     "bookcase": 2,
     "low_bookcase": 2,
-    "wardrobe": 2,
     "sideboard": 2,
 }  # in one room
 SHARES = {  # of the floor that is furnished

@@ -114,7 +114,7 @@ def _tables(b: Builder, bed: Piece, sides: tuple[int, ...]) -> Piece:
 def double_bed(b: Builder) -> Piece:
     """1.4 to 1.8 m wide, with two bedside tables, with one, or beside a wall without."""
     w = (b.pick(1.6, 1.8), b.pick(1.4, 1.6), 1.4, 1.2)[min(b.smaller, 3)]
-    if b.smaller == 0:
+    if b.smaller == 0 and b.chance(0.8):
         return _tables(b, _bed(b, w, 2, (-1, 1)), (-1, 1))
     side = b.pick(-1, 1)
     bed = _bed(b, w, 2 if w > 1.3 else 1, (side,))
@@ -125,7 +125,7 @@ def single_bed(b: Builder) -> Piece:
     """0.9 to 1.2 m wide, with a bedside table where there is room."""
     w, side = b.pick(0.9, 1.0, 1.2) if b.smaller == 0 else 0.9, b.pick(-1, 1)
     bed = _bed(b, w, 1, (side,))
-    return _tables(b, bed, (side,)) if b.smaller == 0 else bed
+    return _tables(b, bed, (side,)) if b.smaller == 0 and b.chance(0.7) else bed
 
 
 def day_bed(b: Builder) -> Piece:

@@ -229,6 +229,10 @@ class Builder:
         self.pictures.append(picture)
         return picture.name
 
+    def on_ceiling(self) -> None:
+        """What was written hangs from the ceiling: it is left out of a view from above."""
+        self.geoms = [geom.replace('class="decor"', 'class="lamp"') for geom in self.geoms]
+
     def piece(
         self,
         size: Sequence[float],

@@ -231,6 +231,8 @@ def _on_floor(b: Builder, w: float, d: float, material: str, round_one: bool = F
 def rug(b: Builder) -> Piece:
     """A rectangle with a pattern of its own."""
     w, d = b.pick((1.2, 0.8), (1.6, 1.1), (2.0, 1.4)) if b.smaller == 0 else (1.0, 0.7)
+    if b.fit is not None:
+        w, d, _ = b.fit
     return _on_floor(b, w, d, b.own(carpet(b.rng, b.look)))
 
 
@@ -282,19 +284,26 @@ def curtains(b: Builder) -> Piece:
     return b.piece((total + 0.1, 0.14, top + 0.03), parts=(), stands="hangs")
 
 
-def blind(b: Builder) -> Piece:
-    """Drawn a third of the way down: slats, or a roll of cloth."""
+def roller_blind(b: Builder) -> Piece:
+    """A roll of cloth, drawn a part of the way down."""
     w, low, high = _window(b)
     down = round(b.pick(0.2, 0.35) * (high - low), 2)
     b.box("white", w + 0.06, (0.0, 0.06), (high, high + 0.07), seen=True)
-    if b.chance(0.5):
-        b.box(b.pick("curtain", "linen", b.cloth), w + 0.02, (0.02, 0.028), (high - down, high), seen=True)
-        b.box("white", w + 0.03, (0.015, 0.035), (high - down - 0.02, high - down), seen=True)
-    else:
-        count = max(3, round(down / 0.05))
-        for i in range(count):
-            z = high - 0.01 - down * (i + 0.5) / count
-            b.box("white", w + 0.02, (0.005, 0.05), (z, z + 0.008), seen=True)
+    b.box(b.pick("curtain", "linen", b.cloth), w + 0.02, (0.02, 0.028), (high - down, high), seen=True)
+    b.box("white", w + 0.03, (0.015, 0.035), (high - down - 0.02, high - down), seen=True)
+    return b.piece((w + 0.06, 0.06, high + 0.07), parts=(), stands="hangs")
+
+
+def blind(b: Builder) -> Piece:
+    """Slats, drawn a part of the way down."""
+    w, low, high = _window(b)
+    down = round(b.pick(0.15, 0.25, 0.35) * (high - low), 2)
+    b.box("white", w + 0.06, (0.0, 0.06), (high, high + 0.07), seen=True)
+    count = max(3, round(down / 0.05))
+    slat = b.pick("white", "white", b.wood)
+    for i in range(count):
+        z = high - 0.01 - down * (i + 0.5) / count
+        b.box(slat, w + 0.02, (0.005, 0.05), (z, z + 0.008), seen=True)
     return b.piece((w + 0.06, 0.06, high + 0.07), parts=(), stands="hangs")
 
 
@@ -318,11 +327,6 @@ def radiator(b: Builder) -> Piece:
     return b.piece((w + 0.1, 0.105, top + 0.01))
 
 
-def _lamp_class(b: Builder) -> None:
-    """What hangs from a ceiling is left out of a view from above."""
-    b.geoms = [geom.replace('class="decor"', 'class="lamp"') for geom in b.geoms]
-
-
 def ceiling_lamp(b: Builder) -> Piece:
     """Flat under the ceiling, above the light that casts shadows: a disc, a bowl, a square, a bar, a star."""
     form, z = b.pick("disc", "bowl", "square", "bar", "star"), CEILING
@@ -343,7 +347,7 @@ def ceiling_lamp(b: Builder) -> Piece:
                 x, y = 0.2 * math.cos(2.1 * i), 0.2 * math.sin(2.1 * i)
                 b.soft("bulb", (x, y, z - 0.02), (0.11, 0.11, 0.025))
         b.box(b.metal, 0.8 if form == "bar" else 0.12, (-0.06, 0.06), (z - 0.025, z), seen=True)
-    _lamp_class(b)
+    b.on_ceiling()
     return b.piece((0.8, 0.62, z), parts=(), stands="ceiling")
 
 
@@ -393,6 +397,12 @@ KINDS = (
         "curtains", _rooms("living", "bedroom", "dining", "office", "child", "studio"), curtains, solid=False
     ),
     Kind("blind", _rooms("kitchen", "bathroom", "toilet", "office", "utility"), blind, solid=False),
+    Kind(
+        "roller_blind",
+        _rooms("kitchen", "bathroom", "toilet", "bedroom", "utility"),
+        roller_blind,
+        solid=False,
+    ),
     Kind("radiator", _ANY, radiator),
     Kind("ceiling_lamp", _ANY, ceiling_lamp, solid=False),
     Kind("floor_lamp", _rooms("living", "bedroom", "office", "studio"), floor_lamp),

@@ -2,10 +2,9 @@
 
 import math
 
-from mjsim.houses.furniture import seats, storage, tables
+from mjsim.houses.furniture import decoration, seats, storage, tables
 from mjsim.houses.furniture.builder import Builder, numbers
-from mjsim.houses.furniture.decoration import carpet, painting
-from mjsim.houses.furniture.piece import Kind, Picture, Piece, group
+from mjsim.houses.furniture.piece import Kind, Piece, group
 from mjsim.houses.furniture.seats import _rooms
 
 
@@ -17,7 +16,7 @@ def television(b: Builder) -> Piece:
     b.box("black", 0.5, (0.06, 0.26), (h, h + 0.012), seen=True)
     b.box("black", 0.08, (y - 0.02, y + 0.02), (h + 0.012, h + 0.08), seen=True)
     b.box("black", w, (y - 0.02, y + 0.02), (h + 0.07, h + 0.07 + tall))
-    b.image(b.own(painting(b.rng, b.look)), w - 0.03, (h + 0.085, h + 0.055 + tall), y + 0.024)
+    b.image(b.own(decoration.painting(b.rng, b.look)), w - 0.03, (h + 0.085, h + 0.055 + tall), y + 0.024)
     b.clutter(0.1, (0.12, 0.3), h, 1, stand.size[0] / 2 - 0.16 if w + 0.4 < stand.size[0] else 0.0)
     if w + 0.4 >= stand.size[0]:
         b.geoms = b.geoms[:4]
@@ -45,14 +44,11 @@ def lounge(b: Builder) -> Piece:
             x = -side * 0.46
         if y - deep > 0.7:
             members.append((table, x, y, 0.0))
-    rug: str = ""
-    pictures: tuple[Picture, ...] = ()
     if b.smaller < 3 and b.chance(0.85):
-        pictures = (carpet(b.rng, b.look),)
-        half = (min(b.pick(1.0, 1.2), sofa.size[0] / 2), min(gap / 2 - 0.1, b.pick(0.7, 0.85)), 0.0015)
-        middle = numbers(0, (deep + front) / 2 + 0.25, 0.002)
-        rug = f'<geom class="decor" material="{pictures[0].name}" pos="{middle}" size="{numbers(*half)}"/>'
-    return group(b.kind, members, use=((-0.4, deep, 0.4, deep + 0.6),), geoms=rug, pictures=pictures)
+        wide, half = min(b.pick(2.0, 2.4), sofa.size[0]), min(gap / 2 - 0.1, b.pick(0.7, 0.85))
+        rug = Builder("rug", b.rng, b.look, fit=(wide, 2 * half, 0.0))
+        members.append((decoration.rug(rug), 0.0, (deep + front) / 2 + 0.25 - half, 0.0))
+    return group(b.kind, members, use=((-0.4, deep, 0.4, deep + 0.6),))
 
 
 def piano(b: Builder) -> Piece:

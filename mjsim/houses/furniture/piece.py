@@ -61,7 +61,7 @@ class Piece:
     seats: int = 0  # how many can sit
     mounts: tuple[Mount, ...] = ()  # for bins
     pictures: tuple[Picture, ...] = ()  # its own textures
-    members: tuple["Member", ...] = ()  # of a group, whose own geoms come on top
+    members: tuple["Member", ...] = ()  # of a group, which has no geoms of its own
 
 
 Member = tuple[Piece, float, float, float]  # a piece, and where in its group: x, y, m, and yaw
@@ -114,8 +114,6 @@ def group(
     use: tuple[Spot, ...] | None = None,
     stands: str = "wall",
     seats: int | None = None,
-    geoms: str = "",
-    pictures: tuple[Picture, ...] = (),
 ) -> Piece:
     """Pieces that belong together as one piece, moved so that its back edge is at y = 0 and its middle at x = 0.
 
@@ -137,14 +135,13 @@ def group(
     return Piece(
         kind,
         (right - left, front - back, max(p.size[2] for p, *_ in members)),
-        f'<body pos="{dx:.4g} {dy:.4g} 0">{geoms}</body>' if geoms else "",
+        "",
         tuple(Part(moved(part.spot, dx, dy, 0), part.top) for part in parts),
         tuple(moved(spot, dx, dy, 0) for spot in use),
         stands,
         sum(p.seats for p, *_ in members) if seats is None else seats,
         tuple(mounts),
-        pictures,
-        tuple((p, x + dx, y + dy, yaw) for p, x, y, yaw in members),
+        members=tuple((p, x + dx, y + dy, yaw) for p, x, y, yaw in members),
     )
 
 

@@ -69,21 +69,21 @@ def round_table(b: Builder) -> Piece:
     return b.piece((2 * r, 2 * r, 1.1), stands="free")
 
 
-def _pendant(b: Builder, x: float, y: float) -> str:
-    """A lamp over a table, as MJCF."""
-    form, low = b.pick("dome", "drum", "balls"), 1.72
-    lamp = Builder("pendant", b.rng, b.look)
+def pendant_lamp(b: Builder) -> Piece:
+    """Hangs over a table: a dome, a drum, or two globes."""
+    form, low, y = b.pick("dome", "drum", "balls"), 1.72, 0.3
     paint = b.pick(*b.look.accents, "white", "black")
-    for u in (-0.25, 0.25) if form == "balls" else (0.0,):
-        lamp.post("black", x + u, y, (low + 0.1, 2.58), 0.006)
-        if form == "dome":
-            lamp.soft(paint, (x, y, low + 0.12), (0.24, 0.24, 0.1))
-            lamp.soft("bulb", (x, y, low + 0.05), (0.09, 0.09, 0.05))
-        elif form == "drum":
-            lamp.post("shade", x, y, (low, low + 0.22), 0.22)
-        else:
-            lamp.soft("bulb", (x + u, y, low + 0.1), (0.11, 0.11, 0.11))
-    return "".join(lamp.geoms).replace('class="decor"', 'class="lamp"')
+    for x in (-0.25, 0.25) if form == "balls" else (0.0,):
+        b.post("black", x, y, (low + 0.1, 2.58), 0.006)
+        if form == "balls":
+            b.soft("bulb", (x, y, low + 0.1), (0.11, 0.11, 0.11))
+    if form == "dome":
+        b.soft(paint, (0, y, low + 0.12), (0.24, 0.24, 0.1))
+        b.soft("bulb", (0, y, low + 0.05), (0.09, 0.09, 0.05))
+    elif form == "drum":
+        b.post("shade", 0, y, (low, low + 0.22), 0.22)
+    b.on_ceiling()
+    return b.piece((0.8, 0.6, 2.6), parts=(), stands="ceiling")
 
 
 def dining(b: Builder) -> Piece:
@@ -114,9 +114,9 @@ def dining(b: Builder) -> Piece:
                 members.append((chair(), x, -out, 0.0))
         if (w >= 1.5 and b.chance(0.5)) or b.smaller:
             members += [(chair(), side * (w / 2 + out), d / 2, side * math.pi / 2) for side in (-1, 1)]
-    middle = d / 2
-    lamp = _pendant(b, 0.0, middle) if b.chance(0.7) else ""
-    return group(b.kind, members, use=(), stands="wall" if against else "free", geoms=lamp)
+    if b.chance(0.7):
+        members.append((pendant_lamp(Builder("pendant_lamp", b.rng, b.look)), 0.0, d / 2 - 0.3, 0.0))
+    return group(b.kind, members, use=(), stands="wall" if against else "free")
 
 
 def coffee_table(b: Builder) -> Piece:
@@ -268,6 +268,7 @@ KINDS = (
     Kind("dining", _rooms("dining", "kitchen", "living", "studio"), dining, frozenset({"table", "seat"})),
     Kind("table", _rooms("dining", "kitchen"), table),
     Kind("round_table", _rooms("dining", "kitchen"), round_table),
+    Kind("pendant_lamp", _rooms("dining", "kitchen", "living"), pendant_lamp, solid=False),
     Kind("coffee_table", _rooms("living"), coffee_table),
     Kind("side_table", _rooms("living", "bedroom", "office"), side_table),
     Kind("console", _rooms("hall", "living", "dining"), console),
