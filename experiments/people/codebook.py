@@ -22,6 +22,7 @@ OWN = {
     "reason": "Why a trial or the phase ended.",
     "item": "Name of what was asked.",
     "answer": "The answer; scales are numbers from 1 on, several choices are joined by semicolons.",
+    "inattentive": "How many items of the survey with a right answer were answered otherwise.",
     "text": "What the person wrote freely; a text that a spreadsheet would compute begins with an apostrophe.",
 }
 

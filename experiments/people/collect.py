@@ -142,6 +142,9 @@ def _answers(items: Sequence[Item], answers: Sequence[Answer]) -> dict[str, Any]
             columns[f"answer_{item.name}"] = None if value is None else "; ".join(value)
         elif item.kind not in FREE:
             columns[f"answer_{item.name}"] = value
+    if checks := [item for item in items if item.right is not None]:
+        final = {answer.item: answer.value for answer in answers if answer.final and answer.phase == SURVEY}
+        columns["inattentive"] = sum(item.is_wrong(final.get(item.name)) for item in checks)
     for (phase, name), value in given.items():
         if isinstance(value, int | float | bool):
             columns[f"{phase}_{name}"] = value

@@ -1,6 +1,6 @@
 """What a participant is asked: items of a form, as files of texts describe them."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -39,6 +39,10 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"the right answer {self.right!r} of item {self.name!r} is none of its choices")
         if self.low > self.high:
             raise ValueError(f"item {self.name!r} has low {self.low} above high {self.high}")
+
+    def is_wrong(self, answer: Any) -> bool:
+        """Whether there is a right answer, and this is another one, or none."""
+        return self.right is not None and answer != self.right
 
     def example(self) -> str:
         """An answer that is accepted, as a form sends it; the right one where there is one."""

@@ -92,6 +92,8 @@ class Limits(_Table, frozen=True):
     abandoned_after: Seconds = 1800.0  # without a sign of the person, after which the assignment is released
     timed_out_after: Seconds = 14400.0  # without a sign of the person, after which the participation ends
     attempts: Count = 3  # at the comprehension check
+    # how many items of the survey with a right answer may be answered wrongly; None screens nobody out
+    inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
     keep_days: Count | None = None  # after which personal data are deleted
 
     def __post_init__(self) -> None:
@@ -138,6 +140,8 @@ class Settings(_Table, frozen=True):
             )
         if unknown := [name for name in (*self.minimum, *self.optional) if name not in self.phases]:
             raise ValueError(f"minimum or optional names {unknown[0]!r}, which is not among the phases")
+        if ended := [name for name in self.minimum if name in (*PLAYED, COMPLETION)]:
+            raise ValueError(f"minimum names {ended[0]!r}, which no time ends; leave it out")
         if played := [name for name in self.optional if name in (CONSENT, TASK, COMPLETION)]:
             raise ValueError(f"{played[0]} cannot be optional")
 

@@ -19,7 +19,7 @@ class Comprehension(FormPhase):
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return read
-        wrong = [i.name for i in self.items if i.right is not None and read.answers.get(i.name) != i.right]
+        wrong = any(item.is_wrong(read.answers.get(item.name)) for item in self.items)
         answers = dict(read.answers)
         if not wrong:
             return Done(answers)

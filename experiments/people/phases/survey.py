@@ -1,9 +1,24 @@
-"""The survey: items on a scale, demographics, free text (PAPER section 6)."""
+"""The survey: items on a scale, demographics, free text (PAPER section 6), and checks of attention."""
 
-from experiments.people.phases.base import FormPhase
+import dataclasses
+
+from experiments.people.phases.base import Again, Done, FormData, FormPhase, Visitor
 from experiments.people.study_file import SURVEY, Study
 
 
-def build(study: Study) -> FormPhase:
+class Survey(FormPhase):
+    """Items; those with a right answer show whether they were read."""
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """The answers; whoever gives too many wrong ones is screened out where the study file says so."""
+        read = super().read(visitor, sent)
+        allowed = self._study.settings.limits.inattentive
+        if isinstance(read, Again) or allowed is None:
+            return read
+        wrong = sum(item.is_wrong(read.answers.get(item.name)) for item in self.items)
+        return dataclasses.replace(read, outcome="screened_out") if wrong > allowed else read
+
+
+def build(study: Study) -> Survey:
     """The phase."""
-    return FormPhase(study, SURVEY)
+    return Survey(study, SURVEY)

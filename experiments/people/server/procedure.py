@@ -78,12 +78,10 @@ class Procedure:
             return None
         if phase == self._names[-1]:
             return None
-        if now.wait > 0.0:
+        skipped = bool(sent.get("skip")) and phase in settings.optional
+        if now.wait > 0.0 and not skipped:
             return Again(self.study.texts["common"]["too_early"])
-        if sent.get("skip") and phase in settings.optional:
-            read: Done | Again = Done({"skipped": True})
-        else:
-            read = current.read(now.visitor, sent)
+        read = Done({"skipped": True}) if skipped else current.read(now.visitor, sent)
         attempts = {ATTEMPTS: now.visitor.attempts + 1}
         if isinstance(read, Again):
             await self.store.save_answers(now.person.id, phase, attempts)

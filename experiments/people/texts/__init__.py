@@ -109,6 +109,12 @@ def _section(name: str, table: dict[str, Any], values: Mapping[str, str], path: 
         raise ConfigError(f"{where}[{name}]: {error}") from error
     if len({item.name for item in form.item}) < len(form.item):
         raise ConfigError(f"{where}[{name}] has two items of one name")
+    for item in form.item:
+        points = range(1, len(form.scale or ()) + 1)
+        if item.kind == "scale" and item.right is not None and item.right not in points:
+            raise ConfigError(
+                f"{where}[{name}] item {item.name}: right is {item.right!r}, no point of the scale"
+            )
     filled = {key: _filled(text, values, f"{where}[{name}] {key}") for key, text in words.items()}
     return Section(filled, tuple(form.item), tuple(form.scale or ()))
 

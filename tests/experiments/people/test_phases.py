@@ -106,3 +106,52 @@ def test_own_phases_are_named_by_module_and_attribute():
 
 def _with_phases(settings, name):
     return msgspec.structs.replace(settings, phases=("task", name, "completion"), minimum={})
+
+
+CHECKED = """
+[survey]
+[[survey.item]]
+name = "{name}"
+kind = "scale"
+text = "Please choose 'disagree'."
+right = {right}
+[[survey.item]]
+name = "second"
+kind = "choice"
+text = "Which one is a colour?"
+choices = ["red", "seven"]
+right = "red"
+required = false
+"""
+
+
+def checked_survey(folder, right=2, **limits):
+    """The survey of a study with two checks of attention."""
+    (folder / "texts.toml").write_text(CHECKED.format(name="first", right=right))
+    text = (FOLDER / "paper.toml").read_text().replace("minutes = 25", 'minutes = 25\ntexts = "texts.toml"')
+    entries = "".join(f"{name} = {value}\n" for name, value in limits.items())
+    (folder / "study.toml").write_text(f"{text}\n[study.limits]\n{entries}")
+    study = read_people_study(folder / "study.toml")
+    return next(phase for phase in phases_of_study(study) if phase.name == "survey")
+
+
+@pytest.mark.parametrize(
+    ("limits", "answers", "outcome"),
+    [
+        ({}, {"first": "5", "second": "seven"}, "next"),
+        ({"inattentive": 1}, {"first": "2", "second": "red"}, "next"),
+        ({"inattentive": 1}, {"first": "5", "second": "red"}, "next"),
+        ({"inattentive": 1}, {"first": "5"}, "screened_out"),
+        ({"inattentive": 0}, {"first": "2", "second": "seven"}, "screened_out"),
+    ],
+)
+def test_who_does_not_read_is_noted_or_screened_out(tmp_path, limits, answers, outcome):
+    survey = checked_survey(tmp_path, **limits)
+    assert survey.read(NOBODY, sent(**answers)).outcome == outcome
+    assert isinstance(survey.read(NOBODY, sent()), Again)
+    assert survey.texts["failed_title"] and survey.texts["failed"]
+
+
+def test_a_right_answer_is_a_point_of_the_scale(tmp_path):
+    with pytest.raises(ConfigError, match=r"\[survey\] item first: right is 6"):
+        checked_survey(tmp_path, right=6)

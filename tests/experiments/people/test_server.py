@@ -186,6 +186,44 @@ def test_minimum_times_hold(tmp_path, study):
         assert phase(client, link) == "consent"
 
 
+def test_who_may_skip_a_phase_need_not_wait(tmp_path, study):
+    settings = msgspec.structs.replace(study.settings, minimum={"story": 60}, optional=("device", "story"))
+    with serving(tmp_path, dataclasses.replace(study, settings=settings)) as client:
+        link = begin(client)
+        assert 'name="skip"' not in client.get(link).text
+        post(client, link, phase="consent", skip="yes", agree="")
+        assert phase(client, link) == "consent", "consent cannot be skipped"
+        post(client, link, phase="consent", agree="yes")
+        for name, following in (("device", "story"), ("story", "flythrough")):
+            assert 'name="skip"' in client.get(link).text
+            post(client, link, phase=name, skip="yes")
+            assert phase(client, link) == following
+
+
+def test_pages_without_javascript_say_so(client, study):
+    link, names = begin(client), study.settings.phases[:-1]
+    assert study.texts["common"]["needs_script"] in client.get("/").text
+    for name in names:
+        go_to(client, link, study, name)
+        text = client.get(link).text
+        assert re.search(r"<noscript>.*?JavaScript.*?</noscript>", text, re.S), name
+
+
+def test_who_does_not_read_the_survey_ends_with_a_clear_page(tmp_path, study):
+    survey = study.texts["survey"]
+    first, *others = survey.items
+    checked = msgspec.structs.replace(survey, items=(msgspec.structs.replace(first, right=1), *others))
+    limits = msgspec.structs.replace(study.settings.limits, inattentive=0)
+    settings = msgspec.structs.replace(study.settings, limits=limits)
+    strict = dataclasses.replace(study, settings=settings, texts={**study.texts, "survey": checked})
+    with serving(tmp_path, strict) as client:
+        link = begin(client)
+        go_to(client, link, strict, "survey")
+        post(client, link, phase="survey", **survey_answers(strict))
+        assert "to see whether they were read" in client.get(link).text
+        assert phase(client, link) is None
+
+
 def test_leaving_deletes_what_was_played_if_wanted(client, study, tmp_path):
     for data, left in (("keep", 1), ("delete", 0)):
         link = begin(client)
