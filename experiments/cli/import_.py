@@ -1,23 +1,33 @@
-"""`mjsim import`: objects from mesh files."""
+"""`mjsim import`: objects from mesh files, houses from scenes of other simulators."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from experiments.cli.check import UNUSABLE
 from experiments.cli.options import HelpFormatter
 from mjsim.importing import require_extra
-from mjsim.importing.values import AXES, UNITS, ImportOptions
+from mjsim.importing.values import AXES, UNITS, ImportDecision, ImportOptions
 
 DESCRIPTION = """\
 Make an object of a mesh file: in metres and z up, closed, in convex parts, with mass, grips and a look, resting as it
 would on a floor. It joins a category of a house in DIR/catalogue.toml, which every command takes as --house. What was
 decided is printed and kept in DIR/NAME/report.json; DIR/NAME/preview.png shows the result (docs/import.md)."""
 
+HOUSE = """\
+Make a house of a scene of another simulator: an SDF world (Gazebo), an MJCF scene, a glTF, GLB or OBJ scene, or a
+scene_instance.json of Habitat. Its parts become convex, its outer walls are closed, doors stand open, rooms are found,
+and bins are put against walls. Then it is checked as by `mjsim check`; every command takes DIR as --house. What was
+decided is printed and kept in DIR/report.json; DIR/preview.png shows the house from above (docs/import.md)."""
+
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     # `help` lets completion list it; the overview has its own line.
-    top = commands.add_parser("import", help=None, description="Make objects from mesh files.")
+    top = commands.add_parser(
+        "import", help=None, description="Make objects and houses from files of others."
+    )
     kinds = top.add_subparsers(title="what to import", metavar="KIND", required=True)
     parser = kinds.add_parser(
         "object", help="an object from a mesh", description=DESCRIPTION, formatter_class=HelpFormatter
@@ -43,14 +53,51 @@ def add_parser(commands: Any) -> None:
     weight.add_argument(
         "--density", type=float, metavar="D", help="kg/m3 (default: 400, and a mass that is allowed)"
     )
+    _add_house(kinds)
+
+
+def _add_house(kinds: Any) -> None:
+    parser = kinds.add_parser(
+        "house", help="a house from a scene", description=HOUSE, formatter_class=HelpFormatter
+    )
+    parser.set_defaults(run=run_house)
+    add = parser.add_argument
+    add(
+        "source",
+        type=Path,
+        metavar="SOURCE",
+        help=".world, .sdf, .xml, .glb, .gltf, .obj or .scene_instance.json",
+    )
+    add("--out", type=Path, required=True, metavar="DIR", help="folder of the house, new")
+    add("--name", metavar="NAME", help="shown to the person (default: the name of the file)")
+    add("--force", action="store_true", help="replace a house that was imported before")
+    add(
+        "--rooms",
+        type=Path,
+        metavar="FILE.toml",
+        help="rooms as rectangles (default: those of the source, else parted where the way is narrow)",
+    )
+    add(
+        "--models",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="DIR",
+        help="folders of the models that it names",
+    )
+    add("--skip-missing", action="store_true", help="leave out files that are not there, instead of refusing")
+    shape = parser.add_argument_group("what the file does not say")
+    shape.add_argument("--units", choices=tuple(UNITS), help="default: m, of OBJ guessed from the size")
+    shape.add_argument("--up", choices=AXES, help="default: y in glTF, of OBJ guessed from the shape")
+    shape.add_argument("--scale", type=float, default=1.0, metavar="F", help="factor on top of the unit")
+    shape.add_argument(
+        "--floor", type=float, metavar="M", help="height of the floor (default: the lowest large one)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Import, report."""
+    """Import an object, report."""
     require_extra()  # then trimesh, CoACD and OpenGL are loaded: other commands start fast
-    from rich.console import Console
-    from rich.table import Table
-
     from mjsim.importing.house_extension import Entry, HouseExtension
     from mjsim.importing.mesh_import import add_mesh
 
@@ -58,9 +105,45 @@ def run(arguments: argparse.Namespace) -> int:
     options = ImportOptions(arguments.units, arguments.up, arguments.scale, arguments.mass, arguments.density)
     extension = HouseExtension(arguments.out, arguments.house)
     decisions = add_mesh(arguments.file, extension, entry, options, force=arguments.force)
-    table = Table("", entry.label, "why")
+    _print(entry.label, decisions)
+    print(f"{extension.folder / entry.key} (mjsim run --house {extension.path} samples it)")
+    return 0
+
+
+def run_house(arguments: argparse.Namespace) -> int:
+    """Import a house, report, check."""
+    require_extra()
+    from mjsim.importing.houses.house_import import import_house
+    from mjsim.importing.houses.values import HouseOptions
+
+    options = HouseOptions(
+        arguments.units,
+        arguments.up,
+        arguments.scale,
+        arguments.floor,
+        arguments.rooms,
+        tuple(arguments.models),
+        arguments.skip_missing,
+    )
+    out = arguments.out
+    decisions, report = import_house(
+        arguments.source, out, options, label=arguments.name, force=arguments.force
+    )
+    _print(out.name, decisions)
+    for finding in report.findings:
+        print(finding)
+    print(
+        f"{out} (mjsim run --house {out} samples it)" if report.usable else f"{out} cannot be used as it is"
+    )
+    return 0 if report.usable else UNUSABLE
+
+
+def _print(title: str, decisions: Sequence[ImportDecision]) -> None:
+    """The table of what was decided, and why."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("", title, "why")
     for decision in decisions:
         table.add_row(decision.what, decision.choice, decision.reason)
     Console().print(table)
-    print(f"{extension.folder / entry.key} (mjsim run --house {extension.path} samples it)")
-    return 0

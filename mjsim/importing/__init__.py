@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 from mjsim.errors import AssetError
 
-EXTRA = ("coacd", "fast_simplification", "manifold3d", "networkx", "PIL", "trimesh")
+EXTRA = ("coacd", "collada", "fast_simplification", "manifold3d", "networkx", "PIL", "trimesh")
 
 
 def require_extra() -> None:

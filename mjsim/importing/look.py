@@ -44,7 +44,7 @@ def make_look(surface: Surface, mesh: trimesh.Trimesh) -> Look:
     coarse = coarse.copy()
     coarse.fix_normals(multibody=True)
     vertices, faces = np.asarray(coarse.vertices), np.asarray(coarse.faces)
-    normals = _corner_normals(vertices, faces)
+    normals = corner_normals(vertices, faces)
     colour, uv, picture = _painted(surface, vertices[faces])
     if not closed:
         faces = np.concatenate((faces, faces[:, ::-1] + len(vertices)))
@@ -91,7 +91,7 @@ def _positions(surface: Surface, triangles: Ints, weights: Floats) -> Floats:
     return np.concatenate((points, _FACING * _normals(surface.corners)[triangles]), axis=1)
 
 
-def _corner_normals(vertices: Floats, faces: Ints) -> Floats:
+def corner_normals(vertices: Floats, faces: Ints) -> Floats:
     """Normal at every corner of every face, shape (m, 3, 3): mean of the faces there that bend less than `_CREASE`."""
     corners = vertices[faces]
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -47,7 +47,7 @@ _MJCF = """\
 
 def write_model(item: ImportedObject, folder: Path, *, key: str, label: str, source: str) -> Path:
     """Write an object into an existing folder; returns its MJCF file."""
-    (folder / "look.obj").write_text("\n".join(_look_lines(item.look)) + "\n", encoding="utf-8")
+    (folder / "look.obj").write_text("\n".join(look_lines(item.look)) + "\n", encoding="utf-8")
     if item.look.picture is not None:
         write_png(folder / "look.png", item.look.picture)
     for number, points in enumerate(item.hulls):
@@ -98,7 +98,8 @@ def _geoms(item: ImportedObject, key: str) -> Iterator[str]:
         yield f'<geom class="part" type="mesh" mesh="{key}_part_{number}" mass="{mass:.6g}"/>'
 
 
-def _look_lines(look: Look) -> Iterator[str]:
+def look_lines(look: Look) -> Iterator[str]:
+    """Lines of an OBJ file."""
     yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.round(look.vertices, 6) + 0.0)
     columns = [look.faces + 1]
     if look.uv is not None:

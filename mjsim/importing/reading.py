@@ -21,7 +21,7 @@ MAX_TRIANGLES = 5_000_000
 PLAIN = (0.74, 0.72, 0.68)  # RGB of what has no colour
 
 
-class _Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
+class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
     """Files that a mesh names, such as its materials, if they are files."""
 
     def absolute(self, name: str) -> Path:
@@ -34,16 +34,16 @@ class _Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
 
 def read_surface(path: Path) -> Surface:
     """All triangles of a mesh file, in its own unit and axes; `AssetError` where there are none that can be read."""
-    _check_file(path)
-    with _parsing(path):
-        geometries = trimesh.load_scene(path, process=False, resolver=_Beside(path)).dump()
+    check_mesh_file(path)
+    with parsing(path):
+        geometries = trimesh.load_scene(path, process=False, resolver=Beside(path)).dump()
     meshes = [g for g in geometries if isinstance(g, trimesh.Trimesh) and len(g.faces)]
     if not meshes:
         raise AssetError(f"{path} {_what_it_has(geometries)}; export it as a mesh of triangles")
     if (count := sum(len(mesh.faces) for mesh in meshes)) > MAX_TRIANGLES:
         raise AssetError(f"{path} has {count} triangles; reduce it to {MAX_TRIANGLES} or fewer")
-    with _parsing(path):
-        return joined([_surface(mesh, linear=path.suffix.lower() == ".glb") for mesh in meshes])
+    with parsing(path):
+        return joined([surface_of(mesh, linear=path.suffix.lower() == ".glb") for mesh in meshes])
 
 
 def missing_colours(path: Path) -> tuple[str, ...]:
@@ -55,9 +55,10 @@ def missing_colours(path: Path) -> tuple[str, ...]:
     return tuple(name for name in dict.fromkeys([*named, *pictures]) if not (path.parent / name).is_file())
 
 
-def _check_file(path: Path) -> None:
-    if path.suffix.lower() not in SUFFIXES:
-        raise AssetError(f"{path} is not a {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]} file; convert it")
+def check_mesh_file(path: Path, suffixes: tuple[str, ...] = SUFFIXES) -> None:
+    """`AssetError` unless a file of such a kind is there, neither empty nor too large."""
+    if path.suffix.lower() not in suffixes:
+        raise AssetError(f"{path} is not a {', '.join(suffixes[:-1])} or {suffixes[-1]} file; convert it")
     if not path.is_file():
         raise AssetError(f"there is no file {path}")
     size = path.stat().st_size
@@ -68,7 +69,7 @@ def _check_file(path: Path) -> None:
 
 
 @contextmanager
-def _parsing(path: Path) -> Iterator[None]:
+def parsing(path: Path) -> Iterator[None]:
     """Turn whatever a parser raises on a damaged file into an `AssetError`, and keep its warnings off the terminal."""
     log = logging.getLogger("trimesh")
     before = log.level
@@ -101,8 +102,12 @@ def _named(path: Path, keyword: str) -> list[str]:
         return [found[-1] for found in words if len(found) > 1]
 
 
-def _surface(mesh: trimesh.Trimesh, *, linear: bool) -> Surface:
-    """One mesh of a file; `linear` if its plain colours are linear, as in glTF."""
+def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) -> Surface:
+    """One mesh of a file; `linear` if its plain colours are linear, as in glTF.
+
+    Args:
+        side: Longest side of its picture, px, which is reduced to that; None to leave it as it is.
+    """
     count = len(mesh.faces)
     corners = np.asarray(mesh.triangles, np.float64)
     colours, uv = np.ones((count, 3, 3)), np.zeros((count, 3, 2))
@@ -110,7 +115,7 @@ def _surface(mesh: trimesh.Trimesh, *, linear: bool) -> Surface:
     picture = None
     visual = mesh.visual
     if visual.kind == "texture":
-        colours[:], picture = _material(visual.material)
+        colours[:], picture = _material(visual.material, side)
         if visual.uv is None or len(visual.uv) != len(mesh.vertices):
             picture = None
         else:
@@ -126,12 +131,15 @@ def _surface(mesh: trimesh.Trimesh, *, linear: bool) -> Surface:
     return Surface(corners, colours, uv, number, () if picture is None else (picture,))
 
 
-def _material(material: Any) -> tuple[Floats, NDArray[np.float64] | None]:
-    """Plain colour (3,) and picture (height, width, 3) of a material, RGB from 0 to 1."""
+def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float64] | None]:
+    """Plain colour (3,) and picture (height, width, 3), reduced to a side, px, of a material, RGB from 0 to 1."""
     if isinstance(material, trimesh.visual.material.PBRMaterial):
         factor, picture = material.baseColorFactor, material.baseColorTexture
     else:
         factor, picture = getattr(material, "diffuse", None), getattr(material, "image", None)
+    if picture is not None and side is not None:
+        picture = picture.copy()
+        picture.thumbnail((side, side))
     pixels = None if picture is None else np.asarray(picture.convert("RGB"), np.float64) / 255
     if factor is None:
         return np.ones(3) if pixels is not None else np.array(PLAIN), pixels

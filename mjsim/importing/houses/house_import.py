@@ -1,0 +1,247 @@
+"""From a scene of another simulator to a house, with every decision on the way."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from trimesh.transformations import translation_matrix
+
+from mjsim.errors import AssetError, RenderError
+from mjsim.files import work_folder
+from mjsim.importing.houses.bins import place_bins
+from mjsim.importing.houses.look import make_looks
+from mjsim.importing.houses.plan import Plan, make_plan
+from mjsim.importing.houses.rooms import Rooms, find_rooms, read_rooms, words_of
+from mjsim.importing.houses.sdf import SUFFIXES as SDF
+from mjsim.importing.houses.sdf import read_sdf
+from mjsim.importing.houses.solids import LOW, Solids, make_solids
+from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, moved
+from mjsim.importing.houses.writer import ImportedHouse, write_house
+from mjsim.importing.model_writer import write_png
+from mjsim.importing.surface import Floats
+from mjsim.importing.values import ImportDecision
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.validation.object_rules import SIZE
+from mjsim.model.validation.report import Report, check_house_name
+
+REPORT, PICTURE = "report.json", "preview.png"
+_STOREY = 2.1  # m above a floor, from where on another floor is another storey
+_LEVEL = 0.4  # share of the largest level that a floor has at least
+_FLAT = 0.95  # cosine of the slope of a floor
+_FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself
+_DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # m: thickness at most, width and height of a door leaf
+
+
+def import_house(
+    source: Path, out: Path, options: HouseOptions, *, label: str | None = None, force: bool = False
+) -> tuple[tuple[ImportDecision, ...], Report]:
+    """Make a house of a scene, in a new folder; returns what was decided and the report of the check.
+
+    Raises:
+        AssetError: The scene cannot be read or is no house, or the folder is there already; nothing is written.
+    """
+    if out.exists() and not force:
+        raise AssetError(f"{out} is already there; choose another --out, or use --force to replace it")
+    if out.exists() and not (out / REPORT).is_file():
+        raise AssetError(f"{out} is not an imported house and is not replaced; choose another --out")
+    scene = read_scene(source, options)
+    try:
+        house, decisions = _converted(scene, source, options, label)
+    except AssetError as error:
+        raise AssetError(f"{source}: {error}") from error
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with work_folder(out.parent) as work:
+        new = work / "new"
+        new.mkdir()
+        path = write_house(house, new, Catalogue.load())
+        report = check_house_name(str(path))
+        if (note := _write_picture(path, new / PICTURE)) is not None:
+            decisions.append(note)
+        text = json.dumps([asdict(decision) for decision in decisions], indent=2, ensure_ascii=False)
+        (new / REPORT).write_text(text + "\n", encoding="utf-8")
+        if out.exists():
+            out.rename(work / "old")
+        new.rename(out)
+    return tuple(decisions), report
+
+
+def read_scene(source: Path, options: HouseOptions) -> SourceScene:
+    """Read a scene by the kind of its file; `AssetError` where it is of no known kind or cannot be read."""
+    if not source.is_file():
+        raise AssetError(f"there is no file {source}")
+    if source.suffix.lower() in SDF:
+        return read_sdf(source, options)
+    raise AssetError(f"{source} is no scene that can be read; give {', '.join(SDF)}")
+
+
+def _converted(
+    scene: SourceScene, source: Path, options: HouseOptions, label: str | None
+) -> tuple[ImportedHouse, list[ImportDecision]]:
+    level, ceiling = _levels(scene.pieces) if options.floor is None else (options.floor, np.inf)
+    pieces = moved(list(scene.pieces), translation_matrix([0, 0, -level]))
+    decisions = [
+        ImportDecision("source", source.name, f"{scene.kind}, {_counted(len(pieces), 'shape')}"),
+        ImportDecision(
+            "floor", f"z = {level:.3f} m", "the lowest large level area" if options.floor is None else "given"
+        ),
+    ]
+    decisions += [ImportDecision("left out", note, "") for note in scene.notes]
+    pieces, notes = _kept(pieces, ceiling - level)
+    decisions += notes
+    doors = [piece for piece in pieces if _is_door(piece)]
+    still = [piece for piece in pieces if not _is_door(piece)]
+    solids = make_solids(still)
+    floor = _floor_extent(still)
+    leaves = make_solids(doors)
+    plan = make_plan(solids.solids, leaves.solids, floor)
+    opened = {leaf.name for leaf in leaves.solids if _between_rooms(plan, leaf.outline)}
+    kept = [leaf for leaf in leaves.solids if leaf.name not in opened]
+    solids = Solids((*solids.solids, *kept), solids.boxes, solids.hulls, solids.voxels, solids.pitch)
+    plan = make_plan(solids.solids, [leaf for leaf in leaves.solids if leaf.name in opened], floor)
+    drawn = [piece for piece in pieces if piece.name not in opened]
+    given = read_rooms(options.rooms) if options.rooms is not None else scene.rooms
+    rooms = find_rooms(plan, given, drawn)
+    bins = place_bins(plan, rooms, Catalogue.load())
+    looks = make_looks(drawn, partial(plan.on, rooms.floor))
+    seen = _floor_share(drawn, plan, rooms)
+    name = label or source.stem.replace("_", " ").strip().capitalize()
+    house = ImportedHouse(name, source.name, solids.solids, looks, plan, rooms, bins, seen >= _FLOOR_SEEN)
+    triangles = sum(len(mesh.look.faces) for mesh in looks)
+    pictures = len({id(mesh.look.picture) for mesh in looks if mesh.look.picture is not None})
+    decisions += [
+        ImportDecision(
+            "doors", f"{len(opened)} open" if opened else "as they are", ", ".join(sorted(opened)[:6])
+        ),
+        ImportDecision(
+            "collision",
+            f"{_counted(len(solids.solids), 'convex geom')}",
+            f"{solids.boxes} boxes, {solids.hulls} hulls, {solids.voxels} boxes of {100 * solids.pitch:g} cm voxels",
+        ),
+        ImportDecision(
+            "outline",
+            "closed by its walls" if plan.enclosed else "a rectangle",
+            f"{plan.area:.0f} m2 can be walked on" if plan.enclosed else "no outer wall encloses a floor",
+        ),
+        ImportDecision("rooms", ", ".join(text for _, text in rooms.names), rooms.reason),
+        ImportDecision(
+            "bins", ", ".join(f"{b.key} in {b.room}" for b in bins), "against walls, ways stay open"
+        ),
+        ImportDecision("look", _counted(triangles, "triangle"), f"{len(looks)} meshes, {pictures} pictures"),
+        ImportDecision(
+            "drawn floor",
+            "of the source" if house.floor_seen else "added",
+            f"the source draws {100 * seen:.0f} % of it",
+        ),
+    ]
+    return house, decisions
+
+
+def _levels(pieces: Sequence[Piece]) -> tuple[float, float]:
+    """Height of the floor, and of the floor of the storey above it, m; infinite where there is none."""
+    corners = np.concatenate([p.surface.corners for p in pieces])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    area = np.linalg.norm(normals, axis=1)
+    flat = np.abs(normals[:, 2]) > _FLAT * np.maximum(area, 1e-12)
+    heights = corners[flat, :, 2].mean(axis=1)
+    if not len(heights):
+        raise AssetError("has no level surface; is it a house, and which way is up (--up)?")
+    bins = np.round(heights / 0.02).astype(int)
+    first = bins.min()
+    total = np.bincount(bins - first, area[flat])
+    wide = np.convolve(total, np.ones(3), mode="same")
+    levels = np.flatnonzero(wide >= _LEVEL * wide.max())
+    near = np.abs(bins - first - levels[0]) <= 1
+    weights = area[flat] * near
+    # The upper side of a floor slab is what one stands on.
+    group = levels[0]
+    while group + 1 in levels or group + 2 in levels or group + 3 in levels:
+        group += 1 if group + 1 in levels else 2 if group + 2 in levels else 3
+    near = np.abs(bins - first - group) <= 1
+    weights = area[flat] * near
+    floor = float(np.average(heights, weights=weights))
+    above = [(level + first) * 0.02 for level in levels if (level + first) * 0.02 > floor + _STOREY]
+    return floor, (min(above) if above else np.inf)
+
+
+def _kept(pieces: list[Piece], ceiling: float) -> tuple[list[Piece], list[ImportDecision]]:
+    """Pieces without what a hand carries, and without what is above a height, m, or below the floor."""
+    kept, loose = [], []
+    dropped = 0
+    for piece in pieces:
+        corners = piece.surface.corners
+        longest = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+        if piece.loose and longest <= SIZE[1]:
+            loose.append(piece.name)
+            continue
+        stays = (corners[:, :, 2].min(axis=1) <= ceiling + 0.05) & (corners[:, :, 2].max(axis=1) > -0.3)
+        dropped += int((~stays).sum())
+        if stays.any():
+            kept.append(Piece(piece.name, piece.surface.select(stays), piece.seen, piece.solid))
+    notes = []
+    if loose:
+        names = sorted(set(loose))
+        notes.append(
+            ImportDecision(
+                "loose things",
+                f"{len(names)} left out",
+                f"{', '.join(names[:6])}{', ...' if len(names) > 6 else ''}: use mjsim import object for those",
+            )
+        )
+    if dropped:
+        notes.append(
+            ImportDecision("other storeys", f"{_counted(dropped, 'triangle')} left out", "one storey is kept")
+        )
+    return kept, notes
+
+
+def _is_door(piece: Piece) -> bool:
+    """Whether a piece is a door leaf, by its name and shape."""
+    if not {"door", "doors"} & set(words_of(piece.name)):
+        return False
+    x, y, height = np.ptp(piece.surface.corners.reshape(-1, 3), axis=0)
+    thickness, (narrow, wide), (low, high) = _DOOR
+    return bool(min(x, y) <= thickness and narrow <= max(x, y) <= wide and low <= height <= high)
+
+
+def _between_rooms(plan: Plan, outline: Floats) -> bool:
+    """Whether both sides of a door are indoors."""
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    middle, across = (low + high) / 2, int(np.argmin(high - low))
+    offset = np.zeros(2)
+    offset[across] = 0.5
+    return all(plan.indoors[plan.cell(middle + sign * offset)] for sign in (-1, 1))
+
+
+def _floor_extent(pieces: Sequence[Piece]) -> tuple[Floats, Floats] | None:
+    """Corners of what lies at floor height, m, (2,) each."""
+    found = [p.surface.corners[np.abs(p.surface.corners[:, :, 2]).max(axis=1) < LOW] for p in pieces]
+    corners = np.concatenate([c.reshape(-1, 3) for c in found]) if found else np.empty((0, 3))
+    return (corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)) if len(corners) else None
+
+
+def _floor_share(pieces: Sequence[Piece], plan: Plan, rooms: Rooms) -> float:
+    """Share of the rooms' floor that the source draws."""
+    corners = np.concatenate([p.surface.corners for p in pieces if p.seen] or [np.empty((0, 3, 3))])
+    low = corners[np.abs(corners[:, :, 2]).max(axis=1) < LOW]
+    here = rooms.labels > 0
+    return float((plan.covered(low[:, :, :2]) & here).sum() / max(here.sum(), 1))
+
+
+def _write_picture(catalogue: Path, out: Path) -> ImportDecision | None:
+    """Draw the house from above; without OpenGL there is no picture, and the note says so."""
+    from mjsim.model.house import compiled_house
+    from mjsim.render.floorplan import render_house_map
+
+    loaded = Catalogue.load(str(catalogue))
+    try:
+        write_png(out, render_house_map(loaded, compiled_house(loaded).rooms.bounds, 60.0)[..., :3])
+    except (RenderError, AssetError) as error:
+        return ImportDecision("picture", "none", str(error))
+    return None
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number:,} {what}{'' if number == 1 else 's'}"

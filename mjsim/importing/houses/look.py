@@ -1,0 +1,117 @@
+"""What is drawn of a scene: meshes of one material each, with their pictures, within a budget of triangles."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.spatial
+import trimesh
+
+from mjsim.importing.houses.plan import Mask
+from mjsim.importing.houses.values import Piece
+from mjsim.importing.look import Look, corner_normals
+from mjsim.importing.solid import is_closed
+from mjsim.importing.surface import Floats, Surface, cleaned, joined
+
+BUDGET = 150_000  # triangles of a house
+_LEAST = 100  # triangles that every mesh keeps
+_SMALL, _FEW = 0.3, 1000  # m; triangles that are kept of smaller things
+CEILING = 2.2  # m; what is above is left out of views from above
+_SAME = 8  # of 255, colours that differ by less are one
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnMesh:
+    """A mesh of one material."""
+
+    name: str  # of its piece
+    look: Look
+    high: bool  # whether it is above `CEILING` and not a wall
+
+
+def make_looks(pieces: Iterable[Piece], over_floor: Callable[[Floats], Mask]) -> tuple[DrawnMesh, ...]:
+    """Meshes of all that is seen; `over_floor` tells points (k, 2), m, over rooms from those over walls."""
+    parts = []
+    for name, surface in _by_name(pieces):
+        surface, _ = cleaned(surface)
+        high = (surface.corners[:, :, 2].min(axis=1) >= CEILING) & over_floor(
+            surface.corners.mean(axis=1)[:, :2]
+        )
+        for rows, is_high in ((~high, False), (high, True)):
+            if rows.any():
+                parts.append((name, surface.select(rows), is_high))
+    materials = [(name, one, high) for name, surface, high in parts for one in _by_material(surface)]
+    limit = max((len(surface) for _, surface, _ in materials), default=0)
+    while sum(min(len(surface), limit) for _, surface, _ in materials) > BUDGET and limit > _LEAST:
+        limit = int(limit * 0.8)
+    found = []
+    for name, surface, high in materials:
+        small = np.ptp(surface.corners.reshape(-1, 3), axis=0).max() < _SMALL
+        found.append(DrawnMesh(name, _look(_reduced(surface, _FEW if small else limit)), high))
+    return tuple(found)
+
+
+def picture_key(look: Look) -> str:
+    """A name for the picture of a look, the same for equal ones."""
+    return "" if look.picture is None else hashlib.sha256(look.picture.tobytes()).hexdigest()[:12]
+
+
+def _by_name(pieces: Iterable[Piece]) -> Iterator[tuple[str, Surface]]:
+    """Everything seen of each name, as one surface."""
+    groups: dict[str, list[Surface]] = {}
+    for piece in pieces:
+        if piece.seen:
+            groups.setdefault(piece.name, []).append(piece.surface)
+    for name, surfaces in groups.items():
+        yield name, joined(surfaces)
+
+
+def _by_material(surface: Surface) -> Iterator[Surface]:
+    """Parts of one picture, or of one colour."""
+    colours = np.round(surface.colours.mean(axis=1) * 255 / _SAME).astype(int)
+    keys = np.column_stack((surface.image, colours))
+    kinds, number = np.unique(keys, axis=0, return_inverse=True)
+    for kind in range(len(kinds)):
+        yield surface.select(number.ravel() == kind)
+
+
+def _reduced(surface: Surface, count: int) -> Surface:
+    """A surface of one material with about so many triangles at most; each takes the place in the picture of the
+    nearest one that it replaces."""
+    if len(surface) <= count:
+        return surface
+    mesh = surface.mesh()
+    coarse = mesh.simplify_quadric_decimation(face_count=count)
+    if not 0 < len(coarse.faces) < len(surface):
+        return surface
+    corners = np.asarray(coarse.triangles, np.float64)
+    nearest = scipy.spatial.cKDTree(surface.corners.mean(axis=1)).query(corners.mean(axis=1))[1]
+    before = surface.corners[nearest]
+    weights = trimesh.triangles.points_to_barycentric(np.repeat(before, 3, axis=0), corners.reshape(-1, 3))
+    weights = np.clip(np.nan_to_num(weights, nan=1 / 3), -1.0, 2.0).reshape(-1, 3, 3)
+    uv = np.einsum("fkc,fcd->fkd", weights, surface.uv[nearest])
+    return replace(surface.select(nearest), corners=corners, uv=uv)
+
+
+def _look(surface: Surface) -> Look:
+    mesh = surface.mesh()
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    normals = corner_normals(vertices, faces)
+    image = int(surface.image[0])
+    picture = None if image < 0 else np.round(255 * surface.images[image]).astype(np.uint8)
+    uv: Floats | None = None if picture is None else surface.uv
+    red, green, blue = np.clip(surface.colours.mean(axis=(0, 1)), 0.0, 1.0).round(4).tolist()
+    look = Look(vertices, faces, normals, uv, picture, (red, green, blue), doubled=False)
+    return look if is_closed(mesh) else both_sides(look)
+
+
+def both_sides(look: Look) -> Look:
+    """A look that is drawn from both sides of its faces."""
+    return replace(
+        look,
+        faces=np.concatenate((look.faces, look.faces[:, ::-1])),
+        normals=np.concatenate((look.normals, -look.normals[:, ::-1])),
+        uv=None if look.uv is None else np.concatenate((look.uv, look.uv[:, ::-1])),
+        doubled=True,
+    )

@@ -1,0 +1,165 @@
+"""The floor of a scene on a grid: what is blocked, what is indoors, where one can walk, and which rooms there are."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, label
+
+from mjsim.errors import AssetError
+from mjsim.importing.houses.solids import Solid
+from mjsim.importing.surface import Floats
+
+CELL = 0.05  # m
+BODY = 0.27  # m, radius of a person with a little air
+MAX_SIDE = 60.0  # m, of a house
+_BAND = (0.05, 1.8)  # m, heights at which a person bumps into things
+_WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # m; what is at all these heights is a wall
+_GAP = 0.6  # m, half of the widest opening of the outer wall that is closed
+_PAD = 2 * _GAP + 0.3  # m around all things
+_MIN_AREA = 3.0  # m^2 that walls must enclose to be those of a house
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Grids of the floor; the first axis is x. All masks have the shape (nx, ny)."""
+
+    origin: Floats  # lower corner of cell (0, 0), m, (2,)
+    blocked: Mask  # where something stands
+    walls: Mask  # where it is a wall; doors that are open count
+    doors: Mask  # where doors were that are open now
+    indoors: Mask  # what the outer walls enclose, walls included
+    enclosed: bool  # whether there are such walls; else it is a rectangle
+
+    @cached_property
+    def free(self) -> Mask:
+        """Floor with nothing on it."""
+        return self.indoors & ~self.blocked
+
+    @cached_property
+    def clearance(self) -> Floats:
+        """Distance from each cell to what stands there, m."""
+        return clearance(self.free)
+
+    @cached_property
+    def walkable(self) -> Mask:
+        """Where a person's middle can be: the largest connected part."""
+        return largest(self.clearance > BODY)
+
+    @property
+    def area(self) -> float:
+        """Of the walkable floor, m^2."""
+        return float(self.walkable.sum()) * CELL**2
+
+    def cell(self, point: Sequence[float] | Floats) -> tuple[int, int]:
+        """Cell that holds a point (x, y), m; the nearest one off the grid."""
+        found = np.floor((np.asarray(point)[:2] - self.origin) / CELL).astype(int)
+        x, y = np.clip(found, 0, np.array(self.free.shape) - 1).tolist()
+        return x, y
+
+    def on(self, mask: Mask, points: Floats) -> Mask:
+        """Whether points (k, 2), m, lie on cells of a mask, shape (k,)."""
+        cells = np.clip(np.floor((points - self.origin) / CELL).astype(int), 0, np.array(mask.shape) - 1)
+        return np.asarray(mask[cells[:, 0], cells[:, 1]])
+
+    def covered(self, outlines: Iterable[Floats]) -> Mask:
+        """Cells that the convex hulls of outlines, each (k, 2), m, touch."""
+        return _raster(self.free.shape, self.origin, outlines)
+
+
+def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: tuple[Floats, Floats] | None) -> Plan:
+    """The plan of a house.
+
+    Args:
+        solids: All that collides.
+        doors: Doors that stand open, not among the solids.
+        floor: Lower and upper corner of what is drawn at floor height, m, (2,) each; None where nothing is.
+
+    Raises:
+        AssetError: There is neither a wall nor a floor, the scene is too large, or nobody can stand in it.
+    """
+    corners = [np.array([s.low[:2], s.high[:2]]) for s in (*solids, *doors)]
+    if not corners and floor is None:
+        raise AssetError("has neither walls nor a floor; is it a house?")
+    if not corners:
+        corners = [np.array(floor)]
+    points = np.concatenate(corners)
+    low, high = points.min(axis=0), points.max(axis=0)
+    if floor is not None and np.ptp(floor, axis=0).max() < MAX_SIDE:
+        low, high = np.minimum(low, floor[0]), np.maximum(high, floor[1])
+    if (high - low).max() > MAX_SIDE:
+        sides = " x ".join(f"{side:.4g}" for side in high - low)
+        raise AssetError(
+            f"spans {sides} m, and houses have at most {MAX_SIDE:g} m; give its unit by --units, or --scale"
+        )
+    origin = low - _PAD
+    shape = tuple(np.ceil((high - low + 2 * _PAD) / CELL).astype(int).tolist())
+    blocked, shut = (_at_heights(shape, origin, chosen, _BAND) for chosen in (solids, doors))
+    walls = np.logical_and.reduce([_at_heights(shape, origin, solids, band) for band in _WALL]) | shut
+    indoors = _enclosed(walls)
+    plan = Plan(origin, blocked, walls, shut & ~blocked, indoors, enclosed=True)
+    if plan.area < _MIN_AREA:
+        plan = replace(plan, indoors=_rectangle(shape, origin, floor), enclosed=False)
+    if plan.area < 1.0:
+        raise AssetError(
+            "leaves nowhere to walk: its walls enclose no floor, or what stands there fills it; "
+            "is the unit right (--units), and which way is up (--up)?"
+        )
+    return plan
+
+
+def clearance(free: Mask) -> Floats:
+    """Distance from each cell to the nearest one that is not free, or to the border, m."""
+    padded = np.pad(free, 1)
+    return np.asarray(distance_transform_edt(padded)[1:-1, 1:-1] * CELL)
+
+
+def largest(mask: Mask) -> Mask:
+    """The largest connected part of a mask."""
+    parts, count = label(mask)
+    return np.asarray(parts == np.bincount(parts.ravel())[1:].argmax() + 1) if count else mask
+
+
+def _enclosed(walls: Mask) -> Mask:
+    """What walls enclose, walls included, once openings up to twice `_GAP` are closed."""
+    distance = distance_transform_edt(~walls) * CELL if walls.any() else np.full(walls.shape, np.inf)
+    parts, _ = label(distance > _GAP)
+    border = np.unique(np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]]))
+    far = np.isin(parts, border[border > 0])
+    if not far.any():
+        return np.ones_like(walls)
+    outside = (distance_transform_edt(~far) * CELL <= _GAP) & ~walls
+    return np.asarray(~outside)
+
+
+def _rectangle(shape: tuple[int, ...], origin: Floats, floor: tuple[Floats, Floats] | None) -> Mask:
+    """The rectangle of the floor, or of all that stands there."""
+    inside = np.zeros(shape, bool)
+    edge = round(_PAD / CELL)
+    first, last = np.array([edge, edge]), np.array(shape) - edge
+    if floor is not None:
+        first, last = (np.rint((corner - origin) / CELL).astype(int) for corner in floor)
+        first = np.maximum(first, 0)
+    inside[first[0] : last[0], first[1] : last[1]] = True
+    return inside
+
+
+def _at_heights(
+    shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid], band: tuple[float, float]
+) -> Mask:
+    """Cells with something between two heights, m."""
+    low, high = band
+    return _raster(shape, origin, [s.outline for s in solids if s.low[2] < high and s.high[2] > low])
+
+
+def _raster(shape: tuple[int, ...], origin: Floats, outlines: Iterable[Floats]) -> Mask:
+    image = np.zeros(shape, np.uint8)
+    for points in outlines:
+        hull = cv2.convexHull(((points - origin) / CELL - 0.5).astype(np.float32))[:, 0]
+        cv2.fillConvexPoly(image, np.rint(hull[:, ::-1] * 16).astype(np.int32), 1, shift=4)
+    return image > 0

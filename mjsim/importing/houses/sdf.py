@@ -1,0 +1,233 @@
+"""SDF worlds (Gazebo): models with their links, poses, shapes and meshes; joints stand still."""
+
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from trimesh.transformations import compose_matrix
+
+from mjsim.errors import AssetError
+from mjsim.files import read_text
+from mjsim.importing.houses.meshes import primitive, read_parts
+from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene
+from mjsim.importing.reading import PLAIN
+from mjsim.importing.surface import Floats, Surface
+
+SUFFIXES = (".world", ".sdf")
+_VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
+_THIN = 0.002  # m, of planes
+_DEPTH = 20  # models within models
+_PLANE = 30.0  # m, greatest side of a plane
+
+
+def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
+    """Read a world or a model; `AssetError` where it is damaged, or names something that is not there."""
+    root = _root(path)
+    reader = _Reader(path, options)
+    top = root.find("world")
+    pieces = list(reader.models(root if top is None else top, np.eye(4), path.parent, 0, static=False))
+    if not pieces:
+        raise AssetError(f"{path} has no model with a shape or a mesh; give the world file of a house")
+    return SourceScene(tuple(pieces), "SDF world", (*reader.missing.notes(), *reader.unknown_kinds()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where a link is."""
+
+    name: str  # of the outermost model
+    frame: Floats  # (4, 4)
+    folder: Path
+    loose: bool
+
+
+class _Reader:
+    def __init__(self, path: Path, options: HouseOptions) -> None:
+        self._path = path
+        self._folders = [*options.models, path.parent, path.parent / "models", path.parent.parent / "models"]
+        for variable in _VARIABLES:
+            self._folders += [Path(part) for part in os.environ.get(variable, "").split(":") if part]
+        self.missing = Missing(options.skip_missing)
+        self._unknown: dict[str, int] = {}
+        self._meshes: dict[Path, list[tuple[str, Surface]]] = {}
+
+    def unknown_kinds(self) -> tuple[str, ...]:
+        """Notes about shapes that cannot be read."""
+        return tuple(f"{n} of shape <{kind}> left out" for kind, n in self._unknown.items())
+
+    def models(
+        self, parent: ET.Element, frame: Floats, folder: Path, depth: int, *, static: bool, name: str = ""
+    ) -> Iterator[Piece]:
+        """Pieces of all models in a world or a model; `name` is that of the outermost one."""
+        if depth > _DEPTH:
+            raise AssetError(
+                f"{self._path} includes models within models {_DEPTH} deep; does one include itself?"
+            )
+        for element in parent.findall("include"):
+            yield from self._included(element, frame, depth, static, name)
+        for model in parent.findall("model"):
+            yield from self._model(model, frame @ _pose(model, self._path), folder, depth, static, name)
+
+    def _included(
+        self, element: ET.Element, frame: Floats, depth: int, static: bool, name: str
+    ) -> Iterator[Piece]:
+        uri = (element.findtext("uri") or "").strip()
+        found = self._find(uri, None)
+        if found is None:
+            return
+        file = _model_file(found) if found.is_dir() else found
+        model = _root(file).find("model")
+        if model is None:
+            raise AssetError(f"{file} has no <model>; correct the include of {uri}")
+        name = name or (element.findtext("name") or model.get("name") or "").strip()
+        own = element.find("pose")
+        frame = frame @ (_pose(model, file) if own is None else _pose(element, self._path))
+        static = static or _is_true(element.findtext("static"))
+        yield from self._model(model, frame, file.parent, depth, static, name)
+
+    def _model(
+        self, model: ET.Element, frame: Floats, folder: Path, depth: int, static: bool, name: str
+    ) -> Iterator[Piece]:
+        name = name or model.get("name", "model")
+        static = static or _is_true(model.findtext("static"))
+        for link in model.findall("link"):
+            at = _Place(name, frame @ _pose(link, self._path), folder, not static)
+            visuals = [s for v in link.findall("visual") for s in self._shape(v, at)]
+            solids = [s for c in link.findall("collision") for s in self._shape(c, at)]
+            yield from (Piece(name, s, seen=True, solid=not solids, loose=at.loose) for s in visuals)
+            yield from (Piece(name, s, seen=not visuals, solid=True, loose=at.loose) for s in solids)
+        yield from self.models(model, frame, folder, depth + 1, static=static, name=name)
+
+    def _shape(self, element: ET.Element, at: _Place) -> Iterator[Surface]:
+        """Surfaces of a <visual> or <collision>."""
+        geometry = element.find("geometry")
+        if geometry is None or not len(geometry):
+            return
+        shape = geometry[0]
+        frame = at.frame @ _pose(element, self._path)
+        if shape.tag == "mesh":
+            yield from self._mesh(shape, frame, at.folder)
+            return
+        made = _primitive(shape, self._path)
+        if made is None:
+            self._unknown[shape.tag] = self._unknown.get(shape.tag, 0) + 1
+            return
+        made.apply_transform(frame)
+        yield primitive(made, _colour(element))
+
+    def _mesh(self, shape: ET.Element, frame: Floats, folder: Path) -> Iterator[Surface]:
+        file = self._find((shape.findtext("uri") or "").strip(), folder)
+        if file is None:
+            return
+        if file not in self._meshes:
+            self._meshes[file] = read_parts(file)
+        scale = _numbers(shape.findtext("scale") or "1 1 1", 3, self._path)
+        yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
+
+    def _find(self, uri: str, folder: Path | None) -> Path | None:
+        """File or folder of a URI; None where it is missing and left out."""
+        scheme, _, rest = uri.rpartition("://")
+        rest = rest.lstrip("/") if scheme == "model" else rest
+        folders = [*([] if folder is None else [folder, folder.parent]), *self._folders]
+        found = next((base / rest for base in folders if rest and (base / rest).exists()), None)
+        if found is None:
+            if not self.missing.skip:
+                raise AssetError(
+                    f"{self._path} names {uri!r}, which is not there; give the folder of its models by --models, "
+                    "or leave out what is missing with --skip-missing"
+                )
+            self.missing.files.append(uri)
+        return found
+
+
+def _root(path: Path) -> ET.Element:
+    try:
+        root = ET.fromstring(read_text(path))
+    except (OSError, UnicodeDecodeError, ET.ParseError) as error:
+        raise AssetError(f"cannot read {path} as SDF: {error}; is it complete?") from error
+    if root.tag != "sdf":
+        raise AssetError(f"{path} is XML with <{root.tag}>, not SDF; give a world file with <sdf>")
+    return root
+
+
+def _model_file(folder: Path) -> Path:
+    """The SDF file of a model's folder, by its model.config."""
+    config = folder / "model.config"
+    if config.is_file():
+        try:
+            named = ET.fromstring(read_text(config)).findtext("sdf")
+        except (OSError, UnicodeDecodeError, ET.ParseError) as error:
+            raise AssetError(f"cannot read {config}: {error}; correct it") from error
+        if named and (folder / named.strip()).is_file():
+            return folder / named.strip()
+    if (folder / "model.sdf").is_file():
+        return folder / "model.sdf"
+    raise AssetError(f"the model {folder} has no model.sdf; correct its model.config")
+
+
+def _pose(element: ET.Element, path: Path) -> Floats:
+    """Transform (4, 4) of an element's <pose>: x y z roll pitch yaw."""
+    pose = element.find("pose")
+    if pose is None or not (pose.text or "").strip():
+        return np.eye(4)
+    if pose.get("rotation_format", "euler_rpy") != "euler_rpy" or pose.get("relative_to", "") not in (
+        "",
+        "world",
+        "__model__",
+    ):
+        raise AssetError(
+            f"{path} has a <pose> with {dict(pose.attrib)}; write it as 'x y z roll pitch yaw' in its parent's frame"
+        )
+    values = _numbers(pose.text or "", 6, path)
+    if _is_true(pose.get("degrees")):
+        values[3:] = np.deg2rad(values[3:])
+    return np.asarray(compose_matrix(translate=values[:3], angles=values[3:]))
+
+
+def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
+    """A box, cylinder, ..., around the origin; None for what is not known."""
+
+    def number(name: str, count: int = 1) -> Floats:
+        return _numbers(shape.findtext(name) or "", count, path)
+
+    if shape.tag == "box":
+        return trimesh.creation.box(number("size", 3))
+    if shape.tag == "plane":
+        return trimesh.creation.box([*np.minimum(number("size", 2), _PLANE), _THIN]).apply_translation(
+            [0, 0, -_THIN / 2]
+        )
+    if shape.tag == "sphere":
+        return trimesh.creation.icosphere(2, float(number("radius")[0]))
+    if shape.tag in ("cylinder", "capsule"):
+        make = getattr(trimesh.creation, shape.tag)
+        return make(radius=float(number("radius")[0]), height=float(number("length")[0]))
+    if shape.tag == "ellipsoid":
+        return trimesh.creation.icosphere(2, 1.0).apply_scale(number("radii", 3))
+    return None
+
+
+def _colour(element: ET.Element) -> Floats:
+    """Plain colour (3,) of a <visual>, RGB from 0 to 1."""
+    for name in ("diffuse", "ambient"):
+        words = (element.findtext(f"material/{name}") or "").split()
+        if len(words) >= 3:
+            return np.clip([float(word) for word in words[:3]], 0.0, 1.0)
+    return np.array(PLAIN)
+
+
+def _numbers(text: str, count: int, path: Path) -> Floats:
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != count or not np.isfinite(values).all():
+        raise AssetError(f"{path} has {text.strip()!r:.60} where {count} numbers should stand; correct it")
+    return values
+
+
+def _is_true(text: str | None) -> bool:
+    return (text or "").strip().lower() in ("1", "true")

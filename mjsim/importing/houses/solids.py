@@ -1,0 +1,214 @@
+"""What one bumps into: boxes, convex hulls, and boxes of merged voxels where neither fits, within a budget."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.ndimage import binary_fill_holes
+from scipy.spatial import QhullError
+
+from mjsim.importing.houses.values import Piece
+from mjsim.importing.parts import _few_vertices
+from mjsim.importing.surface import Floats
+
+BUDGET = 1500  # geoms that collide
+LOW, HIGH = 0.045, 1.9  # m; what ends below is walked over, what begins above is only seen
+_PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)  # m, sides of voxels, the first within the budget
+_BOX = 0.95  # share of its bounding box that the hull of a box fills
+_CONVEX = 0.85  # share of its hull that a convex thing fills
+_SMALL = 0.5  # m; smaller things collide as their hulls
+_HANGING = 1.6  # m; lamps and pictures that begin above are only seen
+_OVERHEAD = 0.8  # m; what begins above is a box: as a hull it would seem to fill the free floor below
+_FURNITURE = 1.5  # m, sides of furniture that is taken for filled where it is closed
+_FEW = 30  # boxes of voxels of a piece of furniture
+_MAX_PARTS = 60  # connected parts of a piece that are looked at one by one
+_THIN = 0.01  # m, least thickness of what collides
+_SINK = 0.005  # m; bottoms so near to the floor stand on it
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A convex thing that collides."""
+
+    name: str  # of its piece
+    low: Floats  # lower corner, m, (3,)
+    high: Floats  # upper corner
+    hull: Floats | None = None  # vertices (k, 3), m; None for a box
+
+    @property
+    def outline(self) -> Floats:
+        """Points (k, 2), m, whose hull is its outline from above."""
+        if self.hull is not None:
+            return self.hull[:, :2]
+        (a, b), (c, d) = self.low[:2], self.high[:2]
+        return np.array([[a, b], [c, b], [c, d], [a, d]])
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """All that collides."""
+
+    solids: tuple[Solid, ...]
+    boxes: int  # pieces that are boxes
+    hulls: int  # pieces that collide as their hulls
+    voxels: int  # boxes of merged voxels
+    pitch: float  # m, side of a voxel
+
+
+def make_solids(pieces: Iterable[Piece]) -> Solids:
+    """Convex parts of all solid pieces at the heights of a person."""
+    simple: list[Solid] = []
+    rest: list[tuple[str, trimesh.Trimesh]] = []
+    for piece in pieces:
+        if not piece.solid:
+            continue
+        for mesh in _parts(piece):
+            solid = _simple(piece.name, mesh)
+            if solid is None:
+                rest.append((piece.name, mesh))
+            else:
+                simple.append(solid)
+    boxes: list[Solid] = []
+    for pitch in _PITCHES:
+        boxes = [solid for name, mesh in rest for solid in _few_voxels(name, mesh, pitch)]
+        if len(simple) + len(boxes) <= BUDGET:
+            break
+    hulls = sum(solid.hull is not None for solid in simple)
+    return Solids((*simple, *boxes), len(simple) - hulls, hulls, len(boxes), pitch)
+
+
+def _parts(piece: Piece) -> Iterator[trimesh.Trimesh]:
+    """Connected parts of a piece that a person can bump into."""
+    mesh = piece.surface.mesh()
+    count = mesh.body_count
+    whole = count == 1 or count > _MAX_PARTS or (_compact(mesh.extents) and not mesh.is_watertight)
+    parts = [mesh] if whole else mesh.split(only_watertight=False, repair=False)
+    for part in parts:
+        low, high = part.bounds[:, 2]
+        if high > LOW and low < (HIGH if np.ptp(part.bounds, axis=0)[:2].max() > _FURNITURE else _HANGING):
+            yield part
+
+
+def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
+    """A box or a hull where that is what it is, or it is small; else None."""
+    low, high = mesh.bounds
+    extents = high - low
+    if extents.min() < _THIN:  # a sheet
+        flat = np.sort(extents)
+        filled = mesh.area / 2 / max(flat[1] * flat[2], 1e-9) if not mesh.is_watertight else 1.0
+        return _box(name, low, high) if filled > _CONVEX / 2 + 0.05 or flat[2] < _SMALL else None
+    try:
+        hull = mesh.convex_hull
+    except QhullError:
+        return _box(name, low, high)
+    if hull.volume > _BOX * np.prod(extents):
+        return _box(name, low, high) if _filled(mesh, hull) or extents.max() < _SMALL else None
+    if low[2] > _OVERHEAD and _compact(extents):
+        return _box(name, low, high)
+    if extents.max() < _SMALL or _filled(mesh, hull):
+        points = _few_vertices(np.asarray(hull.vertices))
+        return Solid(name, points.min(axis=0), points.max(axis=0), points)
+    return None
+
+
+def _filled(mesh: trimesh.Trimesh, hull: trimesh.Trimesh) -> bool:
+    """Whether a mesh is about its hull: by its volume where it is closed, else by its area."""
+    if mesh.is_watertight:
+        return bool(abs(mesh.volume) > _CONVEX * hull.volume)
+    return bool(abs(mesh.area - hull.area) < (1 - _CONVEX) * hull.area and _compact(mesh.extents))
+
+
+def _box(name: str, low: Floats, high: Floats) -> Solid:
+    grow = np.maximum(_THIN - (high - low), 0.0) / 2
+    low, high = low - grow, high + grow
+    return Solid(name, low, high)
+
+
+def _compact(extents: Floats) -> bool:
+    """Whether a thing of these extents is furniture, not walls: what it encloses is filled."""
+    return bool(extents[:2].max() < _FURNITURE)
+
+
+def _few_voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> list[Solid]:
+    """Boxes of voxels of this side, or of larger ones where furniture would need too many."""
+    boxes: list[Solid] = []
+    for side in (p for p in _PITCHES if p >= pitch):
+        boxes = list(_voxels(name, mesh, side))
+        if len(boxes) <= _FEW or not _compact(mesh.extents):
+            break
+    return boxes
+
+
+def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
+    """Boxes of merged voxels around a surface, each drawn in to what it holds of the surface."""
+    samples = _samples(np.asarray(mesh.triangles), pitch / 2)
+    samples = samples[samples[:, 2] < HIGH + pitch]
+    if not len(samples):
+        return
+    origin = samples.min(axis=0) - 0.3 * pitch  # walls are often multiples of 5 cm thick: no face on a border
+    cells = np.floor((samples - origin) / pitch).astype(int)
+    grid = np.zeros(cells.max(axis=0) + 1, bool)
+    grid[tuple(cells.T)] = True
+    if _compact(mesh.extents):
+        grid = binary_fill_holes(grid)
+    owner = np.full(grid.shape, -1)
+    for number, (first, last) in enumerate(merged_boxes(grid)):
+        owner[tuple(slice(a, b) for a, b in zip(first, last, strict=True))] = number
+    number_of = owner[tuple(cells.T)]
+    order = np.argsort(number_of, kind="stable")
+    bounds = np.flatnonzero(np.diff(number_of[order])) + 1
+    for rows in np.split(order, bounds):
+        yield _box(name, samples[rows].min(axis=0), samples[rows].max(axis=0))
+
+
+def _samples(corners: Floats, step: float) -> Floats:
+    """Points (k, 3) at most about a step, m, apart on triangles (n, 3, 3)."""
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    first, count = lengths.argmax(axis=1), np.arange(len(corners))
+    a, b, c = (corners[count, (first + k) % 3] for k in range(3))
+    length = lengths[count, first]
+    height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(length, 1e-12)
+    along, across = (np.ceil(size / step).astype(int) + 1 for size in (length, height))
+    total = (along + 1) * (across + 1)
+    owner = np.repeat(count, total)
+    index = np.arange(total.sum()) - np.repeat(np.cumsum(total) - total, total)
+    i, j = np.divmod(index, (across + 1)[owner])
+    u, v = (i / along[owner])[:, None], (j / across[owner])[:, None]
+    return np.asarray((a[owner] + (b - a)[owner] * u) * (1 - v) + c[owner] * v)
+
+
+def merged_boxes(grid: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, int, int], tuple[int, int, int]]]:
+    """Boxes that cover the cells of a grid (nx, ny, nz) once, as first and last cell, the last not included.
+
+    Columns of the same profile are merged into rectangles, so walls and tables give few.
+    """
+    packed = np.packbits(grid, axis=2)
+    profiles, index = np.unique(packed.reshape(-1, packed.shape[2]), axis=0, return_inverse=True)
+    index = index.reshape(grid.shape[:2])
+    for number, profile in enumerate(profiles):
+        levels = np.unpackbits(profile)[: grid.shape[2]].astype(np.int8)
+        steps = np.diff(np.concatenate([[0], levels, [0]]))
+        spans = list(zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1), strict=True))
+        if not spans:
+            continue
+        for a, b, c, d in merged_rectangles(index == number):
+            for bottom, top in spans:
+                yield (a, c, int(bottom)), (b, d, int(top))
+
+
+def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
+    """Rectangles that cover the cells of a mask (nx, ny) once: rows from, to, columns from, to, ends not included."""
+    left = mask.copy()
+    for row in range(len(left)):
+        while left[row].any():
+            start = int(left[row].argmax())
+            stop = start
+            while stop < left.shape[1] and left[row, stop]:
+                stop += 1
+            end = row + 1
+            while end < len(left) and left[end, start:stop].all():
+                end += 1
+            left[row:end, start:stop] = False
+            yield row, end, start, stop

@@ -1,0 +1,68 @@
+"""What readers make of a scene, and what the user says about it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mjsim.importing.surface import Floats, Surface
+
+TEXTURE_SIDE = 512  # px, longest side of a picture
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A thing of a scene in the frame of the scene: z up, m."""
+
+    name: str  # as the source calls it
+    surface: Surface
+    seen: bool = True  # whether it is drawn
+    solid: bool = True  # whether one bumps into it
+    loose: bool = False  # whether the source lets it move
+
+
+@dataclass(frozen=True)
+class NamedRoom:
+    """A room that the user or the source gives."""
+
+    key: str
+    label: str
+    boxes: tuple[tuple[float, float, float, float], ...]  # xmin, ymin, xmax, ymax of rectangles, m
+
+
+@dataclass(frozen=True, eq=False)
+class SourceScene:
+    """A scene as it was read."""
+
+    pieces: tuple[Piece, ...]
+    kind: str  # of the source, such as `SDF world`
+    notes: tuple[str, ...] = ()  # what was left out on the way, one line each
+    rooms: tuple[NamedRoom, ...] = ()  # where the source names them
+
+
+@dataclass(frozen=True)
+class HouseOptions:
+    """What the user gives; None for what is to be found out."""
+
+    units: str | None = None  # key of `mjsim.importing.values.UNITS`
+    up: str | None = None  # `y` or `z`
+    scale: float = 1.0  # factor on top of the unit
+    floor: float | None = None  # height of the floor in the source, m
+    rooms: Path | None = None  # TOML file that names rooms
+    models: tuple[Path, ...] = ()  # folders in which the source's models lie
+    skip_missing: bool = False  # whether files that are not there are left out
+
+
+@dataclass
+class Missing:
+    """Files that a source names and that are not there: refused, or left out if the user says so."""
+
+    skip: bool
+    files: list[str] = field(default_factory=list)
+
+    def notes(self) -> tuple[str, ...]:
+        """What was left out, for the report."""
+        return (f"{len(self.files)} missing: {', '.join(self.files[:6])}",) if self.files else ()
+
+
+def moved(pieces: list[Piece], transform: Floats) -> list[Piece]:
+    """Pieces moved by a homogeneous transform (4, 4)."""
+    return [Piece(p.name, p.surface.moved(transform), p.seen, p.solid, p.loose) for p in pieces]

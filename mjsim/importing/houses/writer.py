@@ -1,0 +1,202 @@
+"""An imported house as files: house.xml, catalogue.toml, meshes and pictures; the same house gives the same bytes."""
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import trimesh
+
+from mjsim.importing.houses.bins import Bin
+from mjsim.importing.houses.look import DrawnMesh, picture_key
+from mjsim.importing.houses.plan import Plan
+from mjsim.importing.houses.rooms import Rooms
+from mjsim.importing.houses.solids import Solid
+from mjsim.importing.model_writer import look_lines, write_png
+from mjsim.importing.surface import Floats
+from mjsim.model.assets import models_root
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.catalogue_files import CATALOGUE
+
+MODEL = "house.xml"
+MESHES = "meshes"
+_HEIGHT = 2.5  # m, of what closes the shell
+_DEPTH = 0.1  # m, of the floor that collides
+_UNDER = 0.002  # m, of the drawn floor below z = 0, so that rugs and floors of the source are seen
+_LIGHTS = (("0 0 -1", 0.25), ("0.7 1 -0.5", 0.28), ("-1 -0.7 -0.5", 0.25), ("0.2 0.5 1", 0.3))
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedHouse:
+    """All that is written."""
+
+    label: str  # shown to the person
+    source: str  # name of the file that it is made of
+    solids: Sequence[Solid]
+    looks: Sequence[DrawnMesh]
+    plan: Plan
+    rooms: Rooms
+    bins: Sequence[Bin]
+    floor_seen: bool  # whether the source's own floor is drawn
+
+
+def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Path:
+    """Write a house into an existing folder, with categories of a catalogue; returns its catalogue file."""
+    (folder / MESHES).mkdir()
+    lines = [
+        f"<mujoco model={quoteattr(_name(house.label))}>",
+        f"  <!-- {_comment(house.label)}, imported from {_comment(house.source)}; conventions in docs/models.md. -->",
+        f'  <compiler angle="radian" meshdir="{MESHES}" texturedir="{MESHES}"/>',
+        '  <visual><headlight ambient="0.5 0.5 0.5" diffuse="0.05 0.05 0.05" specular="0 0 0"/></visual>',
+        "  <default>",
+        '    <geom type="box" solref="0.008 1"/>',
+        '    <site type="box" group="5" rgba="0 0 0 0"/>',
+        '    <light type="directional" castshadow="false" specular="0 0 0"/>',
+        '    <default class="solid"><geom group="3"/></default>',
+        '    <default class="seen"><geom type="mesh" group="2" contype="0" conaffinity="0"/></default>',
+        "  </default>",
+        "  <asset>",
+        *(f"    {line}" for line in _assets(house, folder / MESHES)),
+        "  </asset>",
+        "  <worldbody>",
+        *(f"    {line}" for line in (*_lights(), *_structure(house), *_geoms(house), *_sites(house))),
+        "  </worldbody>",
+        "</mujoco>",
+    ]
+    (folder / MODEL).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path = folder / CATALOGUE
+    path.write_text("\n".join(_catalogue(house, catalogue)) + "\n", encoding="utf-8")
+    return path
+
+
+def _assets(house: ImportedHouse, folder: Path) -> Iterator[str]:
+    """Meshes, pictures and materials; writes their files."""
+    materials: dict[str, str] = {}
+    for number, mesh in enumerate(house.looks):
+        look, name = mesh.look, f"look_{number}"
+        (folder / f"{name}.obj").write_text("\n".join(look_lines(look)) + "\n", encoding="utf-8")
+        yield f'<mesh name="{name}" file="{name}.obj" inertia="shell"/>'
+        material = _material(mesh)
+        if material in materials:
+            continue
+        materials[material] = name
+        red, green, blue = look.colour if look.picture is None else (1.0, 1.0, 1.0)
+        texture = ""
+        if look.picture is not None:
+            picture = f"picture_{picture_key(look)}"
+            write_png(folder / f"{picture}.png", look.picture)
+            yield f'<texture name="{picture}" type="2d" file="{picture}.png"/>'
+            texture = f' texture="{picture}"'
+        rgba = f"{red:g} {green:g} {blue:g} 1"
+        yield f'<material name="{material}"{texture} rgba="{rgba}" specular="0.1" shininess="0.2"/>'
+    for number, solid in enumerate(house.solids):
+        if solid.hull is not None:
+            text = trimesh.convex.convex_hull(solid.hull).export(file_type="obj", digits=5, header=None)
+            (folder / f"hull_{number}.obj").write_text(text, encoding="utf-8")
+            yield f'<mesh name="hull_{number}" file="hull_{number}.obj"/>'
+
+
+def _material(mesh: DrawnMesh) -> str:
+    if mesh.look.picture is not None:
+        return f"material_{picture_key(mesh.look)}"
+    return "colour_" + "_".join(f"{round(255 * c):02x}" for c in mesh.look.colour)
+
+
+def _lights() -> Iterator[str]:
+    for direction, strength in _LIGHTS:
+        yield f'<light pos="0 0 4" dir="{direction}" diffuse="{strength} {strength} {strength}"/>'
+
+
+def _structure(house: ImportedHouse) -> Iterator[str]:
+    """The floor, and what closes the house."""
+    corners = np.array([edge for _, *edges in house.rooms.rectangles(house.plan) for edge in edges])
+    low, high = corners.min(axis=0) - 0.2, corners.max(axis=0) + 0.2
+    (x, y), (a, b) = (low + high) / 2, (high - low) / 2
+    yield f'<geom class="solid" name="floor" pos="{x:.4f} {y:.4f} {-_DEPTH / 2}" size="{a:.4f} {b:.4f} {_DEPTH / 2}"/>'
+    if not house.floor_seen:
+        yield (
+            f'<geom class="seen" type="box" name="floor_seen" pos="{x:.4f} {y:.4f} {-_UNDER - 0.01}" '
+            f'size="{a:.4f} {b:.4f} 0.01" rgba="0.72 0.62 0.5 1"/>'
+        )
+    for number, (low, high) in enumerate(house.rooms.shell(house.plan)):
+        yield _box(f"shell_{number}", np.array([*low, 0.0]), np.array([*high, _HEIGHT]))
+
+
+def _geoms(house: ImportedHouse) -> Iterator[str]:
+    for number, solid in enumerate(house.solids):
+        name = f"{_name(solid.name)}_{number}"
+        if solid.hull is None:
+            yield _box(name, solid.low, solid.high)
+        else:
+            yield f'<geom class="solid" name="{name}" type="mesh" mesh="hull_{number}"/>'
+    for number, mesh in enumerate(house.looks):
+        group = ' group="1"' if mesh.high else ""
+        name = f"{_name(mesh.name)}_look_{number}"
+        yield f'<geom class="seen" name="{name}" mesh="look_{number}" material="{_material(mesh)}"{group}/>'
+
+
+def _sites(house: ImportedHouse) -> Iterator[str]:
+    counts: dict[str, int] = {}
+    for key, low, high in house.rooms.rectangles(house.plan):
+        counts[key] = counts.get(key, -1) + 1
+        (x, y), (a, b) = (low + high) / 2, (high - low) / 2
+        yield f'<site name="room:{key}:{counts[key]}" pos="{x:.4f} {y:.4f} 1" size="{a:.4f} {b:.4f} 1"/>'
+    for place in house.bins:
+        yield f'<site name="mount:{place.key}" pos="{place.x:.4f} {place.y:.4f} 0" euler="0 0 {place.yaw:.6f}"/>'
+
+
+def _box(name: str, low: Floats, high: Floats) -> str:
+    return f'<geom class="solid" name="{name}" pos="{_numbers((low + high) / 2)}" size="{_numbers((high - low) / 2)}"/>'
+
+
+def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
+    """Lines of catalogue.toml: what of the other catalogue belongs into the bins."""
+    room_of = {place.key: place.room for place in house.bins}
+    categories = [c for c in catalogue.categories.values() if c.receptacle in room_of]
+    objects = [key for category in categories for key in category.objects]
+    tables: list[tuple[str, dict[str, object]]] = [
+        ("house", {"label": house.label, "model": MODEL}),
+        ("rooms", dict(house.rooms.names)),
+    ]
+    tables += [
+        (f"categories.{c.key}", {"label": c.label, "receptacle": c.receptacle, "objects": list(c.objects)})
+        for c in categories
+    ]
+    for key, room in room_of.items():
+        known = catalogue.receptacles[key]
+        entry: dict[str, object] = {
+            "label": known.label,
+            "place": "against the wall",
+            "room": room,
+            "model": _relative(known.path),
+        }
+        tables.append((f"receptacles.{key}", entry))
+    for key in objects:
+        item = catalogue.objects[key]
+        tables.append((f"objects.{key}", {"label": item.label, "model": _relative(item.path)}))
+    for name, values in tables:
+        yield f"[{name}]"
+        yield from (f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items())
+        yield ""
+
+
+def _relative(path: Path) -> str:
+    """A model as a catalogue names it: those of the package from their folder."""
+    root = models_root().resolve()
+    resolved = path.resolve()
+    return str(resolved.relative_to(root)) if resolved.is_relative_to(root) else str(resolved)
+
+
+def _comment(text: str) -> str:
+    return text.replace("--", "- -").replace("&", "and").replace("<", "(").replace(">", ")")
+
+
+def _name(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_]+", "_", text).strip("_")[:40] or "thing"
+
+
+def _numbers(values: Floats | Sequence[float]) -> str:
+    return " ".join(f"{value:.6g}" for value in np.round(values, 5) + 0.0)

@@ -1,0 +1,171 @@
+"""`mjsim import house`: scenes of other simulators become houses that `mjsim check` accepts, or are refused."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from house_scenes import write_sdf
+
+from experiments.cli import main as cli
+from mjsim.errors import AssetError
+from mjsim.importing.houses.house_import import import_house
+from mjsim.importing.houses.values import HouseOptions
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.house import compiled_house
+
+
+def imported(tmp_path, source, **options):
+    """Import a scene into a new folder: its decisions by what was decided, and its catalogue."""
+    out = tmp_path / "house"
+    decisions, report = import_house(source, out, HouseOptions(**options))
+    assert [f for f in report.findings if f.severity == "error"] == []
+    return {d.what: f"{d.choice}: {d.reason}" for d in decisions}, Catalogue.load(str(out))
+
+
+@pytest.fixture(scope="module")
+def flat(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flat")
+    return imported(folder, write_sdf(folder))
+
+
+def test_an_sdf_world_becomes_a_house(flat):
+    decisions, catalogue = flat
+    assert list(catalogue.rooms.values()) == ["Living room", "Room 1"]
+    assert decisions["outline"].startswith("closed by its walls")
+    assert set(catalogue.receptacles) >= {"dish_bin", "toy_box"}
+    house = compiled_house(catalogue)
+    assert house.rooms.room_at((1.0, 3.0)) == "living_room"
+    assert house.rooms.room_at((7.0, 3.0)) == "room_1"
+    assert not house.model.njnt
+
+
+def test_a_door_between_rooms_stands_open(flat):
+    decisions, catalogue = flat
+    assert decisions["doors"] == "1 open: door_1"
+    assert compiled_house(catalogue).navigable.is_navigable((4.0, 2.5))
+
+
+def test_loose_things_of_the_size_of_a_hand_are_left_out_and_named(flat):
+    decisions, catalogue = flat
+    assert "cup" in decisions["loose things"]
+    model = compiled_house(catalogue).model
+    assert not any("cup" in model.geom(g).name for g in range(model.ngeom))
+
+
+def test_a_mesh_keeps_its_place_scale_and_picture(flat):
+    _, catalogue = flat
+    model = compiled_house(catalogue).model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    look = next(g for g in range(model.ngeom) if model.geom(g).name.startswith("table_look"))
+    mesh = model.geom_dataid[look]
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    points = (
+        model.mesh_vert[first : first + count] @ data.geom_xmat[look].reshape(3, 3).T + data.geom_xpos[look]
+    )
+    np.testing.assert_allclose(points[:, 2].max(), 0.75, atol=1e-3)
+    np.testing.assert_allclose(points.mean(axis=0)[:2], (6.0, 2.0), atol=0.02)
+    assert model.mat_texid[model.geom_matid[look]].max() >= 0
+
+
+def test_what_one_bumps_into_is_below_a_table_only_where_its_legs_are(flat):
+    _, catalogue = flat
+    house = compiled_house(catalogue)
+    tall = [
+        g
+        for g in range(house.model.ngeom)
+        if house.model.geom(g).name.startswith("table_") and house.model.geom_contype[g]
+    ]
+    assert 3 <= len(tall) <= 40
+
+
+def test_the_same_scene_gives_the_same_bytes(tmp_path):
+    written = []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        source = write_sdf(tmp_path / name)
+        import_house(source, tmp_path / name / "out", HouseOptions())
+        files = sorted(p for p in (tmp_path / name / "out").rglob("*") if p.is_file())
+        written.append({str(p.relative_to(tmp_path / name)): p.read_bytes() for p in files})
+    assert written[0] == written[1]
+
+
+def test_rooms_can_be_given(tmp_path):
+    rooms = tmp_path / "rooms.toml"
+    rooms.write_text(
+        '[rooms.den]\nlabel = "Den"\nboxes = [[0, 0, 3.9, 5]]\n[rooms.hall]\nlabel = "Hall"\nboxes = [[4, 0, 8, 5]]\n'
+    )
+    _, catalogue = imported(tmp_path, write_sdf(tmp_path), rooms=rooms)
+    assert dict(catalogue.rooms) == {"den": "Den", "hall": "Hall"}
+
+
+def test_without_walls_the_house_is_the_rectangle_of_its_floor(tmp_path):
+    decisions, catalogue = imported(tmp_path, write_sdf(tmp_path, walls=False))
+    assert decisions["outline"].startswith("a rectangle")
+    assert len(catalogue.rooms) == 1
+
+
+def test_the_command_imports_and_reports(tmp_path, capsys):
+    out = tmp_path / "my house"
+    assert cli.main(["import", "house", str(write_sdf(tmp_path)), "--out", str(out), "--name", "Flat"]) == 0
+    assert "convex geoms" in capsys.readouterr().out
+    assert tomllib.loads((out / "catalogue.toml").read_text())["house"]["label"] == "Flat"
+    assert json.loads((out / "report.json").read_text())[0]["what"] == "source"
+
+
+INCLUDE = "<include><uri>model://chair</uri></include>"
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "cannot read"),
+        ("<sdf version='1.6'><world name='a'", "cannot read"),
+        ("<mujoco/>", "not SDF"),
+        ("<sdf version='1.6'><world name='a'/></sdf>", "no model"),
+        (
+            f"<sdf version='1.6'><world name='a'>{INCLUDE}</world></sdf>",
+            "'model://chair', which is not there",
+        ),
+        (
+            "<sdf version='1.6'><model name='a'><link name='l'><pose>1 2 x</pose><visual name='v'><geometry><sphere>"
+            "<radius>1</radius></sphere></geometry></visual></link></model></sdf>",
+            "6 numbers",
+        ),
+    ],
+)
+def test_a_damaged_world_is_refused_by_its_cause_and_nothing_is_written(tmp_path, text, reason):
+    source = tmp_path / "bad.world"
+    source.write_text(text)
+    with pytest.raises(AssetError, match=reason) as caught:
+        import_house(source, tmp_path / "out", HouseOptions())
+    assert str(source) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_missing_is_left_out_if_the_user_says_so(tmp_path):
+    source = write_sdf(tmp_path, extra=INCLUDE)
+    with pytest.raises(AssetError, match="--skip-missing"):
+        import_house(source, tmp_path / "house", HouseOptions())
+    decisions, _ = imported(tmp_path, source, skip_missing=True)
+    assert "model://chair" in decisions["left out"]
+
+
+def test_a_folder_that_is_there_is_kept(tmp_path):
+    source, out = write_sdf(tmp_path), tmp_path / "mine"
+    out.mkdir()
+    (out / "letter.txt").write_text("dear")
+    for force in (False, True):
+        with pytest.raises(AssetError, match="choose another --out"):
+            import_house(source, out, HouseOptions(), force=force)
+    assert [p.name for p in out.iterdir()] == ["letter.txt"]
+
+
+@pytest.mark.parametrize("name", ["there_is_none.world", "."])
+def test_a_source_that_is_not_there_is_refused(tmp_path, name):
+    with pytest.raises(AssetError, match="no file"):
+        import_house(tmp_path / Path(name), tmp_path / "out", HouseOptions())
