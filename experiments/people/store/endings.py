@@ -8,7 +8,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store.part import Part, lock_study
 from experiments.people.store.places import place_of, set_place, take_back
-from experiments.people.store.tables import answer, person
+from experiments.people.store.tables import answer, identity, person
 from experiments.people.store.values import ACTIVE, Status, utc_now
 
 
@@ -81,6 +81,8 @@ async def end(
 ) -> None:
     """Give a person the last status, and finish or release the place; the study must be locked."""
     await connection.execute(update(person).where(person.c.id == person_id).values(status=status))
+    if status == "no_consent":  # paying nobody needs no ids; the keyed hash recognises who comes again
+        await connection.execute(delete_rows(identity).where(identity.c.person_id == person_id))
     place = await place_of(connection, person_id)
     if place is None:
         return

@@ -57,9 +57,11 @@ class Erasure(Part):
         await self._database.scrub()
 
     async def known(self, before: datetime) -> tuple[int, ...]:
-        """Numbers of people whose ids of a platform are still here, and who gave their last sign before a time."""
+        """Numbers of people who can still be recognised, and who gave their last sign before a time."""
         mine = (tables.person.c.study_id == self._study_id, tables.person.c.seen < before)
-        query = select(tables.person.c.id).join(tables.identity).where(*mine).order_by(tables.person.c.id)
+        recognised = tables.identity.c.id.is_not(None) | tables.person.c.platform_key.is_not(None)
+        query = select(tables.person.c.id).outerjoin(tables.identity).where(*mine, recognised)
+        query = query.order_by(tables.person.c.id)
         async with self._database.reading() as connection:
             return tuple((await connection.execute(query)).scalars())
 

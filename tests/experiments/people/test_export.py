@@ -7,7 +7,9 @@ import os
 import re
 import shlex
 import shutil
+import sqlite3
 import subprocess
+from contextlib import closing
 
 import pytest
 
@@ -115,6 +117,13 @@ def test_no_id_link_or_address_leaves_and_no_cell_is_a_formula(served, tmp_path)
         for row in rows_of(path):
             for cell in filter(None, row.values()):
                 assert not cell.startswith(FORMULA) or cell[1:].replace(".", "").isdigit(), cell
+
+
+def test_of_who_does_not_agree_no_id_is_kept(served):
+    _, folder = served
+    with closing(sqlite3.connect(folder / "study.db")) as database:
+        kept = [row[0] for row in database.execute("SELECT person_id FROM identity ORDER BY person_id")]
+    assert kept == [1, 3, 4]
 
 
 def test_an_export_is_whole_or_absent(served, tmp_path, monkeypatch):
