@@ -223,7 +223,8 @@ def desk(b: Builder) -> Piece:
     x = 0.22 if w > 1.1 else 0.25
     turn = math.pi + float(b.rng.uniform(-0.35, 0.35))
     away = d - 0.06 + 0.56
-    return group(b.kind, [(base, 0, 0, 0), (chair, x + 0.28 * math.sin(turn), away, turn)], use=())
+    use = ((-w / 2, d, -w / 2 + 0.5, d + 0.72),)  # before the box
+    return group(b.kind, [(base, 0, 0, 0), (chair, x + 0.28 * math.sin(turn), away, turn)], use=use)
 
 
 def dressing_table(b: Builder) -> Piece:
