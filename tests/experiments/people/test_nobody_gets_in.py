@@ -16,6 +16,7 @@ from websockets.sync.client import connect
 from experiments.cli.logs import JsonLines
 from experiments.errors import StoreError
 from experiments.people.collect import collect, write_collected
+from experiments.people.server.app import NEW_PEOPLE
 from experiments.people.store import Store
 from experiments.web.server.static_files import static_url
 from experiments.web.server.visits import token_hash
@@ -271,6 +272,14 @@ def test_what_people_write_is_kept_as_it_is_and_harms_nothing(tmp_path):
         write_collected(site.ask(collect(site.study, site.store, tmp_path)), tmp_path / "table")
     cells = (tmp_path / "table" / "texts.csv").read_text().splitlines()[1:]
     assert not [line for line in cells if re.search(r'(^|,)"?[=+\-@\t\r]', line)]
+
+
+def test_nobody_makes_people_without_end(site):
+    with site.client(headers={"X-Forwarded-For": "203.0.113.1"}) as client:
+        begun = [client.post("/begin").status_code for _ in range(int(NEW_PEOPLE[0]) + 1)]
+        assert set(begun[:-1]) == {303} and begun[-1] == 429
+    with site.client(headers={"X-Forwarded-For": "203.0.113.2"}) as client:
+        assert client.post("/begin").status_code == 303
 
 
 SECRETS = {

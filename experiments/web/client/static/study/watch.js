@@ -87,4 +87,5 @@ if (drawn) {
     if (seen) hud.moveReach(seen.reach);
   });
 }
+byId("list-title", HTMLElement).textContent = "Not begun yet";
 open();
