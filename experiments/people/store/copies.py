@@ -39,9 +39,10 @@ async def back_up(source: Database, path: Path) -> None:
 
 
 def one_file(path: Path) -> None:
-    """Let a SQLite database have no log beside it, and be on the disk."""
+    """Let a SQLite database have no log beside it, be on the disk, and be read by nobody else."""
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")
+    path.chmod(0o600)  # it holds ids of platforms
     with path.open("rb") as file:
         os.fsync(file.fileno())
 
