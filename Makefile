@@ -48,6 +48,7 @@ assets: $(READY) ## Make textures and meshes under models/ anew
 pictures: $(READY) ## Make the pictures of the README and of docs/rendering.md anew
 	$(BIN)/mjsim gallery --force --out docs/pictures
 	$(BIN)/python -m tools.drawn_pairs docs/pictures/browser.webp
+	$(BIN)/python -m tools.furniture_sheet docs/pictures/furniture.webp
 
 data-dictionary: $(READY) ## Make docs/data.md anew from the types
 	$(BIN)/python -m tools.data_dictionary > docs/data.md

@@ -218,7 +218,7 @@ class Home:
             placement
             for space in self.spaces
             for piece, place in space.stood
-            for placement in placed(space, piece, place, self.look)
+            for placement in placed(space.room.key, piece, place, self.look)
         ]
         return Furnishing(tuple(placements), tuple(self.mounts))
 
@@ -256,7 +256,7 @@ def furnished(plan: FloorPlan, bins: Sequence[str], palette: Palette, seed: int)
             return home
 
 
-def placed(space: Space, piece: Piece, place: Place, look: Look) -> list[Placement]:
+def placed(room: str, piece: Piece, place: Place, look: Look) -> list[Placement]:
     """A piece, or the members of a group, as the house is written."""
     found = []
     for member, x, y, yaw in flattened(piece, place.x, place.y, place.yaw):
@@ -272,7 +272,7 @@ def placed(space: Space, piece: Piece, place: Place, look: Look) -> list[Placeme
         found.append(
             Placement(
                 member.kind,
-                space.room.key,
+                room,
                 member.geoms,
                 (round(x, 4), round(y, 4), 0.0),
                 turns % 4,

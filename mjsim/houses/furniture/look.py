@@ -1,5 +1,6 @@
 """The materials of a home's furniture, by role, so that pieces of one home go together."""
 
+import colorsys
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,6 +44,9 @@ class Look:
 def draw_look(palette: Palette, rng: np.random.Generator) -> Look:
     """Materials of a home in its colours."""
     assets = {name: Asset(name, f'<material name="{name}" {rest}/>') for name, rest in _ALWAYS}
+    fabrics, accents, fronts = (
+        [_muted(rgb) for rgb in of] for of in (palette.fabrics, palette.accents, palette.fronts)
+    )
 
     def add(role: str, rgb: Rgb, attributes: str = "") -> None:
         rgba = " ".join(f"{min(max(value, 0.0), 1.0):.3f}" for value in rgb)
@@ -58,17 +62,17 @@ def draw_look(palette: Palette, rng: np.random.Generator) -> Look:
         return [_rgb(codes[i]) for i in rng.permutation(len(codes))]
 
     several("wood_a wood_b wood_c", palette.woods, 'texture="wood_grain"')
-    several("front_a front_b", palette.fronts)
-    red, green, blue = palette.fronts[0]
+    several("front_a front_b", fronts)
+    red, green, blue = fronts[0]
     add("front_dark", (0.8 * red, 0.8 * green, 0.8 * blue))
-    several("cloth_a cloth_b cloth_c cloth_d", palette.fabrics, 'texture="fabric"')
-    several("accent_a accent_b accent_c accent_d", palette.accents)
+    several("cloth_a cloth_b cloth_c cloth_d", fabrics, 'texture="fabric"')
+    several("accent_a accent_b accent_c accent_d", accents)
     add("metal_a", palette.metal, 'specular="0.6" shininess="0.7"')
     quilts = drawn(_QUILTS)
     several("quilt_a quilt_b", quilts, 'texture="fabric"')
     add("quilt_c", (0.98, 0.98, 0.98), f'texture="{rng.choice(("stripes", "quilt", "fabric"))}"')
     add("quilt_d", quilts[2], f'texture="{rng.choice(("damask", "towel", "fabric"))}"')
-    several("towel_a towel_b", palette.fabrics[::-1], 'texture="towel"')
+    several("towel_a towel_b", fabrics[::-1], 'texture="towel"')
     several("pot_a pot_b", drawn(_POTS))
     stones = drawn(_STONES)
     add("stone", stones[0], 'texture="marble"' if rng.random() < 0.5 else "")
@@ -77,7 +81,14 @@ def draw_look(palette: Palette, rng: np.random.Generator) -> Look:
         (0.97, 0.94, 0.88)
     )
     add("curtain", (float(light[0]), float(light[1]), float(light[2])), 'texture="curtain"')
-    return Look(assets, (*palette.fabrics, *palette.accents))
+    return Look(assets, (*fabrics, *accents))
+
+
+def _muted(rgb: Rgb) -> Rgb:
+    """Vivid greens and purples are rare in homes: less of both."""
+    hue, saturation, value = colorsys.rgb_to_hsv(*rgb)
+    loud = 0.19 < hue < 0.48 or 0.7 < hue < 0.9
+    return colorsys.hsv_to_rgb(hue, saturation * (0.55 if loud else 0.9), value * (0.85 if loud else 1.0))
 
 
 def _rgb(code: str) -> Rgb:

@@ -1,0 +1,92 @@
+"""A contact sheet of all kinds of furniture, three pieces of each.
+
+`python -m tools.furniture_sheet docs/pictures/furniture.webp` makes the sheet of docs/houses.md.
+"""
+
+import argparse
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.houses.chance import stream
+from mjsim.houses.files import write_files
+from mjsim.houses.furnish import placed
+from mjsim.houses.furniture.catalogue import KINDS
+from mjsim.houses.furniture.look import draw_look
+from mjsim.houses.furniture.piece import Piece
+from mjsim.houses.palette import draw_palette
+from mjsim.houses.space import Place
+from mjsim.houses.values import FloorPlan, Furnishing, Placement, Rectangle, Room
+from mjsim.model.assets import models_root
+from mjsim.model.model_files import read_model
+from mjsim.render import Renderer
+from mjsim.render.cameras import CameraPose
+
+CELL = (112, 84)  # of a picture, px
+COLUMNS = 18
+APART = 12.0  # m, between pieces
+FOVY = math.radians(38)
+Image = NDArray[np.uint8]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the sheet."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="image file to write")
+    parser.add_argument("--kinds", nargs="*", default=list(KINDS), help="only these")
+    options = parser.parse_args(arguments)
+    cells = [cell for kind in options.kinds for cell in pictures(kind)]
+    while len(cells) % COLUMNS:
+        cells.append(np.full_like(cells[0], 255))
+    rows = [np.hstack(cells[i : i + COLUMNS]) for i in range(0, len(cells), COLUMNS)]
+    cv2.imwrite(str(options.out), np.vstack(rows)[..., ::-1], [cv2.IMWRITE_WEBP_QUALITY, 75])
+
+
+def pictures(kind: str, count: int = 3) -> Iterator[Image]:
+    """Pieces of a kind, each in the colours of another home, (height, width, 3), RGB."""
+    room = Room("living_room", "living_room", kind, Rectangle(0.0, 0.0, APART * count, 9.0))
+    pieces: list[tuple[Piece, Place]] = []
+    placements: list[Placement] = []
+    seed = sum(map(ord, kind))  # all pieces of a sheet share its materials: one home
+    look = draw_look(draw_palette(seed), stream(seed, "look"))
+    for i in range(count):
+        piece = KINDS[kind].make(stream(seed, "sheet", kind, str(i)), look)
+        place = Place(APART * (i + 0.5), 0.0 if piece.stands != "ceiling" else 1.0, 0, "south")
+        pieces.append((piece, place))
+        placements += placed(room.key, piece, place, look)
+    plan = FloorPlan((room,), (), ())
+    files = write_files(seed, kind, kind, plan, Furnishing(tuple(placements), ()), 1, models_root())
+    with tempfile.TemporaryDirectory() as folder:
+        for name, content in files.items():
+            (Path(folder) / name).parent.mkdir(exist_ok=True)
+            (Path(folder) / name).write_bytes(content)
+        model = read_model(Path(folder) / "house.xml").compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with Renderer(model, width=2 * CELL[0], height=2 * CELL[1], profile="quality") as renderer:
+        for each in pieces:
+            picture = renderer.rgb(data, _camera(*each))
+            yield np.asarray(cv2.resize(picture, CELL, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _camera(piece: Piece, place: Place) -> CameraPose:
+    """From above its right side."""
+    w, d, h = piece.size
+    low = max(0.0, h - 1.3) if piece.stands in ("hangs", "ceiling") else 0.0
+    middle = np.array([place.x, place.y + (d / 2 if piece.stands != "ceiling" else 0.0), (low + h) / 2])
+    away = 0.9 + 1.25 * max(w, d, h - low)
+    rise = -0.35 if piece.stands == "ceiling" else 0.4
+    side = np.array([0.45, 1.0, rise])
+    eye = middle + away * side / np.linalg.norm(side)
+    eye[2] = min(eye[2], 2.45)  # below the ceiling
+    return CameraPose.looking_at(eye, middle, FOVY)
+
+
+if __name__ == "__main__":
+    main()
