@@ -1,11 +1,13 @@
 """Small scenes of the kinds that other simulators have, written for tests: a flat of two rooms with a table."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from PIL import Image
 from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
 
 WIDTH, DEPTH, HEIGHT, THICK = 8.0, 5.0, 2.6, 0.1
 # Walls as boxes: middle and sides, m. The partition leaves a doorway of 1 m.
@@ -64,6 +66,86 @@ def write_sdf(folder: Path, *, extra: str = "", walls: bool = True) -> Path:
         '<?xml version="1.0"?><sdf version="1.6"><world name="flat"><include><uri>model://table</uri>'
         f"<pose>6 2 0 0 0 0.5</pose></include>{''.join(parts)}{extra}</world></sdf>"
     )
+    return path
+
+
+def scene(scale: float = 1.0) -> trimesh.Scene:
+    """The flat as nodes of a scene with y up, at a scale."""
+    whole = trimesh.Scene()
+    for name, mesh in {**boxes(), "table": table().apply_translation((6, 2, 0))}.items():
+        mesh.visual = TextureVisuals(material=PBRMaterial(baseColorFactor=(0.5, 0.6, 0.7, 1)))
+        whole.add_geometry(mesh, node_name=name, geom_name=name)
+    whole.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, [1, 0, 0]))
+    whole.apply_scale(scale)
+    return whole
+
+
+def write_glb(path: Path) -> Path:
+    """The flat as glTF."""
+    scene().export(path)
+    return path
+
+
+def write_obj(path: Path) -> Path:
+    """The flat as one mesh in centimetres."""
+    scene(100.0).to_geometry().export(path)
+    return path
+
+
+def write_habitat(folder: Path) -> Path:
+    """The flat as Habitat's stage, a chest, and a ball that moves."""
+    for kind in ("stages", "objects", "scenes"):
+        (folder / kind).mkdir(parents=True)
+    scene().export(folder / "stages" / "flat.glb")
+    (folder / "stages" / "flat.stage_config.json").write_text('{"render_asset": "flat.glb", "up": [0, 1, 0]}')
+    trimesh.creation.box((0.8, 0.9, 0.5)).export(folder / "objects" / "chest.glb")
+    trimesh.creation.icosphere(2, 0.1).export(folder / "objects" / "ball.glb")
+    for name in ("chest", "ball"):
+        (folder / "objects" / f"{name}.object_config.json").write_text(
+            json.dumps({"render_asset": f"{name}.glb"})
+        )
+    half = np.sqrt(0.5)
+    items = [
+        {"template_name": "objects/chest", "translation": [2, 0.45, -1], "rotation": [half, 0, half, 0],
+         "motion_type": "static"},
+        {"template_name": "ball", "translation": [3, 0.1, -3], "motion_type": "dynamic"},
+    ]  # fmt: skip
+    path = folder / "scenes" / "flat.scene_instance.json"
+    path.write_text(
+        json.dumps({"stage_instance": {"template_name": "stages/flat"}, "object_instances": items})
+    )
+    return path
+
+
+def write_mjcf(folder: Path) -> Path:
+    """The flat as MJCF: walls that are only seen, a cupboard with a hinged door, a motor, a cup that falls."""
+    walls = "".join(
+        f'<geom name="{name}" type="box" pos="{x} {y} 1.3" size="{a / 2} {b / 2} 1.3" material="plaster" contype="0" '
+        'conaffinity="0" group="1"/>'
+        for name, ((x, y), (a, b)) in WALLS.items()
+    )
+    Image.new("RGB", (16, 16), (200, 100, 50)).save(folder / "plaster.png")
+    path = folder / "flat.xml"
+    path.write_text(f"""<mujoco model="flat">
+  <asset>
+    <texture name="plaster" type="2d" file="plaster.png"/>
+    <material name="plaster" texture="plaster" texrepeat="2 2" texuniform="true"/>
+  </asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="4 3 1" pos="4 2.5 0"/>
+    {walls}
+    <body name="bed" pos="1.2 4.2 0.25">
+      <geom type="box" size="1 0.5 0.25" rgba="1 1 1 1" contype="0" conaffinity="0" group="1"/>
+      <geom type="box" size="1 0.5 0.25" group="0"/>
+    </body>
+    <body name="cupboard" pos="7.5 4.6 0.5">
+      <geom type="box" size="0.4 0.25 0.5"/>
+      <body name="leaf" pos="0 -0.3 0"><joint name="hinge" axis="0 0 1"/><geom type="box" size="0.4 0.02 0.5"/></body>
+    </body>
+    <body name="cup" pos="6 1 0.1"><freejoint/><geom type="box" size="0.04 0.04 0.05"/></body>
+  </worldbody>
+  <actuator><motor joint="hinge"/></actuator>
+</mujoco>""")
     return path
 
 

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.cli.check import UNUSABLE
 from experiments.cli.options import HelpFormatter
 from mjsim.importing import require_extra
 from mjsim.importing.values import AXES, UNITS, ImportDecision, ImportOptions
@@ -132,10 +131,8 @@ def run_house(arguments: argparse.Namespace) -> int:
     _print(out.name, decisions)
     for finding in report.findings:
         print(finding)
-    print(
-        f"{out} (mjsim run --house {out} samples it)" if report.usable else f"{out} cannot be used as it is"
-    )
-    return 0 if report.usable else UNUSABLE
+    print(f"{out} (mjsim run --house {out} samples it)")
+    return 0
 
 
 def _print(title: str, decisions: Sequence[ImportDecision]) -> None:

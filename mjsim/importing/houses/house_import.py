@@ -1,7 +1,7 @@
 """From a scene of another simulator to a house, with every decision on the way."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,11 @@ from trimesh.transformations import translation_matrix
 from mjsim.errors import AssetError, RenderError
 from mjsim.files import work_folder
 from mjsim.importing.houses.bins import place_bins
+from mjsim.importing.houses.gltf import INSTANCE, read_habitat, read_mesh_scene
 from mjsim.importing.houses.look import make_looks
+from mjsim.importing.houses.meshes import SUFFIXES as MESHES
+from mjsim.importing.houses.mjcf import SUFFIXES as MJCF
+from mjsim.importing.houses.mjcf import read_mjcf
 from mjsim.importing.houses.plan import Plan, make_plan
 from mjsim.importing.houses.rooms import Rooms, find_rooms, read_rooms, words_of
 from mjsim.importing.houses.sdf import SUFFIXES as SDF
@@ -24,12 +28,14 @@ from mjsim.importing.model_writer import write_png
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.validation.findings import Finding, errors
 from mjsim.model.validation.object_rules import SIZE
 from mjsim.model.validation.report import Report, check_house_name
 
 REPORT, PICTURE = "report.json", "preview.png"
 _STOREY = 2.1  # m above a floor, from where on another floor is another storey
 _LEVEL = 0.4  # share of the largest level that a floor has at least
+_UPWARD = 0.2  # share of level surfaces that face up, from where on only these count
 _FLAT = 0.95  # cosine of the slope of a floor
 _FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself
 _DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # m: thickness at most, width and height of a door leaf
@@ -41,7 +47,8 @@ def import_house(
     """Make a house of a scene, in a new folder; returns what was decided and the report of the check.
 
     Raises:
-        AssetError: The scene cannot be read or is no house, or the folder is there already; nothing is written.
+        AssetError: The scene cannot be read, is no house or has errors in the check, or the folder is there already;
+            nothing is written.
     """
     if out.exists() and not force:
         raise AssetError(f"{out} is already there; choose another --out, or use --force to replace it")
@@ -58,6 +65,8 @@ def import_house(
         new.mkdir()
         path = write_house(house, new, Catalogue.load())
         report = check_house_name(str(path))
+        if found := errors(report.findings):
+            raise AssetError(f"{source}: {_refusal(found)}")
         if (note := _write_picture(path, new / PICTURE)) is not None:
             decisions.append(note)
         text = json.dumps([asdict(decision) for decision in decisions], indent=2, ensure_ascii=False)
@@ -68,13 +77,30 @@ def import_house(
     return tuple(decisions), report
 
 
+def _refusal(found: Sequence[Finding]) -> str:
+    """Why a house that was made of a scene cannot be used, without the names of its files."""
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    subject = "" if found[0].subject == "house" else f"{found[0].subject} "
+    return f"the house made of it cannot be used: {subject}{found[0].message}{more}; correct the source"
+
+
 def read_scene(source: Path, options: HouseOptions) -> SourceScene:
     """Read a scene by the kind of its file; `AssetError` where it is of no known kind or cannot be read."""
     if not source.is_file():
         raise AssetError(f"there is no file {source}")
-    if source.suffix.lower() in SDF:
-        return read_sdf(source, options)
-    raise AssetError(f"{source} is no scene that can be read; give {', '.join(SDF)}")
+    for endings, read in _READERS:
+        if source.name.lower().endswith(endings):
+            return read(source, options)
+    known = ", ".join(ending for endings, _ in _READERS for ending in endings)
+    raise AssetError(f"{source} is of no kind that can be read; give {known}")
+
+
+_READERS: tuple[tuple[tuple[str, ...], Callable[[Path, HouseOptions], SourceScene]], ...] = (
+    (SDF, read_sdf),
+    (MJCF, read_mjcf),
+    (MESHES, read_mesh_scene),
+    ((INSTANCE,), read_habitat),
+)
 
 
 def _converted(
@@ -88,7 +114,7 @@ def _converted(
             "floor", f"z = {level:.3f} m", "the lowest large level area" if options.floor is None else "given"
         ),
     ]
-    decisions += [ImportDecision("left out", note, "") for note in scene.notes]
+    decisions += scene.notes
     pieces, notes = _kept(pieces, ceiling - level)
     decisions += notes
     doors = [piece for piece in pieces if _is_door(piece)]
@@ -107,7 +133,7 @@ def _converted(
     bins = place_bins(plan, rooms, Catalogue.load())
     looks = make_looks(drawn, partial(plan.on, rooms.floor))
     seen = _floor_share(drawn, plan, rooms)
-    name = label or source.stem.replace("_", " ").strip().capitalize()
+    name = label or source.name.split(".")[0].replace("_", " ").strip().capitalize()
     house = ImportedHouse(name, source.name, solids.solids, looks, plan, rooms, bins, seen >= _FLOOR_SEEN)
     triangles = sum(len(mesh.look.faces) for mesh in looks)
     pictures = len({id(mesh.look.picture) for mesh in looks if mesh.look.picture is not None})
@@ -145,6 +171,9 @@ def _levels(pieces: Sequence[Piece]) -> tuple[float, float]:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     area = np.linalg.norm(normals, axis=1)
     flat = np.abs(normals[:, 2]) > _FLAT * np.maximum(area, 1e-12)
+    upward = flat & (normals[:, 2] > 0)
+    if area[upward].sum() > _UPWARD * area[flat].sum():
+        flat = upward  # of a slab, what one stands on
     heights = corners[flat, :, 2].mean(axis=1)
     if not len(heights):
         raise AssetError("has no level surface; is it a house, and which way is up (--up)?")
@@ -153,14 +182,8 @@ def _levels(pieces: Sequence[Piece]) -> tuple[float, float]:
     total = np.bincount(bins - first, area[flat])
     wide = np.convolve(total, np.ones(3), mode="same")
     levels = np.flatnonzero(wide >= _LEVEL * wide.max())
-    near = np.abs(bins - first - levels[0]) <= 1
-    weights = area[flat] * near
-    # The upper side of a floor slab is what one stands on.
-    group = levels[0]
-    while group + 1 in levels or group + 2 in levels or group + 3 in levels:
-        group += 1 if group + 1 in levels else 2 if group + 2 in levels else 3
-    near = np.abs(bins - first - group) <= 1
-    weights = area[flat] * near
+    lowest = levels[0] + int(np.argmax(total[levels[0] : levels[0] + 3]))
+    weights = area[flat] * (np.abs(bins - first - lowest) <= 1)
     floor = float(np.average(heights, weights=weights))
     above = [(level + first) * 0.02 for level in levels if (level + first) * 0.02 > floor + _STOREY]
     return floor, (min(above) if above else np.inf)

@@ -36,7 +36,7 @@ _USES = (
     ),
     ("bathroom", "Bathroom", ("bath bathtub shower toilet washbasin",)),
     ("bedroom", "Bedroom", ("bed bunk wardrobe",)),
-    ("living_room", "Living room", ("sofa couch tv television fireplace",)),
+    ("living_room", "Living room", ("sofa couch tv television fireplace living",)),
     ("dining_room", "Dining room", ("dining",)),
     ("office", "Office", ("desk study office",)),
 )

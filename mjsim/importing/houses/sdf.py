@@ -13,9 +13,10 @@ from trimesh.transformations import compose_matrix
 from mjsim.errors import AssetError
 from mjsim.files import read_text
 from mjsim.importing.houses.meshes import primitive, read_parts
-from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene
+from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene, left_out
 from mjsim.importing.reading import PLAIN
 from mjsim.importing.surface import Floats, Surface
+from mjsim.importing.values import ImportDecision
 
 SUFFIXES = (".world", ".sdf")
 _VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
@@ -55,9 +56,11 @@ class _Reader:
         self._unknown: dict[str, int] = {}
         self._meshes: dict[Path, list[tuple[str, Surface]]] = {}
 
-    def unknown_kinds(self) -> tuple[str, ...]:
+    def unknown_kinds(self) -> tuple[ImportDecision, ...]:
         """Notes about shapes that cannot be read."""
-        return tuple(f"{n} of shape <{kind}> left out" for kind, n in self._unknown.items())
+        return tuple(
+            left_out(f"{n} of shape <{kind}>", "it cannot be read") for kind, n in self._unknown.items()
+        )
 
     def models(
         self, parent: ET.Element, frame: Floats, folder: Path, depth: int, *, static: bool, name: str = ""

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mjsim.importing.surface import Floats, Surface
+from mjsim.importing.values import ImportDecision
 
 TEXTURE_SIDE = 512  # px, longest side of a picture
 
@@ -34,7 +35,7 @@ class SourceScene:
 
     pieces: tuple[Piece, ...]
     kind: str  # of the source, such as `SDF world`
-    notes: tuple[str, ...] = ()  # what was left out on the way, one line each
+    notes: tuple[ImportDecision, ...] = ()  # what was decided on the way
     rooms: tuple[NamedRoom, ...] = ()  # where the source names them
 
 
@@ -58,9 +59,14 @@ class Missing:
     skip: bool
     files: list[str] = field(default_factory=list)
 
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[ImportDecision, ...]:
         """What was left out, for the report."""
-        return (f"{len(self.files)} missing: {', '.join(self.files[:6])}",) if self.files else ()
+        return (left_out(f"{len(self.files)} missing", ", ".join(self.files[:6])),) if self.files else ()
+
+
+def left_out(what: str, why: str) -> ImportDecision:
+    """A line of the report about something that the house lacks."""
+    return ImportDecision("left out", what, why)
 
 
 def moved(pieces: list[Piece], transform: Floats) -> list[Piece]:

@@ -7,7 +7,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from house_scenes import write_sdf
+import trimesh
+from house_scenes import write_glb, write_habitat, write_mjcf, write_obj, write_sdf
 
 from experiments.cli import main as cli
 from mjsim.errors import AssetError
@@ -15,6 +16,7 @@ from mjsim.importing.houses.house_import import import_house
 from mjsim.importing.houses.values import HouseOptions
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
+from mjsim.model.validation.compiled import Compiled
 
 
 def imported(tmp_path, source, **options):
@@ -116,6 +118,53 @@ def test_the_command_imports_and_reports(tmp_path, capsys):
     assert json.loads((out / "report.json").read_text())[0]["what"] == "source"
 
 
+def colliding(house, name):
+    """Lower and upper corner of what collides under a name, m."""
+    model = house.model
+    geoms = [g for g in range(model.ngeom) if model.geom(g).name.startswith(name) and model.geom_contype[g]]
+    points = np.concatenate([Compiled.of("house", Path(), model).points(g) for g in geoms])
+    return points.min(axis=0), points.max(axis=0)
+
+
+def test_gltf_and_obj_give_the_same_floor(tmp_path):
+    area = []
+    for name, write in (("glb", write_glb), ("obj", write_obj)):
+        folder = tmp_path / name
+        folder.mkdir()
+        decisions, catalogue = imported(folder, write(folder / f"flat.{name}"))
+        area.append(decisions["outline"])
+        assert len(catalogue.rooms) == 2
+        bounds = compiled_house(catalogue).rooms.bounds
+        np.testing.assert_allclose(np.diff(np.reshape(bounds, (2, 2)), axis=0)[0], (8, 5), atol=0.35)
+    assert area[0] == area[1]
+
+
+def test_an_obj_scene_tells_its_unit_and_axes(tmp_path):
+    decisions, _ = imported(tmp_path, write_obj(tmp_path / "flat.obj"))
+    assert decisions["up"].startswith("y")
+    assert decisions["unit"].startswith("cm")
+
+
+def test_a_habitat_scene_is_a_stage_with_objects_in_their_places(tmp_path):
+    decisions, catalogue = imported(tmp_path, write_habitat(tmp_path / "data"))
+    assert "ball" in decisions["loose things"]
+    low, high = colliding(compiled_house(catalogue), "chest")
+    np.testing.assert_allclose(low, (1.75, 0.6, 0.0), atol=0.02)  # 0.8 x 0.9 x 0.5 m, turned by 90 degrees
+    np.testing.assert_allclose(high, (2.25, 1.4, 0.9), atol=0.02)
+
+
+def test_an_mjcf_scene_stands_still_and_walls_that_were_only_seen_are_solid(tmp_path):
+    decisions, catalogue = imported(tmp_path, write_mjcf(tmp_path))
+    house = compiled_house(catalogue)
+    assert decisions["outline"].startswith("closed by its walls")
+    assert next(iter(catalogue.rooms.values())) == "Bedroom"
+    assert "cup" in decisions["loose things"]
+    assert (house.model.nu, house.model.njnt) == (0, 0)
+    low, high = colliding(house, "cupboard")
+    np.testing.assert_allclose(high - low, (0.8, 0.57, 1.0), atol=0.02)
+    assert house.model.ntex >= 1  # the plaster
+
+
 INCLUDE = "<include><uri>model://chair</uri></include>"
 
 
@@ -163,6 +212,48 @@ def test_a_folder_that_is_there_is_kept(tmp_path):
         with pytest.raises(AssetError, match="choose another --out"):
             import_house(source, out, HouseOptions(), force=force)
     assert [p.name for p in out.iterdir()] == ["letter.txt"]
+
+
+@pytest.mark.parametrize(
+    ("write", "damage", "reason"),
+    [
+        (write_mjcf, lambda text: text.replace("<worldbody>", '<worldbody><geom type="ball"/>'), "invalid"),
+        (write_mjcf, lambda text: text[: len(text) // 2], "cannot read model"),
+        (write_habitat, lambda text: text.replace("stages/flat", "stages/none"), "stage 'none'"),
+        (write_habitat, lambda text: text.replace("[2, 0.45, -1]", "[2, -1]"), "3 numbers"),
+        (write_habitat, lambda text: text[:-5], "cannot read"),
+        (write_habitat, lambda _: "[]", "no JSON object"),
+    ],
+)
+def test_a_damaged_scene_is_refused_by_its_cause(tmp_path, write, damage, reason):
+    source = write(tmp_path)
+    source.write_text(damage(source.read_text()))
+    with pytest.raises(AssetError, match=reason) as caught:
+        import_house(source, tmp_path / "out", HouseOptions())
+    assert str(tmp_path) in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("mesh", "options", "reason"),
+    [
+        (trimesh.creation.box((0.5, 0.5, 0.9)), {}, "nowhere to walk"),
+        (trimesh.creation.box((900, 700, 3)), {}, "spans"),
+        (trimesh.creation.icosphere(3, 4.0), {}, "cannot be used|nowhere|level"),
+        (trimesh.creation.box((8, 0.01, 5)), {"up": "z"}, "nowhere|level"),
+    ],
+)
+def test_what_is_no_house_is_refused(tmp_path, mesh, options, reason):
+    mesh.export(tmp_path / "it.glb")
+    with pytest.raises(AssetError, match=reason):
+        import_house(tmp_path / "it.glb", tmp_path / "out", HouseOptions(**options))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_of_another_kind_is_refused_with_the_kinds_that_are_read(tmp_path):
+    (tmp_path / "house.usd").write_text("x")
+    with pytest.raises(AssetError, match=r"\.world, \.sdf, \.xml"):
+        import_house(tmp_path / "house.usd", tmp_path / "out", HouseOptions())
 
 
 @pytest.mark.parametrize("name", ["there_is_none.world", "."])

@@ -1,0 +1,141 @@
+"""Scenes of one mesh file (glTF, GLB, OBJ, ...), and Habitat's scene_instance.json that composes several."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from trimesh.transformations import quaternion_matrix, scale_matrix
+
+from mjsim.errors import AssetError
+from mjsim.files import read_json, read_text
+from mjsim.importing.houses.meshes import GLTF, Y_TO_Z, read_parts
+from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene, left_out
+from mjsim.importing.surface import Floats
+from mjsim.importing.values import UNITS, ImportDecision
+
+INSTANCE = ".scene_instance.json"
+_SIDE = (3.0, 60.0)  # m, longest sides that houses have
+_MESHES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".dae")
+
+
+def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
+    """Read a mesh file in which a house stands; the nodes are its pieces."""
+    parts = read_parts(path)
+    points = np.concatenate([surface.corners.reshape(-1, 3) for _, surface in parts])
+    sides = np.ptp(points, axis=0)
+    frame = np.eye(4)
+    notes: list[ImportDecision] = []
+    known = path.suffix.lower() in (*GLTF, ".dae")  # which say unit and up
+    given = options.up or _stage_up(path)
+    up = given or ("z" if known else "y" if sides[1] <= sides[2] else "z")
+    if up == "y" and not known:
+        frame = Y_TO_Z
+        notes.append(ImportDecision("up", "y", "given" if given else "the house is lowest along it"))
+    elif known and given == ("z" if path.suffix.lower() in GLTF else "y"):
+        frame = np.linalg.inv(Y_TO_Z) if up == "z" else Y_TO_Z
+    unit = options.units
+    if unit is None and not known:
+        longest = float(sides.max())
+        unit = next((u for u, m in UNITS.items() if _SIDE[0] <= longest * m <= _SIDE[1]), "m")
+        notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
+    frame = scale_matrix(UNITS[unit or "m"] * options.scale) @ frame
+    pieces = tuple(Piece(name, surface.moved(frame)) for name, surface in parts)
+    return SourceScene(pieces, f"{path.suffix[1:].upper()} scene", tuple(notes))
+
+
+def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
+    """Read a stage with its objects; `AssetError` where a template or its mesh is not there."""
+    scene = _read(path)
+    missing = Missing(options.skip_missing)
+    reader = _Habitat(path, missing)
+    stage = scene.get("stage_instance")
+    if not isinstance(stage, dict):
+        raise AssetError(f"{path} has no stage_instance; give the scene of a house")
+    pieces = list(reader.instance(stage, "stage"))
+    for item in scene.get("object_instances", []):
+        pieces += reader.instance(item, "object")
+    notes = list(missing.notes())
+    if found := scene.get("articulated_object_instances", []):
+        notes.append(left_out(f"{len(found)} articulated objects", "URDF is not read"))
+    if not pieces:
+        raise AssetError(f"{path} has no mesh that is there; add its stages and objects")
+    return SourceScene(tuple(pieces), "Habitat scene", tuple(notes))
+
+
+def _stage_up(path: Path) -> str | None:
+    """Which way is up in a mesh by Habitat's stage_config.json beside it; None where there is none."""
+    config = path.with_suffix(".stage_config.json")
+    if not config.is_file():
+        return None
+    return "z" if _is_z_up(_read(config)) else "y"
+
+
+def _is_z_up(config: dict[str, Any]) -> bool:
+    return int(np.argmax(np.abs(_numbers(config.get("up", [0, 1, 0]), 3, Path("stage_config.json"))))) == 2
+
+
+class _Habitat:
+    def __init__(self, path: Path, missing: Missing) -> None:
+        self._path = path
+        self._missing = missing
+        root = path.resolve().parent.parent
+        self._files = {
+            p.name: p for p in sorted(root.rglob("*")) if p.name.endswith(("_config.json", *_MESHES))
+        }
+
+    def instance(self, item: dict[str, Any], kind: str) -> Iterator[Piece]:
+        """Pieces of a stage or an object where it stands, z up."""
+        name = str(item.get("template_name", "")).rpartition("/")[2]
+        config_file = self._files.get(f"{name}.{kind}_config.json")
+        config = _read(config_file) if config_file else {}
+        asset = str(config.get("render_asset", f"{name}.glb"))
+        mesh = (config_file or self._path).parent / asset
+        if not mesh.is_file():
+            mesh = self._files.get(Path(asset).name, mesh)
+        if not mesh.is_file():
+            if not self._missing.skip:
+                raise AssetError(
+                    f"{self._path} names the {kind} {name!r}, whose mesh {asset} is not there; add it, or leave out "
+                    "what is missing with --skip-missing"
+                )
+            self._missing.files.append(name)
+            return
+        frame = np.eye(4)
+        if (rotation := item.get("rotation")) is not None:
+            frame = quaternion_matrix(_numbers(rotation, 4, self._path))
+        frame[:3, 3] = _numbers(item.get("translation", [0, 0, 0]), 3, self._path)
+        scale = _numbers(config.get("scale", [1, 1, 1]), 3, mesh)
+        scale = scale * float(item.get("uniform_scale", 1.0))
+        upright = np.eye(4)
+        if _is_z_up(config):  # z is up in the mesh; Habitat turns it so that y is
+            upright = np.linalg.inv(Y_TO_Z)
+        own: Floats = Y_TO_Z @ frame @ np.diag([*scale, 1.0]) @ upright @ np.linalg.inv(Y_TO_Z)
+        if mesh.suffix.lower() not in GLTF:
+            own = own @ Y_TO_Z
+        loose = kind == "object" and str(item.get("motion_type", "dynamic")).lower() == "dynamic"
+        for part, surface in read_parts(mesh, own):
+            yield Piece(part if kind == "stage" else name, surface, loose=loose)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        found = read_json(read_text(path))
+    except (OSError, ValueError) as error:
+        raise AssetError(f"cannot read {path}: {error}; is it complete?") from error
+    if not isinstance(found, dict):
+        raise AssetError(f"{path} holds no JSON object; export it again")
+    return found
+
+
+def _numbers(values: Any, count: int, path: Path) -> Floats:
+    try:
+        found = np.array(values, np.float64)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (count,) or not np.isfinite(found).all():
+        raise AssetError(
+            f"{path} has {json.dumps(values)[:60]} where {count} numbers should stand; correct it"
+        )
+    return found

@@ -1,0 +1,193 @@
+"""MJCF scenes: geoms as they stand at the start; joints, actuators and whatever else moves or measures is left out."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import trimesh
+from PIL import Image
+
+from mjsim.errors import AssetError
+from mjsim.importing.houses.meshes import primitive
+from mjsim.importing.houses.values import TEXTURE_SIDE, HouseOptions, Missing, Piece, SourceScene, left_out
+from mjsim.importing.surface import Floats, Surface
+from mjsim.model.model_files import read_model
+
+SUFFIXES = (".xml", ".mjcf")
+_SEEN = (0, 1, 2)  # groups that viewers show
+_ENDLESS = 15.0  # m, half of the side that a plane without end is given
+_GEOM = mujoco.mjtGeom
+
+
+def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
+    """Read a scene; `AssetError` where it does not compile or names a mesh that is not there."""
+    spec = read_model(path)
+    missing = Missing(options.skip_missing)
+    _without_missing_meshes(spec, path, missing)
+    pictures, absent = _take_pictures(spec)
+    try:
+        model = spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())
+        raise AssetError(f"{path} does not compile: {reason}; correct it in MuJoCo first") from error
+    pieces = tuple(_pieces(model, pictures))
+    if not pieces:
+        raise AssetError(f"{path} has no geom that can be read; give the scene of a house")
+    notes = [
+        *missing.notes(),
+        *([left_out(f"{len(absent)} missing pictures", ", ".join(absent[:4]))] if absent else []),
+    ]
+    return SourceScene(pieces, "MJCF scene", tuple(notes))
+
+
+@dataclass(frozen=True, eq=False)
+class _Picture:
+    """The picture of a material."""
+
+    image: Floats  # RGB from 0 to 1, (height, width, 3)
+    repeat: Floats  # (2,)
+    uniform: bool  # whether it repeats by the metre on primitives
+
+
+def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: Missing) -> None:
+    absent = {mesh.name: mesh.file for mesh in spec.meshes if mesh.file and not Path(mesh.file).is_file()}
+    if not absent:
+        return
+    if not missing.skip:
+        raise AssetError(
+            f"{path} names {len(absent)} meshes that are not there, such as {next(iter(absent.values()))}; "
+            "add them, or leave them out with --skip-missing"
+        )
+    missing.files += [Path(file).name for file in absent.values()]
+    for geom in list(spec.geoms):
+        if geom.meshname in absent:
+            spec.delete(geom)
+    for mesh in list(spec.meshes):
+        if mesh.name in absent:
+            spec.delete(mesh)
+
+
+def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]:
+    """Pictures by the names of materials, and files that are not there; the model is left without textures."""
+    files = {
+        t.name: t.file for t in spec.textures if t.file
+    }  # pictures for cubes, too, are drawn on each side
+    images: dict[str, Floats] = {}
+    found, absent = {}, []
+    for material in spec.materials:
+        name = next((t for t in material.textures if t in files), None)
+        for role in range(len(material.textures)):
+            material.textures[role] = ""
+        if name is None:
+            continue
+        if name not in images:
+            try:
+                with Image.open(files[name]) as picture:
+                    small = picture.convert("RGB")
+                    small.thumbnail((TEXTURE_SIDE, TEXTURE_SIDE))
+                    images[name] = np.asarray(small, np.float64) / 255
+            except OSError:
+                absent.append(Path(files[name]).name)
+                continue
+        found[material.name] = _Picture(images[name], np.array(material.texrepeat), bool(material.texuniform))
+    for texture in list(spec.textures):
+        spec.delete(texture)
+    return found, absent
+
+
+def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[Piece]:
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    alpha = np.where(
+        model.geom_matid >= 0,
+        model.mat_rgba[model.geom_matid, 3] if model.nmat else 1.0,
+        model.geom_rgba[:, 3],
+    )
+    shown = np.isin(model.geom_group, _SEEN) & (alpha > 0)
+    bodies = model.geom_bodyid
+    # Bodies of many scenes have geoms to see and others to collide. Where nothing collides, what is seen is solid.
+    has_look = np.isin(bodies, np.unique(bodies[shown & ~collides])) & (bodies > 0)
+    has_solid = np.isin(bodies, np.unique(bodies[collides])) & (bodies > 0)
+    for geom in range(model.ngeom):
+        seen = bool(shown[geom] and not (collides[geom] and has_look[geom]))
+        solid = bool(collides[geom] or (shown[geom] and not has_solid[geom]))
+        surface = _surface(model, geom, pictures) if seen or solid else None
+        if surface is not None:
+            frame = np.eye(4)
+            frame[:3, :3], frame[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
+            loose = bool(model.body_weldid[bodies[geom]] != 0)
+            yield Piece(_name(model, geom), surface.moved(frame), seen, solid, loose)
+
+
+def _name(model: Any, geom: int) -> str:
+    root = int(model.body_rootid[model.geom_bodyid[geom]])
+    mesh = int(model.geom_dataid[geom]) if model.geom_type[geom] == _GEOM.mjGEOM_MESH else -1
+    names = (
+        model.body(root).name if root else "",
+        model.geom(geom).name,
+        model.mesh(mesh).name if mesh >= 0 else "",
+    )
+    return next((name for name in names if name), f"geom {geom}")
+
+
+def _surface(model: Any, geom: int, pictures: dict[str, _Picture]) -> Surface | None:
+    """A geom's surface in its own frame; None for what has none, such as a height field."""
+    material = int(model.geom_matid[geom])
+    rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+    picture = pictures.get(model.material(material).name) if material >= 0 else None
+    colour = np.clip(rgba[:3].astype(np.float64), 0.0, 1.0)
+    if model.geom_type[geom] == _GEOM.mjGEOM_MESH:
+        return _mesh(model, int(model.geom_dataid[geom]), colour, picture)
+    made = _shape(int(model.geom_type[geom]), model.geom_size[geom])
+    if made is None:
+        return None
+    surface = primitive(made, colour)
+    if picture is None:
+        return surface
+    sides = np.ones(3) if picture.uniform else np.maximum(made.extents, 1e-3)
+    axis = np.abs(made.face_normals).argmax(axis=1)
+    plane = np.array([[1, 2], [0, 2], [0, 1]])[axis]  # the axes along which a face lies
+    places = surface.corners / sides
+    uv = np.take_along_axis(places, plane[:, None, :].repeat(3, axis=1), axis=2) * picture.repeat
+    return _painted(surface, uv, picture)
+
+
+def _mesh(model: Any, mesh: int, colour: Floats, picture: _Picture | None) -> Surface:
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    start, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    vertices = model.mesh_vert[first : first + count].astype(np.float64)
+    face = model.mesh_face[start : start + faces]
+    surface = primitive(trimesh.Trimesh(vertices, face, process=False), colour)
+    if picture is None or model.mesh_texcoordadr[mesh] < 0:
+        return surface
+    places = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :][
+        model.mesh_facetexcoord[start : start + faces]
+    ]
+    uv = places.astype(np.float64) * picture.repeat
+    uv[..., 1] = 1.0 - uv[..., 1]  # MuJoCo counts from the top
+    return _painted(surface, uv, picture)
+
+
+def _painted(surface: Surface, uv: Floats, picture: _Picture) -> Surface:
+    return Surface(surface.corners, surface.colours, uv, np.zeros(len(surface), np.int64), (picture.image,))
+
+
+def _shape(kind: int, size: Floats) -> trimesh.Trimesh | None:
+    if kind == _GEOM.mjGEOM_PLANE:
+        half = np.where(size[:2] > 0, np.minimum(size[:2], _ENDLESS), _ENDLESS)
+        return trimesh.creation.box([*(2 * half), 0.002]).apply_translation([0, 0, -0.001])
+    if kind == _GEOM.mjGEOM_BOX:
+        return trimesh.creation.box(2 * size)
+    if kind == _GEOM.mjGEOM_SPHERE:
+        return trimesh.creation.icosphere(2, float(size[0]))
+    if kind == _GEOM.mjGEOM_ELLIPSOID:
+        return trimesh.creation.icosphere(2, 1.0).apply_scale(size)
+    if kind == _GEOM.mjGEOM_CYLINDER:
+        return trimesh.creation.cylinder(float(size[0]), 2 * float(size[1]), sections=24)
+    if kind == _GEOM.mjGEOM_CAPSULE:
+        return trimesh.creation.capsule(2 * float(size[1]), float(size[0]), count=[12, 12])
+    return None
