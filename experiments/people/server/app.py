@@ -328,7 +328,7 @@ class StudyServer:
         back = self._recruiter.way_back("finished", await self._store.identity(person.id))
         section = self._study.texts["completion"]
         values = {**shown.values, "paragraphs": section.paragraphs(), "completion": section}
-        return self._page(request, shown.template, **values, back=back)
+        return self._page(request, shown.template, **values, back=back, finished=True)
 
     def _left(self, request: Request, person: Person) -> Response:
         """The last page of somebody who did not finish."""

@@ -18,13 +18,23 @@ FIREFOX = next(
     (path for path in map(Path, ("/usr/bin/firefox", "/usr/bin/firefox-esr")) if path.is_file()), None
 )
 XVFB = shutil.which("Xvfb")  # without a display, even one like this, Firefox has no WebGL
-KEYS = {"Enter": "\ue007", "Tab": "\ue004", "ArrowLeft": "\ue012", "ArrowRight": "\ue014"}  # of WebDriver
+KEYS = {"Enter": "\ue007", "Tab": "\ue004"}  # of WebDriver
+KEYS |= {"ArrowLeft": "\ue012", "ArrowRight": "\ue014", "ArrowDown": "\ue015"}
 TRIES = 5
 EVENTS = ["log.entryAdded", "network.beforeRequestSent"]
 
 
+# Where an element is that is scrolled into view; null where it is not there yet.
+MIDDLE = """(() => {{
+    const element = document.querySelector({selector});
+    element?.scrollIntoView({{ block: "center", behavior: "instant" }});
+    const box = element?.getBoundingClientRect();
+    return box && JSON.stringify([box.x + box.width / 2, box.y + box.height / 2]);
+}})()"""
+
+
 class Page:
-    """A page of any browser.
+    """A page of any browser; after `enter_frame`, scripts run and clicks go to the page in its only frame.
 
     Attributes:
         faults: Errors and warnings of its console.
@@ -61,7 +71,22 @@ class Chromium(Page):
         page.on("pageerror", lambda error: self.faults.append(str(error)))
         page.on("request", lambda request: self.asked.append(request.url))
         self.goto, self.reload, self.prepare = page.goto, page.reload, page.add_init_script
-        self._evaluate, self.down, self.up = page.evaluate, page.keyboard.down, page.keyboard.up
+        self.down, self.up = page.keyboard.down, page.keyboard.up
+        self._in_frame = False
+
+    @property
+    def shown(self):
+        """What scripts run in: the page, or the one in its frame."""
+        return self._page.frames[-1] if self._in_frame else self._page
+
+    def _evaluate(self, expression):
+        return self.shown.evaluate(expression)
+
+    def enter_frame(self, inside=True):
+        self._in_frame = inside
+
+    def click(self, selector):
+        self.shown.locator(selector).first.click()
 
     def resize(self, width, height):
         self._page.set_viewport_size({"width": width, "height": height})
@@ -80,9 +105,9 @@ class Firefox(Page):
     def __init__(self, socket):
         super().__init__()
         self._socket, self._count = socket, 0
-        self._ask("session.new", capabilities={})
+        self._ask("session.new", capabilities={"alwaysMatch": {"acceptInsecureCerts": True}})
         # The first one never has the focus.
-        self._tab = self._ask("browsingContext.create", type="tab")["context"]
+        self._tab = self._shown = self._ask("browsingContext.create", type="tab")["context"]
         self._ask("session.subscribe", events=EVENTS, contexts=[self._tab])
 
     def goto(self, url):
@@ -99,8 +124,24 @@ class Firefox(Page):
         """Run a script in every page before its own."""
         self._ask("script.addPreloadScript", functionDeclaration=f"() => {{ {script} }}")
 
+    def enter_frame(self, inside=True):
+        self._shown = self._tab
+        if inside:
+            self.wait_for("document.querySelector('iframe')")
+            (tab,) = self._ask("browsingContext.getTree", root=self._tab)["contexts"]
+            self._shown = tab["children"][0]["context"]
+
+    def click(self, selector):
+        middle = MIDDLE.format(selector=json.dumps(selector))
+        self.wait_for(middle)
+        x, y = json.loads(self.evaluate(middle))
+        move = {"type": "pointerMove", "x": round(x), "y": round(y)}
+        press = [{"type": kind, "button": 0} for kind in ("pointerDown", "pointerUp")]
+        mouse = [{"type": "pointer", "id": "mouse", "actions": [move, *press]}]
+        self._ask("input.performActions", context=self._shown, actions=mouse)
+
     def _evaluate(self, expression):
-        target = {"context": self._tab}
+        target = {"context": self._shown}
         answer = self._ask("script.evaluate", expression=expression, target=target, awaitPromise=True)
         return answer["result"].get("value")
 
@@ -117,7 +158,7 @@ class Firefox(Page):
 
     def _act(self, *actions):
         keys = [{"type": "key", "id": "keys", "actions": actions}]
-        self._ask("input.performActions", context=self._tab, actions=keys)
+        self._ask("input.performActions", context=self._shown, actions=keys)
 
     def _ask(self, method, **params):
         self._count += 1

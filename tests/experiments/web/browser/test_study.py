@@ -1,51 +1,35 @@
-"""A study in a browser: no page breaks a rule of axe-core, and keys alone lead from the first page to the last."""
+"""A study in a browser: no page breaks a rule of axe-core, and who shares a browser finds nothing of others."""
 
 import sqlite3
 import subprocess
 import sys
 
-import msgspec
 import pytest
 
 from benchmarks.support.play_server import PATIENCE
-from experiments.house import House
-from experiments.record import records
-from experiments.replay.replay import replay
-from experiments.trials.setup import trial_episode
-from experiments.trials.trial_config import TrialConfig
-from tests.experiments.web.browser.key_presser import WATCH, KeyPresser, choose
+from tests.experiments.web.browser.study_visit import STUDY
 from tests.experiments.web.browser.test_accessibility import DESK, PHONE, violations
 
-STUDY = """
-[[cells]]
-assistance = "optimal"
-objects = 1
-people = 4
-house_seeds = 0
-fidelity = "event"
-
-[study]
-name = "small"
-title = "A small study"
-institution = "a test"
-contact = "nobody@example.org"
-phases = ["consent", "device", "story", "comprehension", "training", "task", "survey", "debriefing", "completion"]
-
-[study.device]
-frames_per_s = 1
-latency_ms = 100000
-width = 300
-height = 300
-
+CODE = """
 [study.recruitment]
 completed = "DONE"
 """
+LAB = """
+[study.recruitment]
+platform = "lab"
+"""
+QUESTION = """
+[study.recruitment]
+platform = "external-question"
+sites = ["https://worker.example.org"]
+"""
+TASK = "hitId=3HIT&turkSubmitTo=https%3A%2F%2Fworker.example.org"
 
 
 @pytest.fixture
-def served(tmp_path):
-    """URL and folder of a study that is served."""
-    (tmp_path / "study.toml").write_text(STUDY)
+def served(request, tmp_path):
+    """URL and folder of a study that is served, with a table of recruitment."""
+    (tmp_path / "study.toml").write_text(STUDY + getattr(request, "param", CODE))
     words = ["study", "serve", "study.toml", "--out", "out", "--port", "0", "--no-open"]
     with (tmp_path / "log.txt").open("w") as log:
         process = subprocess.Popen(
@@ -62,10 +46,10 @@ def served(tmp_path):
         process.wait(PATIENCE)
 
 
-def at_phase(folder, name):
+def at_phase(folder, name, status="arrived"):
     """Let everybody be in a phase, as if what comes before it was done."""
     with sqlite3.connect(folder / "out" / "study.db", timeout=PATIENCE) as database:
-        database.execute("UPDATE person SET phase = ?", (name,))
+        database.execute("UPDATE person SET phase = ?, status = ?", (name, status))
     database.close()
 
 
@@ -116,54 +100,57 @@ def test_no_page_breaks_a_rule_of_axe_core(served, chromium, look):
     assert found == []
 
 
-@pytest.mark.slow
-def test_a_whole_visit_by_keys_from_consent_to_the_completion_code(served, chromium_page):
+@pytest.mark.parametrize("served", [QUESTION], indirect=True)
+@pytest.mark.parametrize("look", [DESK, PHONE])
+def test_pages_of_a_task_in_a_frame_break_no_rule_of_axe_core(served, chromium, look):
     url, folder = served
-    page, house = chromium_page, House.load()
-    page.prepare(WATCH)
-    page.resize(800, 600)
-    page.goto(url)
-    for title, keys in (
-        ("A small study", ["Enter"]),
-        ("Your consent", ["Tab", " ", "Enter"]),
-        ("Your computer", []),
+    page = chromium.new_context(**look).new_page()
+    page.goto(f"{url}?assignmentId=ASSIGNMENT_ID_NOT_AVAILABLE&hitId=3HIT")
+    assert page.get_by_text("This is a preview").is_visible()
+    found = violations(page)
+    page.goto(f"{url}?assignmentId=3ASSIGNMENT&{TASK}")
+    page.get_by_role("button", name="Begin").press("Enter")
+    page.get_by_role("heading", name="Your consent").wait_for()
+    for status, said in (
+        ("timed_out", "Your time is up"),
+        ("withdrawn", "You have left"),
+        ("finished", "Thank"),
     ):
-        page.wait_for(f"document.querySelector('h1')?.textContent === '{title}'")
-        for key in keys:
-            page.hold(key)
-    page.wait_for("document.querySelector('#state')?.textContent.includes('Press the W')")
-    page.hold("w")
-    page.wait_for("document.activeElement?.className === 'button'")
-    page.hold("Enter")
-    page.wait_for("document.querySelector('h1')?.textContent === 'Your task'")
-    page.evaluate("document.querySelector('form .button').focus()")
-    page.hold("Enter")
-    page.wait_for("document.querySelectorAll('fieldset').length === 3")
-    for number, down in enumerate((0, 1, 1)):
-        page.evaluate(f"document.querySelectorAll('fieldset')[{number}].querySelector('input').focus()")
-        page.hold(" ")
-        for _ in range(down):
-            page.hold("ArrowDown")
-    page.hold("Enter")
-    page.wait_for("document.querySelector('#play')?.dataset.trial === 'training'")
-    address = page.evaluate("location.href")
-    page.goto(f"{address}?draw=browser")
-    name = sorted((folder / "out" / "visits").iterdir())[0]
-    settings = msgspec.json.decode((name / "visit.json").read_bytes())["trials"]
-    for trial in ("training", "task"):
-        page.wait_for(f"document.querySelector('#play')?.dataset.trial === '{trial}'")
-        choose(page, "Start the training" if trial == "training" else "Start")
-        page.wait_for("document.querySelectorAll('#list li').length > 0")
-        KeyPresser(page, house, trial_episode(TrialConfig.of(settings[trial]), house)).tidy()
-    page.wait_for("document.querySelectorAll('fieldset.scale').length === 17")
-    for number in range(17):
-        page.evaluate(f"document.querySelectorAll('fieldset')[{number}].querySelectorAll('input')[3].focus()")
-        page.hold(" ")
-    page.hold("Enter")
-    page.wait_for("document.querySelector('h1')?.textContent === 'What this study is about'")
-    page.evaluate("document.querySelector('form .button').focus()")
-    page.hold("Enter")
-    page.wait_for("document.body.textContent.includes('DONE')")
-    run = name / "task"
-    assert msgspec.json.decode((run / records.METRICS).read_bytes())["delivered"] == 1
-    assert all(verdict.verified for verdict in replay(run).verdicts)
+        at_phase(folder, "completion", status)
+        page.reload()
+        assert said in page.get_by_role("heading").inner_text()
+        assert page.get_by_text("give the task back").is_visible() is (status != "finished")
+        found += violations(page)
+    assert page.locator("form").get_attribute("action") == "https://worker.example.org/mturk/externalSubmit"
+    assert found == []
+
+
+@pytest.mark.parametrize("served", [LAB], indirect=True)
+def test_in_a_lab_the_next_person_finds_nothing_of_the_last(served, chromium):
+    url, folder = served
+    page = chromium.new_context(**DESK).new_page()
+    page.set_default_timeout(1000.0 * PATIENCE)
+    kept = "JSON.stringify([{...localStorage}, {...sessionStorage}, document.cookie])"
+    page.goto(url)
+    page.get_by_role("button", name="Begin").press("Enter")
+    page.get_by_role("heading", name="Your consent").wait_for()
+    link = page.url
+    page.evaluate(
+        f"localStorage.setItem('mjsim-visit', '\"{link}\"'); localStorage.setItem('mjsim-settings', '{{}}')"
+    )
+    at_phase(folder, "completion", "finished")
+    page.reload()
+    page.get_by_role("link", name="Next participant").wait_for()
+    assert violations(page) == []
+    page.get_by_role("link", name="Next participant").press("Enter")
+    page.get_by_role("heading", name="A small study").wait_for()
+    for leave in (lambda: None, page.reload):
+        leave()
+        assert page.get_by_role("link").count() == 0 and page.evaluate(kept) == '[{},{},""]'
+    page.go_back()
+    page.get_by_role("link", name="Next participant").wait_for()
+    assert page.locator("form").count() == 0 and page.evaluate(kept) == '[{},{},""]'
+    page.get_by_role("link", name="Next participant").press("Enter")
+    page.get_by_role("button", name="Begin").press("Enter")
+    page.get_by_role("heading", name="Your consent").wait_for()
+    assert page.url != link
