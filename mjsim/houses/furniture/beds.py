@@ -53,7 +53,7 @@ def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: i
     each = w / pillows
     for i in range(pillows):
         x = w * ((i + 0.5) / pillows - 0.5)
-        b.soft("linen", (x, y[0] + 0.24, z + 0.25), (min(0.34, each / 2 - 0.03), 0.2, 0.09), (-0.35, 0, 0))
+        b.soft("linen", (x, y[0] + 0.26, z + 0.235), (min(0.34, each / 2 - 0.03), 0.21, 0.07), (-0.2, 0, 0))
         if pillows > 1 and b.smaller == 0:
             b.pillow(b.cloth, (x, y[0] + 0.42, z + 0.27), (0.22, 0.09, 0.15), 0.6)
 

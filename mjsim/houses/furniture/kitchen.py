@@ -31,10 +31,10 @@ class Run:
         for i, name in enumerate(self.modules):
             x = WIDE * (i + 0.5) - self.w / 2
             top = getattr(self, f"_{name}")(x)
-            if name not in ("fridge", "tall_oven"):
-                self.b.box("tile", WIDE, (0.0, 0.006), (TOP, LOW), x, seen=True)
             if self.hanging and name in ("drawers", "doors", "dishwasher", "sink") and self.b.chance(0.85):
                 top = self._hang(x)
+            if name not in ("fridge", "tall_oven"):  # low where a window may be
+                self.b.box("tile", WIDE, (0.0, 0.008), (TOP, LOW if top > TOP else TOP + 0.05), x, seen=True)
             self.parts.append((x - WIDE / 2, 0.0, x + WIDE / 2, DEEP, top))
         use = ((-self.w / 2, DEEP, self.w / 2, DEEP + 0.9),)
         size = (self.w, DEEP, max(LOW, *(part[4] for part in self.parts)))
