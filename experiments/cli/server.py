@@ -55,11 +55,11 @@ async def serve(
 ) -> None:
     """Print the URL of an ASGI application, open it, and serve until a signal comes, as well as those `beside`.
 
-    The first application starts first and ends last.
+    Where those listen is printed a line each. The first application starts first and ends last.
     """
     begin_logging(as_json=arguments.log_json)
     url = arguments.public_url or url_of(listener)
-    print(url, flush=True)
+    print(url, *(url_of(at) for _, at in beside), sep="\n", flush=True)
     if not arguments.no_open:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
     # Each hears a signal once the one after it has ended.

@@ -101,7 +101,8 @@ def served(tmp_path, certificate):
 def test_a_visit_through_nginx_with_tls(served, certificate):
     url, folder = served
     trusted = ssl.create_default_context(cafile=certificate[0])
-    with httpx.Client(verify=trusted, base_url=url, headers={"Origin": url}, follow_redirects=True) as client:
+    asks = {"headers": {"Origin": url}, "follow_redirects": True, "timeout": PATIENCE}
+    with httpx.Client(verify=trusted, base_url=url, **asks) as client:
         page = client.get("/")
         assert page.status_code == 200, page.text
         assert page.headers["strict-transport-security"]

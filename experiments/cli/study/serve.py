@@ -5,7 +5,6 @@ import asyncio
 import os
 import secrets
 import socket
-import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,6 @@ from experiments.cli.server import (
     number,
     prepare_process,
     serve,
-    url_of,
 )
 from experiments.cli.study.database import DATABASE, add_database, sqlite_url
 from experiments.errors import ConfigError
@@ -124,7 +122,6 @@ async def _serve(
         watched = Watched(study, store, server.sessions, metrics)
         page = ResearcherServer(watched, arguments.researcher_url, arguments.trusted_proxy)
         beside.append((page.app(arguments.researcher_host), researchers))
-        print(f"Researchers: {arguments.researcher_url or url_of(researchers)}", file=sys.stderr)
     await serve(app, listener, arguments, beside)
 
 

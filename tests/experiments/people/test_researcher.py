@@ -3,6 +3,8 @@
 import io
 import json
 import re
+import subprocess
+import sys
 
 import httpx
 import pytest
@@ -260,3 +262,26 @@ def test_researchers_are_made_on_the_command_line_and_passwords_never_stand_on_i
     assert capsys.readouterr().out == "ada  viewer  disabled\n"
     assert command("add", "eve", "--role", "assistant", "--generate") == 0
     assert len(capsys.readouterr().out.split("\n")[0]) == 24
+
+
+@pytest.mark.slow
+def test_a_served_study_has_both_ports_logs_json_and_ends_as_a_whole(tmp_path):
+    (tmp_path / "study.toml").write_text(CELLS + PHASES)
+    words = ["study", "serve", "study.toml", "--out", "out", "--port", "0", "--researcher-port", "0"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "mjsim", *words, "--no-open", "--log-json"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    url, researcher_url = (process.stdout.readline().strip() for _ in range(2))
+    assert httpx.post(f"{url}begin", headers={"Origin": url.rstrip("/")}, timeout=200).status_code == 303
+    assert httpx.get(f"{researcher_url}health", timeout=60).json() == {"database": "up", "study": "open"}
+    assert 'mjsim_people{status="arrived"} 1.0' in httpx.get(f"{researcher_url}metrics", timeout=60).text
+    process.terminate()
+    _, log = process.communicate(timeout=60)
+    assert json.loads(log.splitlines()[0])["message"] == "person 1 arrives"
+    for address in (url, researcher_url):
+        with pytest.raises(httpx.ConnectError):
+            httpx.get(address)
