@@ -31,7 +31,8 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 def check_person(described: Distributions) -> None:
     """Check a description of people by the person in the middle of it; a ConfigError says what is wrong."""
-    _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
+    if described:  # the person in the middle of nothing is the usual one
+        _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
 
 
 def view_limits(text: str) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 import asyncio
 import random
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,6 +16,7 @@ from experiments.errors import StoreError
 from experiments.people.store.failures import advice, damaged, passes
 
 T = TypeVar("T")
+_Waiting = tuple[Callable[[AsyncConnection], Awaitable[Any]], asyncio.Future[Any]]
 
 DRIVERS = {
     "sqlite": "sqlite+aiosqlite",
@@ -39,7 +40,13 @@ DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
 }
 PATIENCE_S = 20  # for locks and for connections
 TRIES = 9
+CONNECTIONS = 10  # kept open
+TOGETHER = 64  # changes in one transaction of SQLite
 PAUSE_S = 0.01  # before the second try, on average twice as long; doubles with each try
+
+
+class _UnknownError(StoreError):
+    """A commit failed in a way that says nothing about what was saved."""
 
 
 class Database:
@@ -51,8 +58,9 @@ class Database:
         self._engine = _engine(self.url)
         self._sqlite = self.kind == "sqlite"
         self.on_write: Callable[[float], None] = lambda _: None  # is told how long each write took, s
-        # Writers of SQLite that wait for its lock sleep, and whoever wakes first goes on; here they queue.
-        self._turn = asyncio.Lock()
+        self._turn = asyncio.Lock()  # SQLite has one writer
+        self._waiting: list[_Waiting] = []
+        self._writer: asyncio.Task[None] | None = None
 
     @property
     def kind(self) -> str:
@@ -150,28 +158,66 @@ class Database:
         Raises StoreError where the database cannot do it.
         """
         began = time.monotonic()
+        if self._sqlite:
+            done: asyncio.Future[T] = asyncio.get_running_loop().create_future()
+            self._waiting.append((work, done))
+            if self._writer is None or self._writer.done():
+                self._writer = asyncio.create_task(self._write_waiting())
+            result = await done
+        else:
+            [result] = await self._persist([work])
+        self.on_write(time.monotonic() - began)
+        return result
+
+    async def _write_waiting(self) -> None:
+        """Do what waits, many at a time: a commit waits for the disk, which takes longer than the rest."""
+        while self._waiting:
+            group, self._waiting = self._waiting[:TOGETHER], self._waiting[TOGETHER:]
+            if len(group) > 1 and await self._write_group(group, alone=False):
+                continue
+            for one in group:  # as one of them failed, and nothing was written
+                await self._write_group([one], alone=True)
+
+    async def _write_group(self, group: Sequence[_Waiting], *, alone: bool) -> bool:
+        """Do work in one transaction, and tell those who wait; False if nothing was written or told."""
+        try:
+            results = await self._persist([work for work, _ in group])
+        except Exception as error:
+            if not (alone or isinstance(error, _UnknownError)):
+                return False
+            for _, done in group:
+                if not done.done():
+                    done.set_exception(error)
+        else:
+            for (_, done), result in zip(group, results, strict=True):
+                if not done.done():  # who waited is gone
+                    done.set_result(result)
+        return True
+
+    async def _persist(self, works: Sequence[Callable[[AsyncConnection], Awaitable[Any]]]) -> Sequence[Any]:
+        """Results of work in one transaction, which is tried again where that may help."""
         for attempt in range(1, TRIES + 1):
             try:
-                result = await self._transaction(work)
-                self.on_write(time.monotonic() - began)
-                return result
+                return await self._transaction(works)
             except SQLAlchemyError as error:
                 if attempt == TRIES or not _again(error, attempt):
                     raise StoreError(advice(error, self.name)) from error
             await _pause(attempt)
         raise AssertionError
 
-    async def _transaction(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
+    async def _transaction(
+        self, works: Sequence[Callable[[AsyncConnection], Awaitable[Any]]]
+    ) -> Sequence[Any]:
         async with self._alone(), self._engine.connect() as connection:
             await connection.execution_options(begin="BEGIN IMMEDIATE")
-            result = await work(connection)
+            results = [await work(connection) for work in works]
             try:
                 await connection.commit()
             except DBAPIError as error:
-                raise StoreError(
+                raise _UnknownError(
                     f"{advice(error, self.name)} Whether the last change was saved is unknown."
                 ) from error
-            return result
+            return results
 
     @asynccontextmanager
     async def _alone(self) -> AsyncIterator[None]:
@@ -201,7 +247,14 @@ def _engine(url: URL) -> AsyncEngine:
             raise StoreError(
                 f"There is no folder {Path(url.database).parent} for the database: make it first."
             )
-        engine = create_async_engine(url, hide_parameters=True, connect_args={"timeout": PATIENCE_S})
+        engine = create_async_engine(
+            url,
+            hide_parameters=True,
+            connect_args={"timeout": PATIENCE_S},
+            pool_timeout=PATIENCE_S,
+            pool_size=CONNECTIONS,
+            max_overflow=0,  # each is a thread, and takes longer to make than to wait for
+        )
         event.listen(engine.sync_engine, "connect", _prepare)
         event.listen(engine.sync_engine, "begin", _begin)
         return engine
@@ -212,7 +265,7 @@ def _engine(url: URL) -> AsyncEngine:
         isolation_level="READ COMMITTED",
         pool_pre_ping=True,
         pool_timeout=PATIENCE_S,
-        pool_size=10,
+        pool_size=CONNECTIONS,
     )
 
 

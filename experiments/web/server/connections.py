@@ -10,7 +10,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from experiments.web.server.guards import address_of, machine_of
 
 REQUEST_TIMEOUT = 10.0  # s for the head and the body of a request
-MAX_OPEN = 400  # connections that are no WebSockets
+MAX_OPEN = 2000  # connections that are no WebSockets; behind a proxy all come from one machine
 
 
 class QuickConnection(H11Protocol):
