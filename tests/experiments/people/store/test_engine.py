@@ -279,3 +279,21 @@ async def test_a_full_disk_is_named_and_takes_nothing_back(tmp_path):
     finally:
         await store.close()
     assert Path(tmp_path / "study.db").is_file()
+
+
+async def test_a_change_that_fails_takes_no_other_along(store, arrive):
+    """Changes that wait for the same commit are as safe as alone."""
+    first = await arrive(0)
+    await store.withdraw(first.id, delete=False)
+
+    async def change(number):
+        if number % 7 == 3:
+            await store.ledger.decide(first.id, "reward", -1, "USD", f"key-{number}")  # the table takes none
+        else:
+            await arrive(number + 1)
+
+    results = await asyncio.gather(*(change(number) for number in range(50)), return_exceptions=True)
+    failed = {number for number, result in enumerate(results) if result is not None}
+    assert failed == {number for number in range(50) if number % 7 == 3}
+    assert all(isinstance(results[number], StoreError) for number in failed)
+    assert len(await store.people()) == 1 + 50 - len(failed)
