@@ -71,8 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
     recruiter(study.settings.recruitment)  # codes may be missing
     check_public_url(arguments.public_url)
     check_public_url(arguments.researcher_url)
+    prepare_process()  # the folder is nobody else's either
     arguments.out.mkdir(parents=True, exist_ok=True)
-    prepare_process()
     with ExitStack() as open_things:
         listener = open_things.enter_context(listen(arguments.host, arguments.port))
         researchers = None
@@ -134,6 +134,7 @@ def _secret(folder: Path) -> bytes:
         from mjsim.files import write_text_atomically
 
         write_text_atomically(path, secrets.token_hex(32) + "\n")
+        path.chmod(0o600)
     return path.read_bytes().strip()
 
 

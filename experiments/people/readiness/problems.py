@@ -63,11 +63,9 @@ def problems_of_length(study: Study, shortest: float, longest: float) -> list[Pr
     told, low, high = study.settings.minutes, shortest / 60, longest / 60
     if 0.8 * low <= told <= 2.5 * high and told >= 0.8 * high:
         return []
-    return [
-        Problem(
-            "study.minutes", f"minutes is {told}, but the study is expected to take {low:.0f} to {high:.0f}"
-        )
-    ]
+    span = f"{low:.0f}" if round(low) == round(high) else f"{low:.0f} to {high:.0f}"
+    text = f"minutes is {told}, but the study is expected to take {span} with simulated people"
+    return [Problem("study.minutes", text)]
 
 
 def located(study: Study, problems: Sequence[Problem]) -> list[str]:
