@@ -7,6 +7,7 @@ import hashlib
 import hmac
 import logging
 import time
+from collections import Counter
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
@@ -46,6 +47,7 @@ LOG = logging.getLogger("mjsim.study")
 NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s
 BEAT_PERIOD = 60.0  # s between two notes that somebody is still there
 SWEEP_PERIOD, CLOCK_SET = 60.0, 30.0  # s between two sweeps; by which the clock then is off if it was set
+SOCKETS_OF_A_PERSON = 2  # open at a time
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
 NEVER = 1e9  # s; as good as for ever
 MAX_FORM = 64 * 1024  # bytes
@@ -88,6 +90,7 @@ class StudyServer:
             pool, SessionLimit(limits.sessions), limits.idle, self._minimum, serving.meter
         )
         self._new = Rate(*NEW_PEOPLE)
+        self._sockets: Counter[int] = Counter()  # by person
         self._locks: dict[str, asyncio.Lock] = {}
 
     def app(self, host: str, public: str | None = None) -> Starlette:
@@ -262,11 +265,17 @@ class StudyServer:
         if person is None or visit is None or not person.active or visit.phase not in PLAYED:
             await socket.close(1008)
             return
-        await socket.accept()
+        if self._sockets[person.id] >= SOCKETS_OF_A_PERSON:
+            await socket.close(1008)
+            return
+        self._sockets[person.id] += 1
         beating = asyncio.create_task(self._beat(person))
         try:
+            await socket.accept()
             await BrowserSocket(socket).serve(self.sessions.of(visit), visit.phase)
         finally:
+            self._sockets.subtract([person.id])
+            self._sockets += Counter()  # forgets those without any
             beating.cancel()
             with suppress(asyncio.CancelledError):
                 await beating

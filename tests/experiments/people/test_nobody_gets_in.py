@@ -282,6 +282,17 @@ def test_nobody_makes_people_without_end(site):
         assert client.post("/begin").status_code == 303
 
 
+def test_a_link_opens_few_sockets(site):
+    link, origin = f"/play/{new_person(site)}", site.url.rstrip("/")
+    with connected(site.url, link, origin, {}), connected(site.url, link, origin, {}):
+        with pytest.raises(InvalidStatus), connected(site.url, link, origin, {}):
+            pass
+        with connected(site.url, f"/play/{new_person(site)}", origin, {}):
+            pass
+    with connected(site.url, link, origin, {}):
+        pass
+
+
 SECRETS = {
     "PROLIFIC_PID": "5ecretperson000000000001",
     "STUDY_ID": "5ecretstudy0000000000001",

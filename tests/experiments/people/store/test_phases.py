@@ -27,6 +27,16 @@ async def test_answers_are_kept_as_they_are_given_and_final_with_the_phase(store
     }
 
 
+async def test_answers_of_everybody_to_one_item(store, arrive):
+    for number in (1, 2, 3):
+        person = await arrive(number)
+        await store.save_answers(person.id, "consent", {"age": 30 + number, "read": True})
+        if number < 3:
+            await store.finish_phase(person.id, "consent", "story")
+    assert [answer.value for answer in await store.answers_to("consent", "age")] == [31, 32]
+    assert await store.answers_to("story", "age") == ()
+
+
 async def test_a_phase_that_is_over_takes_no_answers_and_does_not_end_again(store, arrive):
     person = await arrive()
     assert await store.finish_phase(person.id, "consent", "story", {"read": True})

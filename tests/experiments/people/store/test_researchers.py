@@ -54,5 +54,9 @@ async def test_names_and_roles_that_cannot_be(store):
         await store.researchers.add("ada", "other", "viewer")
     with pytest.raises(StoreError, match="owner, assistant, viewer"):
         await store.researchers.add("bob", "other", "admin")
+    for name in ("", "Ada", "a b", "a\0", "<b>", "x" * 61):
+        with pytest.raises(StoreError, match="cannot be a name"):
+            await store.researchers.add(name, "other", "viewer")
+        assert await store.researchers.check(name, "other") is None
     with pytest.raises(StoreError, match="no researcher 'bob'"):
         await store.researchers.change("bob", disabled=True)
