@@ -163,7 +163,7 @@ def _walls(space: Space, use: str, look: Look, rng: np.random.Generator) -> None
     """Something on each wall that has a free stretch, over low furniture where there is some."""
     kinds = _WALLS.get(use, ("picture", "picture", "wall_shelf", "picture"))
     if use in ("bedroom", "living_room"):
-        kinds = ("picture", "picture", "wall_mirror", "picture", "wall_lamp")
+        kinds = ("picture", "wall_lamp", "picture", "wall_mirror")
     hung = 0
     for side in (SIDES[i] for i in rng.permutation(4)):
         low, high = space.room.floor.wall(side)

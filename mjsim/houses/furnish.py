@@ -199,7 +199,9 @@ class Home:
             rng = stream(self.seed, "usual", space.room.key)
             share = float(rng.uniform(*SHARES.get(use, (0.3, 0.38))))
             in_vain = 0
-            for number, (kinds, chance) in enumerate(ROUNDS * USUAL.get(use, ())):
+            first, *others = USUAL.get(use, (((), 0.0),))
+            wishes = [first, *(others[i] for _ in range(ROUNDS) for i in rng.permutation(len(others)))]
+            for number, (kinds, chance) in enumerate(wishes):
                 order = [kinds[i] for i in rng.permutation(len(kinds))][:IN_VAIN]
                 if rng.random() < chance and (space.share < share or number == 0) and in_vain < IN_VAIN:
                     in_vain += not self._one_more(space, order, number)

@@ -17,7 +17,7 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (("standing_mirror", "armchair", "pouf", "bench"), 0.7),
         (_PLANTS, 0.7),
         ((*_SHELVES, "trunk", "television"), 0.6),
-        (("floor_lamp", "cot", "exercise_bike", "chest_of_drawers"), 0.5),
+        (("floor_lamp", "chest_of_drawers"), 0.5),
     ),
     "child": (
         (("chest_of_drawers", "toy_shelf"), 0.8),
@@ -43,7 +43,7 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (("floor_lamp", "armchair"), 0.6),
     ),
     "kitchen": (
-        (("kitchen_island", "bar_table", "larder", "dresser", "kitchen_trolley"), 0.9),
+        (("bar_table", "larder", "dresser", "kitchen_trolley"), 0.9),
         (("kitchen_trolley", "larder", "stool", "fridge"), 0.7),
         (_PLANTS, 0.6),
     ),
@@ -57,7 +57,7 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (("desk",), 1.0),
         (_SHELVES, 1.0),
         (("filing_cabinet",), 0.8),
-        (("armchair", "day_bed", "exercise_bike", "sofa"), 0.7),
+        (("armchair", "day_bed", "sofa"), 0.7),
         (_PLANTS, 0.8),
         (("floor_lamp", "side_table", *_SHELVES), 0.6),
     ),

@@ -1,8 +1,7 @@
 """Bathrooms and laundries."""
 
 from mjsim.houses.furniture.builder import Builder
-from mjsim.houses.furniture.piece import Kind, Member, Piece, group
-from mjsim.houses.furniture.seats import _rooms
+from mjsim.houses.furniture.piece import Member, Piece, group
 
 
 def toilet(b: Builder) -> Piece:
@@ -268,15 +267,15 @@ def drying_rack(b: Builder) -> Piece:
 
 
 KINDS = (
-    Kind("toilet", _rooms("bathroom", "toilet"), toilet, frozenset({"toilet"})),
-    Kind("washbasin", _rooms("bathroom", "toilet"), washbasin, frozenset({"washbasin"})),
-    Kind("bathtub", _rooms("bathroom"), bathtub, frozenset({"bath"})),
-    Kind("shower", _rooms("bathroom"), shower, frozenset({"bath"})),
-    Kind("wash_corner", _rooms("studio"), wash_corner, frozenset({"toilet", "washbasin", "bath"})),
-    Kind("washing_machine", _rooms("bathroom", "utility", "kitchen"), washing_machine),
-    Kind("washing_tower", _rooms("bathroom", "utility"), washing_tower),
-    Kind("towel_rail", _rooms("bathroom"), towel_rail),
-    Kind("bath_cabinet", _rooms("bathroom", "toilet"), bath_cabinet),
-    Kind("towel_shelf", _rooms("bathroom", "utility"), towel_shelf),
-    Kind("drying_rack", _rooms("utility", "bathroom"), drying_rack),
+    toilet,
+    washbasin,
+    bathtub,
+    shower,
+    wash_corner,
+    washing_machine,
+    washing_tower,
+    towel_rail,
+    bath_cabinet,
+    towel_shelf,
+    drying_rack,
 )

@@ -1,7 +1,7 @@
 """Beds, from the cot to the double bed with its bedside tables."""
 
 from mjsim.houses.furniture.builder import Builder
-from mjsim.houses.furniture.piece import Kind, Piece, Spot, group
+from mjsim.houses.furniture.piece import Piece, Spot, group
 
 SIDE = 0.62  # m, to get in beside it
 
@@ -165,34 +165,4 @@ def bunk_bed(b: Builder) -> Piece:
     return b.piece((w, d + 0.02, h), use=0.7)
 
 
-def cot(b: Builder) -> Piece:
-    """A bed with bars for a small child."""
-    w, d, h = b.size(1.22, 1.32), b.pick(0.66, 0.72), b.pick(0.85, 0.95)
-    paint = b.pick(b.wood, "white", b.front)
-    b.shadow(w, (0, d))
-    b.guard(w, (0, d), (0, h))
-    b.box(paint, w - 0.06, (0.03, d - 0.03), (0.25, 0.3), seen=True)
-    b.box("linen", w - 0.09, (0.04, d - 0.04), (0.3, 0.4), seen=True)
-    b.box(b.pick(*b.look.quilts), 0.6 * w, (0.038, d - 0.038), (0.32, 0.42), 0.16, seen=True)
-    b.soft("wicker", (-0.4 * w, d / 2, 0.47), (0.07, 0.07, 0.08))
-    b.soft("wicker", (-0.4 * w, d / 2, 0.57), (0.055, 0.055, 0.055))
-    for x in (-w / 2 + 0.015, w / 2 - 0.015):
-        b.box(paint, 0.03, (0, d), (0, h), x, seen=True)
-    for y in (0.0, d - 0.03):
-        b.box(paint, w - 0.06, (y, y + 0.03), (h - 0.06, h - 0.02), seen=True)
-        for i in range(9):
-            b.box(
-                paint, 0.018, (y + 0.006, y + 0.024), (0.25, h - 0.06), (w - 0.2) * (i / 8 - 0.5), seen=True
-            )
-    return b.piece((w, d, h), use=0.62)
-
-
-_SLEEPING = frozenset({"bedroom", "studio"})
-KINDS = (
-    Kind("double_bed", _SLEEPING, double_bed, frozenset({"bed"})),
-    Kind("single_bed", _SLEEPING, single_bed, frozenset({"bed"})),
-    Kind("bunk_bed", frozenset({"child"}), bunk_bed, frozenset({"bed"})),
-    Kind("day_bed", frozenset({"office", "living"}), day_bed, frozenset({"seat"})),
-    Kind("cot", frozenset({"bedroom", "child"}), cot),
-    Kind("bedside_table", frozenset({"bedroom", "child"}), bedside_table),
-)
+KINDS = (double_bed, single_bed, bunk_bed, day_bed, bedside_table)

@@ -1,6 +1,7 @@
 """Writes the geoms of one piece of furniture: boxes, legs, fronts, cushions, and small things on top."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -264,3 +265,24 @@ class Builder:
             pictures=tuple(self.pictures),
             **more,
         )
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of furniture, of which every generator makes another piece."""
+
+    name: str
+    draw: Callable[[Builder], Piece]
+
+    def make(
+        self, rng: np.random.Generator, look: Look, *, smaller: int = 0, fit: Point | None = None
+    ) -> Piece:
+        """A piece of this kind.
+
+        Args:
+            rng: Draws size, materials and form.
+            look: The colours of the home.
+            smaller: 0 as large as drawn; 1, 2, ... for a lack of space.
+            fit: Width, lower and upper end, m, of what it goes with, such as a window; None for any.
+        """
+        return self.draw(Builder(self.name, rng, look, smaller, fit))

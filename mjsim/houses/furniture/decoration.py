@@ -1,144 +1,12 @@
 """What hangs on walls and ceilings and lies on floors: pictures, rugs, mirrors, curtains, radiators, lamps."""
 
-import hashlib
 import math
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
+from mjsim.houses.furniture.artwork import carpet, painting
 from mjsim.houses.furniture.builder import Builder, numbers
-from mjsim.houses.furniture.look import Look
-from mjsim.houses.furniture.piece import Kind, Picture, Piece
-from mjsim.houses.furniture.seats import _rooms
+from mjsim.houses.furniture.piece import Piece
 
-_ANY = _rooms(
-    "living",
-    "bedroom",
-    "office",
-    "dining",
-    "kitchen",
-    "hall",
-    "studio",
-    "child",
-    "bathroom",
-    "toilet",
-    "utility",
-)
 CEILING = 2.6  # m
-Image = NDArray[np.float64]
-
-
-def _file(name: str, image: Image) -> Picture:
-    """An image (h, w, 3), red green blue 0 to 1, as a texture whose name tells its content."""
-    pixels = np.clip(255 * image[..., ::-1], 0, 255).astype(np.uint8)
-    png = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 2])[1].tobytes()
-    return Picture(f"{name}_{hashlib.sha256(pixels.tobytes()).hexdigest()[:10]}", png)
-
-
-def _palette(rng: np.random.Generator, look: Look, count: int) -> Image:
-    """Colours (count, 3) of a picture: some of the home's, lighter and darker."""
-    chosen = np.array(look.colours)[rng.permutation(len(look.colours))[: min(count, 5)]]
-    while len(chosen) < count:
-        chosen = np.vstack([chosen, chosen[int(rng.integers(len(chosen)))] * rng.uniform(0.5, 0.9)])
-    return np.asarray(np.clip(chosen * rng.uniform(0.85, 1.15, (len(chosen), 1)), 0, 1))
-
-
-def painting(rng: np.random.Generator, look: Look, wide: int = 128, high: int = 96) -> Picture:
-    """A picture in one of seven manners."""
-    y, x = np.mgrid[0:high, 0:wide] / np.array([high, wide]).reshape(2, 1, 1)
-    colours = _palette(rng, look, 6)
-    light = 0.75 + 0.25 * colours[0]
-    image = np.broadcast_to(light, (high, wide, 3)).copy()
-    aspect = wide / high
-    manner = int(rng.integers(7))
-    if manner in (0, 1):  # hills under a sun, or waves
-        image = light * (1 - 0.35 * y[..., None]) + 0.35 * y[..., None] * colours[1]
-        sun = np.hypot((x - rng.uniform(0.2, 0.8)) * aspect, y - rng.uniform(0.15, 0.35)) < rng.uniform(
-            0.07, 0.13
-        )
-        image[sun] = (1.0, 0.93, 0.75) if manner == 0 else (0.96, 0.6, 0.4)
-        for i in range(4):
-            phase, wave = rng.uniform(0, 6.3), rng.uniform(1.5, 5) if manner == 0 else rng.uniform(8, 16)
-            crest = 0.42 + 0.14 * i + (0.09 if manner == 0 else 0.02) * np.sin(wave * x + phase)
-            image[y > crest] = colours[1] * (1 - 0.18 * i) + 0.06 * (3 - i)
-    elif manner == 2:  # overlapping discs
-        for i in range(6):
-            at = np.hypot((x - rng.uniform(0.1, 0.9)) * aspect, y - rng.uniform(0.1, 0.9)) < rng.uniform(
-                0.1, 0.32
-            )
-            image[at] = 0.25 * image[at] + 0.75 * colours[i % len(colours)]
-    elif manner == 3:  # fields of colour
-        cuts = np.sort(rng.uniform(0.1, 0.9, 3))
-        rows = np.digitize(y + 0.01 * np.sin(20 * x), cuts)
-        for i in range(4):
-            image[rows == i] = colours[i]
-        image += 0.05 * cv2.GaussianBlur(rng.standard_normal((high, wide)), (0, 0), 2.0)[..., None]
-    elif manner == 4:  # a branch with leaves
-        side, lean = float(rng.uniform(0.4, 0.6)), float(rng.uniform(-0.15, 0.15))
-        image[np.abs(x - side - lean * (1 - y)) < 0.008] = 0.5 * colours[1]
-        for i in range(9):
-            v, turn = 0.12 + 0.085 * i, 1 if i % 2 else -1
-            u = side + lean * (1 - v)
-            a = turn * 0.7
-            p, q = (x - u - turn * 0.13) * aspect, y - v + 0.05
-            along, across = p * math.cos(a) - q * math.sin(a) * turn, p * math.sin(a) * turn + q * math.cos(a)
-            leaf = (along / 0.15) ** 2 + (across / 0.045) ** 2 < 1
-            image[leaf] = colours[1 + i % 2] * 0.8
-    elif manner == 5:  # a town
-        image = light * (1 - 0.3 * y[..., None])
-        left = 0.0
-        while left < 1:
-            w, h = rng.uniform(0.08, 0.18), rng.uniform(0.25, 0.7)
-            tower = (x >= left) & (x < left + w) & (y > 1 - h)
-            image[tower] = colours[int(rng.integers(len(colours)))] * rng.uniform(0.6, 1.0)
-            windows = (
-                tower & (np.mod((x - left) / w * 3, 1) > 0.5) & (np.mod(y * 14, 1) > 0.5) & (y > 1.06 - h)
-            )
-            image[windows] = (0.98, 0.9, 0.6)
-            left += w
-    else:  # woven lines
-        for i in range(int(rng.integers(5, 9))):
-            u, w = rng.uniform(0, 1), rng.uniform(0.02, 0.09)
-            image[np.abs((x if i % 2 else y) - u) < w] = colours[i % len(colours)]
-    return _file("picture", image)
-
-
-def carpet(rng: np.random.Generator, look: Look, round_one: bool = False) -> Picture:
-    """The pattern of a rug in one of six manners."""
-    n = 128
-    y, x = (np.mgrid[0:n, 0:n] + 0.5) / n
-    ground, one, two, three = _palette(rng, look, 4)
-    ground = 0.55 * ground + 0.45 * np.array([0.9, 0.87, 0.8]) if rng.random() < 0.6 else ground
-    image = np.broadcast_to(ground, (n, n, 3)).copy()
-    edge = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
-    manner = int(rng.integers(6))
-    if round_one:
-        edge = 0.5 - np.hypot(x - 0.5, y - 0.5)
-        rings = np.mod(edge * rng.integers(6, 12), 1)
-        image[rings < 0.35] = one
-        image[edge < 0.04] = two
-    elif manner == 0:  # stripes
-        bands = np.mod(x * rng.integers(6, 14), 1)
-        image[bands < 0.3], image[(bands > 0.5) & (bands < 0.6)] = one, two
-    elif manner == 1:  # lozenges
-        k = int(rng.integers(3, 6))
-        d = np.abs(np.mod(x * k, 1) - 0.5) + np.abs(np.mod(y * k, 1) - 0.5)
-        image[d < 0.4], image[d < 0.25], image[d < 0.1] = one, two, three
-    elif manner == 2:  # a medallion
-        d = np.hypot((x - 0.5) * 1.3, y - 0.5) * (1 + 0.07 * np.cos(12 * np.arctan2(y - 0.5, x - 0.5)))
-        image[d < 0.34], image[d < 0.26], image[d < 0.12] = one, ground, two
-    elif manner == 3:  # lines of a berber rug
-        k = int(rng.integers(2, 4))
-        zigzag = np.mod((y * k + 0.25 * np.abs(np.mod(x * 4, 2) - 1)), 0.5)
-        image[zigzag < 0.05] = 0.35 * one
-    elif manner == 4:  # checks
-        k = int(rng.integers(3, 7))
-        image[(np.floor(x * k) + np.floor(y * k)) % 2 == 0] = 0.8 * one + 0.2 * ground
-    if not round_one and manner in (1, 2, 5):  # a border
-        image[edge < 0.09], image[edge < 0.07], image[edge < 0.025] = two, one, three
-    worn = cv2.GaussianBlur(rng.standard_normal((n, n)), (0, 0), 1.2)
-    return _file("rug", image * (1 + 0.1 * worn[..., None]))
 
 
 def picture(b: Builder) -> Piece:
@@ -382,29 +250,22 @@ def standing_mirror(b: Builder) -> Piece:
 
 
 KINDS = (
-    Kind("picture", _ANY, picture, solid=False),
-    Kind("wall_mirror", _rooms("hall", "bedroom", "living"), wall_mirror, solid=False),
-    Kind("clock", _rooms("kitchen", "dining", "living", "office", "hall", "child"), clock, solid=False),
-    Kind("pinboard", _rooms("office", "child", "kitchen"), pinboard, solid=False),
-    Kind("wall_shelf", _rooms("office", "child", "bedroom", "living", "kitchen"), wall_shelf, solid=False),
-    Kind("wall_lamp", _rooms("bedroom", "living", "hall", "bathroom"), wall_lamp, solid=False),
-    Kind("rug", _ANY - {"kitchen", "bathroom", "toilet", "utility"}, rug, solid=False),
-    Kind("runner", _rooms("hall", "bedroom", "kitchen"), runner, solid=False),
-    Kind("round_rug", _rooms("child", "bedroom", "living", "office", "studio"), round_rug, solid=False),
-    Kind("bath_mat", _rooms("bathroom", "toilet"), bath_mat, solid=False),
-    Kind("door_mat", _rooms("hall"), door_mat, solid=False),
-    Kind(
-        "curtains", _rooms("living", "bedroom", "dining", "office", "child", "studio"), curtains, solid=False
-    ),
-    Kind("blind", _rooms("kitchen", "bathroom", "toilet", "office", "utility"), blind, solid=False),
-    Kind(
-        "roller_blind",
-        _rooms("kitchen", "bathroom", "toilet", "bedroom", "utility"),
-        roller_blind,
-        solid=False,
-    ),
-    Kind("radiator", _ANY, radiator),
-    Kind("ceiling_lamp", _ANY, ceiling_lamp, solid=False),
-    Kind("floor_lamp", _rooms("living", "bedroom", "office", "studio"), floor_lamp),
-    Kind("standing_mirror", _rooms("bedroom", "hall"), standing_mirror),
+    picture,
+    wall_mirror,
+    clock,
+    pinboard,
+    wall_shelf,
+    wall_lamp,
+    rug,
+    runner,
+    round_rug,
+    bath_mat,
+    door_mat,
+    curtains,
+    blind,
+    roller_blind,
+    radiator,
+    ceiling_lamp,
+    floor_lamp,
+    standing_mirror,
 )

@@ -2,10 +2,8 @@
 
 import math
 
-from mjsim.houses.furniture import seats
 from mjsim.houses.furniture.builder import Builder
-from mjsim.houses.furniture.piece import Kind, Mount, Piece, group
-from mjsim.houses.furniture.seats import _rooms
+from mjsim.houses.furniture.piece import Mount, Piece, group
 
 WIDE = 0.6  # m, a module
 DEEP = 0.62  # m, with the worktop
@@ -224,24 +222,6 @@ def corner_kitchen(b: Builder) -> Piece:
     return group(b.kind, members, use=use, stands="right" if side > 0 else "left")
 
 
-def kitchen_island(b: Builder) -> Piece:
-    """A block with a worktop and stools at one side."""
-    w, d = b.size(1.2, 1.8, 0.2), b.pick(0.8, 0.9)
-    b.shadow(w, (0, d))
-    b.box("dark", w - 0.1, (0.08, d - 0.33), (0, 0.1))
-    b.box(b.front, w, (0.02, d - 0.28), (0.1, 0.86))
-    b.fronts(b.front, w, (0.11, 0.85), 0.004 - 0.0, max(2, round(w / 0.5)), 2)
-    b.box(b.pick("stone", b.wood), w + 0.04, (0, d), (0.86, 0.91))
-    b.clutter(0.7 * w, (0.2, d - 0.3), 0.91, 2)
-    base = b.piece((w + 0.04, d, 1.3))
-    count, state = (2 if w < 1.5 else 3), int(b.rng.integers(2**31))
-    members = [(base, 0.0, 0.0, 0.0)]
-    for i in range(count):
-        stool = seats.bar_stool(Builder("bar_stool", type(b.rng)(type(b.rng.bit_generator)(state)), b.look))
-        members.append((stool, ((i + 0.5) / count - 0.5) * w, d + 0.16, math.pi))
-    return group(b.kind, members, use=(), stands="free")
-
-
 def fridge(b: Builder) -> Piece:
     """A fridge on its own."""
     return Run(b, ("fridge",), False).write()
@@ -272,13 +252,4 @@ def larder(b: Builder) -> Piece:
     return b.piece((w, d, h), use=0.65)
 
 
-_KITCHEN = frozenset({"cooker", "sink", "fridge"})
-KINDS = (
-    Kind("straight_kitchen", _rooms("kitchen", "studio"), straight_kitchen, _KITCHEN),
-    Kind("corner_kitchen", _rooms("kitchen"), corner_kitchen, _KITCHEN),
-    Kind("kitchenette", _rooms("kitchen", "studio"), kitchenette, frozenset({"cooker", "sink"})),
-    Kind("kitchen_island", _rooms("kitchen"), kitchen_island),
-    Kind("fridge", _rooms("kitchen", "utility"), fridge, frozenset({"fridge"})),
-    Kind("kitchen_trolley", _rooms("kitchen", "dining"), kitchen_trolley),
-    Kind("larder", _rooms("kitchen", "utility"), larder),
-)
+KINDS = (straight_kitchen, corner_kitchen, kitchenette, fridge, kitchen_trolley, larder)

@@ -3,9 +3,9 @@
 import math
 
 from mjsim.houses.furniture import decoration, seats, storage, tables
-from mjsim.houses.furniture.builder import Builder, numbers
-from mjsim.houses.furniture.piece import Kind, Piece, group
-from mjsim.houses.furniture.seats import _rooms
+from mjsim.houses.furniture.artwork import painting
+from mjsim.houses.furniture.builder import Builder
+from mjsim.houses.furniture.piece import Piece, group
 
 
 def television(b: Builder) -> Piece:
@@ -16,7 +16,7 @@ def television(b: Builder) -> Piece:
     b.box("black", 0.5, (0.06, 0.26), (h, h + 0.012), seen=True)
     b.box("black", 0.08, (y - 0.02, y + 0.02), (h + 0.012, h + 0.08), seen=True)
     b.box("black", w, (y - 0.02, y + 0.02), (h + 0.07, h + 0.07 + tall))
-    b.image(b.own(decoration.painting(b.rng, b.look)), w - 0.03, (h + 0.085, h + 0.055 + tall), y + 0.024)
+    b.image(b.own(painting(b.rng, b.look)), w - 0.03, (h + 0.085, h + 0.055 + tall), y + 0.024)
     b.clutter(0.1, (0.12, 0.3), h, 1, stand.size[0] / 2 - 0.16 if w + 0.4 < stand.size[0] else 0.0)
     if w + 0.4 >= stand.size[0]:
         b.geoms = b.geoms[:4]
@@ -151,32 +151,4 @@ def umbrella_stand(b: Builder) -> Piece:
     return b.piece((2 * r, 2 * r, 0.9))
 
 
-def exercise_bike(b: Builder) -> Piece:
-    """For a study or a bedroom."""
-    w, d = 0.5, 1.05
-    b.guard(w, (0.05, d - 0.05), (0, 0.95))
-    for y in (0.12, d - 0.12):
-        b.box("dark", w, (y - 0.04, y + 0.04), (0, 0.06), seen=True)
-    paint = b.pick("accent_a", "black", "white")
-    b.box(paint, 0.1, (0.12, d - 0.12), (0.06, 0.16), seen=True)
-    b.add(
-        "cylinder", "grey", True, f'pos="{numbers(0, d - 0.32, 0.38)}" size="0.22 0.035" euler="0 1.5708 0"'
-    )
-    b.rod(paint, (0, 0.4, 0.15), (0, 0.28, 0.82), 0.03)
-    b.soft("black", (0, 0.27, 0.86), (0.11, 0.14, 0.045))
-    b.rod(paint, (0, d - 0.35, 0.5), (0, d - 0.25, 1.12), 0.03)
-    b.rod("black", (-0.22, d - 0.3, 1.12), (0.22, d - 0.3, 1.12), 0.02)
-    b.box("dark", 0.2, (d - 0.28, d - 0.26), (1.12, 1.25), seen=True)
-    return b.piece((w, d, 1.25), use=((w / 2, 0.2, w / 2 + 0.62, 0.9),))
-
-
-KINDS = (
-    Kind("lounge", _rooms("living", "studio"), lounge, frozenset({"seat"})),
-    Kind("television", _rooms("living", "studio", "bedroom"), television),
-    Kind("piano", _rooms("living", "dining"), piano),
-    Kind("stove", _rooms("living", "dining"), stove),
-    Kind("aquarium", _rooms("living", "child", "office"), aquarium),
-    Kind("coat_rack", _rooms("hall"), coat_rack),
-    Kind("umbrella_stand", _rooms("hall"), umbrella_stand),
-    Kind("exercise_bike", _rooms("office", "bedroom"), exercise_bike),
-)
+KINDS = (lounge, television, piano, stove, aquarium, coat_rack, umbrella_stand)

@@ -4,12 +4,9 @@ The frame of a piece: the origin is the middle of its back edge on the floor, +y
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
-import numpy as np
-
-from mjsim.houses.furniture.look import Look
 from mjsim.houses.values import Asset
 
 Spot = tuple[float, float, float, float]  # x0, y0, x1, y1 on the floor
@@ -65,37 +62,6 @@ class Piece:
 
 
 Member = tuple[Piece, float, float, float]  # a piece, and where in its group: x, y, m, and yaw
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of furniture, of which every call makes another piece."""
-
-    name: str
-    uses: frozenset[str]  # uses of the rooms that it belongs to
-    draw: Callable[..., Piece] = field(repr=False)  # takes a Builder
-    provides: frozenset[str] = frozenset()  # what a home must have that it gives
-    solid: bool = True  # whether it stands on floor that people walk on
-
-    def make(
-        self,
-        rng: np.random.Generator,
-        look: Look,
-        *,
-        smaller: int = 0,
-        fit: tuple[float, float, float] | None = None,
-    ) -> Piece:
-        """A piece of this kind.
-
-        Args:
-            rng: Draws size, materials and form.
-            look: The colours of the home.
-            smaller: 0 as large as drawn; 1, 2, ... for a lack of space.
-            fit: Width, lower and upper end, m, of what it goes with, such as a window; None for any.
-        """
-        from mjsim.houses.furniture.builder import Builder
-
-        return self.draw(Builder(self.name, rng, look, smaller, fit))
 
 
 def moved(spot: Spot, x: float, y: float, yaw: float) -> Spot:

@@ -3,8 +3,7 @@
 import math
 
 from mjsim.houses.furniture.builder import Builder
-from mjsim.houses.furniture.piece import Kind, Piece
-from mjsim.houses.furniture.seats import _rooms
+from mjsim.houses.furniture.piece import Piece
 
 _GREENS = ("leaves", "leaves_dark", "leaves_pale")
 
@@ -105,12 +104,4 @@ def fern_stand(b: Builder) -> Piece:
     return _potted(b, r, y, h + 0.36, 1.1)
 
 
-_ANY = _rooms("living", "bedroom", "office", "dining", "kitchen", "hall", "studio", "child")
-KINDS = (
-    Kind("bush", _ANY, bush),
-    Kind("tree", _rooms("living", "dining", "office", "hall", "studio", "bedroom"), tree),
-    Kind("snake_plant", _ANY | {"bathroom"}, snake_plant),
-    Kind("palm", _rooms("living", "dining", "bedroom", "hall", "studio"), palm),
-    Kind("cactus", _ANY, cactus),
-    Kind("fern_stand", _ANY | {"bathroom"}, fern_stand),
-)
+KINDS = (bush, tree, snake_plant, palm, cactus, fern_stand)

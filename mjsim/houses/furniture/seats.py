@@ -3,7 +3,7 @@
 import math
 
 from mjsim.houses.furniture.builder import Builder
-from mjsim.houses.furniture.piece import Kind, Piece
+from mjsim.houses.furniture.piece import Piece
 
 
 def _arms(b: Builder, w: float, d: float, form: str, cloth: str) -> float:
@@ -235,19 +235,4 @@ def office_chair(b: Builder) -> Piece:
     return b.piece((w, d, 1.0), seats=1)
 
 
-def _rooms(*uses: str) -> frozenset[str]:
-    return frozenset(uses)
-
-
-_SEAT = frozenset({"seat"})
-KINDS = (
-    Kind("sofa", _rooms("living", "studio", "office"), sofa, _SEAT),
-    Kind("corner_sofa", _rooms("living"), corner_sofa, _SEAT),
-    Kind("armchair", _rooms("living", "studio", "bedroom", "office", "hall"), armchair, _SEAT),
-    Kind("pouf", _rooms("living", "bedroom", "child"), pouf),
-    Kind("dining_chair", _rooms("kitchen", "dining", "bedroom"), dining_chair, _SEAT),
-    Kind("stool", _rooms("kitchen", "bathroom", "child"), stool),
-    Kind("bar_stool", _rooms("kitchen"), bar_stool, _SEAT),
-    Kind("bench", _rooms("hall", "bedroom", "dining"), bench, _SEAT),
-    Kind("office_chair", _rooms("office"), office_chair, _SEAT),
-)
+KINDS = (sofa, corner_sofa, armchair, pouf, dining_chair, stool, bar_stool, bench, office_chair)

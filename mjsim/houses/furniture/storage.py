@@ -1,8 +1,7 @@
 """Storage: wardrobes, chests, shelves, sideboards, and what stands on them."""
 
 from mjsim.houses.furniture.builder import Builder
-from mjsim.houses.furniture.piece import Kind, Piece
-from mjsim.houses.furniture.seats import _rooms
+from mjsim.houses.furniture.piece import Piece
 
 
 def _wardrobe(b: Builder, mirrored: bool) -> Piece:
@@ -266,19 +265,19 @@ def toy_shelf(b: Builder) -> Piece:
 
 
 KINDS = (
-    Kind("wardrobe", _rooms("bedroom", "child", "studio", "hall"), wardrobe),
-    Kind("mirror_wardrobe", _rooms("bedroom", "hall", "studio"), mirror_wardrobe),
-    Kind("chest_of_drawers", _rooms("bedroom", "child", "living", "hall", "studio"), chest_of_drawers),
-    Kind("bookcase", _rooms("living", "office", "bedroom", "studio", "dining"), bookcase),
-    Kind("low_bookcase", _rooms("living", "office", "child", "hall", "studio"), low_bookcase),
-    Kind("cube_shelf", _rooms("living", "office", "child", "bedroom", "studio"), cube_shelf),
-    Kind("ladder_shelf", _rooms("living", "office", "bedroom", "dining"), ladder_shelf),
-    Kind("sideboard", _rooms("living", "dining"), sideboard),
-    Kind("dresser", _rooms("kitchen", "dining"), dresser),
-    Kind("display_cabinet", _rooms("dining", "living"), display_cabinet),
-    Kind("tv_stand", _rooms("living"), tv_stand),
-    Kind("shoe_cupboard", _rooms("hall"), shoe_cupboard),
-    Kind("filing_cabinet", _rooms("office"), filing_cabinet),
-    Kind("trunk", _rooms("bedroom", "child", "living"), trunk),
-    Kind("toy_shelf", _rooms("child"), toy_shelf),
+    wardrobe,
+    mirror_wardrobe,
+    chest_of_drawers,
+    bookcase,
+    low_bookcase,
+    cube_shelf,
+    ladder_shelf,
+    sideboard,
+    dresser,
+    display_cabinet,
+    tv_stand,
+    shoe_cupboard,
+    filing_cabinet,
+    trunk,
+    toy_shelf,
 )

@@ -4,8 +4,7 @@ import math
 
 from mjsim.houses.furniture import seats
 from mjsim.houses.furniture.builder import Builder
-from mjsim.houses.furniture.piece import Kind, Mount, Piece, group
-from mjsim.houses.furniture.seats import _rooms
+from mjsim.houses.furniture.piece import Mount, Piece, group
 
 
 def _table(b: Builder, w: float, d: float, h: float) -> None:
@@ -266,14 +265,14 @@ def bar_table(b: Builder) -> Piece:
 
 
 KINDS = (
-    Kind("dining", _rooms("dining", "kitchen", "living", "studio"), dining, frozenset({"table", "seat"})),
-    Kind("table", _rooms("dining", "kitchen"), table),
-    Kind("round_table", _rooms("dining", "kitchen"), round_table),
-    Kind("pendant_lamp", _rooms("dining", "kitchen", "living"), pendant_lamp, solid=False),
-    Kind("coffee_table", _rooms("living"), coffee_table),
-    Kind("side_table", _rooms("living", "bedroom", "office"), side_table),
-    Kind("console", _rooms("hall", "living", "dining"), console),
-    Kind("desk", _rooms("office", "bedroom", "child", "studio", "living"), desk, frozenset({"desk"})),
-    Kind("dressing_table", _rooms("bedroom"), dressing_table),
-    Kind("bar_table", _rooms("kitchen"), bar_table, frozenset({"seat"})),
+    dining,
+    table,
+    round_table,
+    pendant_lamp,
+    coffee_table,
+    side_table,
+    console,
+    desk,
+    dressing_table,
+    bar_table,
 )
