@@ -68,7 +68,8 @@ class Erasure(Part):
     async def forget(self, person_ids: Sequence[int], names: Sequence[str], who: str) -> None:
         """Delete who people are on their platform, and by what they would be recognised.
 
-        What they did and answered stays. Their links end, and they could take part again.
+        What they did and answered stays, and what they were paid, without the platform's receipts. Their links end,
+        and they could take part again.
 
         Args:
             person_ids: Numbers of the people.
@@ -94,6 +95,8 @@ class Erasure(Part):
                 gone = {"platform_key": None, "token_hash": name}
                 await connection.execute(update(tables.person).where(*mine).values(**gone))
                 await connection.execute(delete(tables.identity).where(tables.identity.c.person_id == number))
+                told = (tables.payment.c.person_id == number, tables.payment.c.event != "decided")
+                await connection.execute(update(tables.payment).where(*told).values(reference="", note=""))
             details = {"people": list(person_ids)}
             await note(connection, self._study_id, who, "people forgotten", details, now)
 

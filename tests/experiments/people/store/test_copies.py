@@ -2,6 +2,7 @@
 
 import asyncio
 import sqlite3
+from datetime import timedelta
 
 import numpy as np
 import pytest
@@ -120,6 +121,29 @@ async def test_who_is_erased_leaves_nothing_but_what_was_paid(store, played, arr
                 assert SECRET.encode() not in content.read()
     with pytest.raises(StoreError, match=f"no person {played.id}"):
         await store.erase(played.id, "ada")
+
+
+async def test_who_is_forgotten_keeps_what_they_did_and_nothing_that_tells_who_they_are(
+    store, played, arrive
+):
+    other = await arrive(5)
+    await store.save_answers(played.id, "task", {"later": 1})
+    assert await store.known(other.seen + timedelta(days=1)) == (played.id, other.id)
+    assert await store.known(other.seen - timedelta(days=1)) == ()
+    before = await store.answers(played.id)
+    await store.forget([played.id], ["c" * 64], "keep_days")
+    assert await store.known(other.seen + timedelta(days=1)) == (other.id,)
+    assert await store.find("a" * 64) is None
+    assert (await store.person(played.id)).token_hash == "c" * 64
+    assert [row.folder for row in await store.trials()] == [f"visits/{'c' * 64}/task"]
+    assert await store.answers(played.id) == before
+    left = await everything(store)
+    for name in ("person", "identity", "trial"):
+        assert SECRET not in repr(left[name]) and "f" * 64 not in repr(left[name])
+    assert [event.reference for event in await store.ledger.history(played.id)] == ["", ""]
+    assert [event.cents for event in await store.ledger.history(played.id)] == [750, 750]
+    again = await store.arrive("prolific", "f" * 64, {"participant": SECRET}, "d" * 64, "consent")
+    assert again.id not in (played.id, other.id) and not again.returning
 
 
 async def test_nobody_is_erased_who_is_owed_something(store, arrive):
