@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mjsim.errors import HouseError
-
-ROOMS = (1, 10)  # of a home
+from mjsim.houses.values import ROOMS
 
 
 @dataclass(frozen=True)

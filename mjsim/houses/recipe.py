@@ -11,8 +11,7 @@ import msgspec
 from mjsim.errors import HouseError
 from mjsim.files import read_bytes
 from mjsim.houses.chance import stream
-from mjsim.houses.programme import ROOMS
-from mjsim.houses.values import FloorPlan
+from mjsim.houses.values import ROOMS, FloorPlan
 
 PREFIX = "generated:"
 VERSION = 1  # of the generator: raised by whatever changes a house of a seed

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from mjsim.errors import HouseError
 from mjsim.houses.openings import open_up, portions
 from mjsim.houses.plan import draw_rooms
-from mjsim.houses.programme import NEEDS, ROOMS, draw_programme
-from mjsim.houses.values import SIDES, WALL, FloorPlan, Rectangle
+from mjsim.houses.programme import NEEDS, draw_programme
+from mjsim.houses.values import ROOMS, SIDES, WALL, FloorPlan, Rectangle
 
 CASES = given(seed=st.integers(0, 10**6), rooms=st.integers(1, 7))
 FEW = settings(max_examples=12, deadline=None, derandomize=True)
