@@ -59,6 +59,9 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
         elif await asyncio.to_thread(_remove_from_tables, path, name):
             told.append(f"{_shown(copy)} was written anew without {name}")
     visits = Visits(folder / VISITS)
+    played = any(row.person_id == person.id for row in await store.trials())
+    if played and not (visits.folder / person.token_hash).exists():
+        told.append(f"the runs of {name} are not here; delete {VISITS}/{person.token_hash} where they are")
     await asyncio.to_thread(visits.remove, person.token_hash)
     if (visits.folder / person.token_hash).exists():
         raise StoreError(

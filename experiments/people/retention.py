@@ -4,6 +4,7 @@ import asyncio
 import datetime
 import hashlib
 import logging
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
@@ -12,7 +13,7 @@ from experiments.errors import StoreError
 from experiments.people.collect import person_name
 from experiments.people.copies import copies
 from experiments.people.erase import erase
-from experiments.people.store import Store, rewrite_backup, utc_now
+from experiments.people.store import Person, Store, rewrite_backup, utc_now
 
 LOG = logging.getLogger("mjsim.study")
 WHO = "keep_days"  # in the audit log
@@ -54,11 +55,15 @@ async def forget_old(
     people = [await store.person(number) for number in await store.known(before)]
     paid = [person for person in people if person.id not in owed]
     deleted, kept = ([p for p in paid if p.delete_wanted is wanted] for wanted in (True, False))
+    played, names = {row.person_id for row in await store.trials()}, await _names(store, kept)
+    # People whose runs are on another host are forgotten there.
+    places = {p.id: (visits / p.token_hash, visits / names[p.id]) for p in kept}
+    kept = [p for p in kept if p.id not in played or any(place.is_dir() for place in places[p.id])]
     if not dry:
         for person in deleted:
             await erase(store, visits.parent, person_name(person), WHO)
         if kept:
-            await _forget(store, visits, {person.id: person.token_hash for person in kept})
+            await _forget(store, visits, kept, names)
     return Retained(
         tuple(map(person_name, kept)),
         tuple(map(person_name, deleted)),
@@ -78,17 +83,19 @@ async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
         await asyncio.sleep(DAY)
 
 
-async def _forget(store: Store, visits: Path, hashes: dict[int, str]) -> None:
+async def _names(store: Store, people: Sequence[Person]) -> dict[int, str]:
+    """New names for the hashes of links: with the study's secret, these follow from the platform's ids."""
     study = await store.study()
-    # A new name for the hash of the link: with the study's secret, the hash follows from the platform's id.
-    names = {
-        number: hashlib.sha256(f"{study.name} {study.created} {number}".encode()).hexdigest()
-        for number in hashes
-    }
+    made = {p.id: f"{study.name} {study.created} {p.id}" for p in people}
+    return {number: hashlib.sha256(text.encode()).hexdigest() for number, text in made.items()}
+
+
+async def _forget(store: Store, visits: Path, people: Sequence[Person], names: Mapping[int, str]) -> None:
+    study, numbers = await store.study(), [person.id for person in people]
 
     async def gone(backup: Store) -> bool:
-        known = {person.id for person in await backup.people()} & set(hashes)
-        identified = known & set(await backup.known(datetime.datetime.max.replace(tzinfo=datetime.UTC)))
+        ever = datetime.datetime.max.replace(tzinfo=datetime.UTC)
+        identified = set(numbers) & set(await backup.known(ever))
         if identified:
             await backup.forget(sorted(identified), [names[number] for number in sorted(identified)], WHO)
         return bool(identified)
@@ -96,7 +103,7 @@ async def _forget(store: Store, visits: Path, hashes: dict[int, str]) -> None:
     for copy in copies(visits.parent):
         if copy.kind == "backup" and Path(copy.path).is_file():
             await rewrite_backup(Path(copy.path), study.name, gone)
-    for number, name in names.items():  # done again after a stop: who is moved already is not there
-        if (folder := visits / hashes[number]).is_dir():
-            await asyncio.to_thread(folder.rename, visits / name)
-    await store.forget(list(names), list(names.values()), WHO)
+    for person in people:  # done again after a stop: who is moved already is not there
+        if (folder := visits / person.token_hash).is_dir():
+            await asyncio.to_thread(folder.rename, visits / names[person.id])
+    await store.forget(numbers, [names[number] for number in numbers], WHO)

@@ -104,9 +104,12 @@ def test_who_is_erased_is_nowhere_any_more(served, tmp_path, capsys):
 
 def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
     (tmp_path / "backup.db").rename(tmp_path / "elsewhere.db")
+    visits = tmp_path / "served" / "visits"
+    (visits / ("b" * 64)).rename(tmp_path / "another-host")
     capsys.readouterr()
     assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
     assert "backup.db of" in (said := capsys.readouterr().out) and "where it was moved, delete p00002" in said
+    assert f"the runs of p00002 are not here; delete visits/{'b' * 64}" in said
 
 
 def test_the_last_person_of_a_table_leaves_an_empty_one(served, tmp_path):
