@@ -5,7 +5,7 @@ import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -30,14 +30,17 @@ class PlayProcess:
         folder: Where it keeps visits.
         words: Further words of its command line.
         core: The only one that it may use; None for all.
+        command: What is run; `study serve FILE` for a study.
 
     Attributes:
         url: Its URL.
         process: The process.
     """
 
-    def __init__(self, folder: Path, *words: str, core: int | None = None) -> None:
-        self._folder, self._words = folder, words
+    def __init__(
+        self, folder: Path, *words: str, core: int | None = None, command: Sequence[str] = ("play",)
+    ) -> None:
+        self._folder, self._words, self._command = folder, words, command
         self._cores = os.sched_getaffinity(0) if core is None else {core}
         self.output = folder.with_name("server.txt")
         self.url = ""
@@ -45,7 +48,7 @@ class PlayProcess:
     def start(self) -> None:
         """Start it, after a kill at the same port; returns as soon as it listens."""
         port = urlsplit(self.url).port or 0
-        command = ["play", "--no-open", "--port", str(port), "--out", str(self._folder), *self._words]
+        command = [*self._command, "--no-open", "--port", str(port), "--out", str(self._folder), *self._words]
         with self.output.open("ab") as output:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "mjsim", *command], stdout=subprocess.PIPE, stderr=output, text=True

@@ -19,6 +19,7 @@ from experiments.cli.logs import begin_logging
 from experiments.errors import ConfigError, RecordError
 
 PORT = 8000
+BACKLOG = 1024  # connections that wait to be taken
 MAX_FILES = 16384  # open files, sockets included
 
 
@@ -97,7 +98,7 @@ def listen(host: str, port: int) -> socket.socket:
     """A socket that listens."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        return socket.create_server((host, port), family=family, backlog=100)
+        return socket.create_server((host, port), family=family, backlog=BACKLOG)
     except OSError as error:
         place = f"cannot listen at {host}, port {port}"
         raise OSError(

@@ -14,6 +14,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_en
 
 from experiments.errors import StoreError
 from experiments.people.store.failures import advice, damaged, passes
+from experiments.people.store.sqlite import quick_connection
 
 T = TypeVar("T")
 _Waiting = tuple[Callable[[AsyncConnection], Awaitable[Any]], asyncio.Future[Any]]
@@ -250,7 +251,7 @@ def _engine(url: URL) -> AsyncEngine:
         engine = create_async_engine(
             url,
             hide_parameters=True,
-            connect_args={"timeout": PATIENCE_S},
+            connect_args={"timeout": PATIENCE_S, "async_creator_fn": quick_connection},
             pool_timeout=PATIENCE_S,
             pool_size=CONNECTIONS,
             max_overflow=0,  # each is a thread, and takes longer to make than to wait for

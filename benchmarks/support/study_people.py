@@ -1,0 +1,122 @@
+"""People who arrive at a study at the same moment, each at an address of their own, over real HTTP."""
+
+import asyncio
+import time
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import urlencode, urlsplit
+
+from benchmarks.support.play_server import PATIENCE, PlayProcess
+
+PROXIED = ("--trusted-proxy", "127.0.0.1")  # whose X-Forwarded-For gives everybody an address
+STUDY = """
+[[cells]]
+assistance = "none"
+objects = 1
+people = {people}
+house_seeds = 0
+fidelity = "{fidelity}"
+
+[[cells]]
+assistance = "optimal"
+objects = 1
+people = {people}
+house_seeds = 0
+fidelity = "{fidelity}"
+
+[study]
+name = "small"
+title = "A small study"
+institution = "a test"
+contact = "nobody@example.org"
+phases = ["consent", "task", "completion"]
+
+[study.limits]
+sessions = {sessions}
+"""
+
+
+def study_process(
+    folder: Path, *words: str, people: int = 250, sessions: int = 20, fidelity: str = "event"
+) -> PlayProcess:
+    """A server of a small study in a folder, with two cells of so many people."""
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / "study.toml"
+    file.write_text(STUDY.format(people=people, sessions=sessions, fidelity=fidelity))
+    return PlayProcess(folder / "out", *PROXIED, *words, command=("study", "serve", str(file)))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a server answered."""
+
+    status: int
+    headers: Mapping[str, str]
+    body: str
+
+
+@dataclass
+class Times:
+    """How long pages took, s, by name; `failed` are those that did not come."""
+
+    pages: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    failed: list[str] = field(default_factory=list)
+
+    @property
+    def slowest(self) -> float:
+        """Of all pages."""
+        return max((seconds for times in self.pages.values() for seconds in times), default=0.0)
+
+
+async def ask(
+    url: str, path: str, form: Mapping[str, str] | None = None, number: int = 0, cookie: str = ""
+) -> Answer:
+    """Ask for a page as person `number`, on a connection of its own; with a form, post it."""
+    parts, body = urlsplit(url), "" if form is None else urlencode(form)
+    head = [f"{'GET' if form is None else 'POST'} {path} HTTP/1.1", f"Host: {parts.netloc}"]
+    head += [f"Origin: http://{parts.netloc}", "Connection: close", f"Content-Length: {len(body)}"]
+    head += [f"X-Forwarded-For: 10.{number >> 16}.{number >> 8 & 255}.{number & 255}"]
+    head += ["Content-Type: application/x-www-form-urlencoded"] + ([f"Cookie: {cookie}"] if cookie else [])
+    reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
+    try:
+        writer.write("\r\n".join([*head, "", body]).encode())
+        top, _, content = (await reader.read(-1)).decode().partition("\r\n\r\n")
+    finally:
+        writer.close()
+    if not top:
+        raise ConnectionError("no answer")
+    first, *lines = top.split("\r\n")
+    headers = {name.lower(): value for name, _, value in (line.partition(": ") for line in lines)}
+    return Answer(int(first.split()[1]), headers, content)
+
+
+async def arrive_at_once(url: str, people: int) -> tuple[Times, list[str]]:
+    """Let people come at once and go to their task, each as fast as pages come; times, and everybody's link."""
+    times = Times()
+
+    async def timed(name: str, number: int, path: str, form: Mapping[str, str] | None = None) -> Answer:
+        began = time.perf_counter()
+        try:
+            answer = await asyncio.wait_for(ask(url, path, form, number), PATIENCE)
+        except OSError as error:
+            times.failed.append(f"{name}: {error!r}")
+            raise
+        times.pages[name].append(time.perf_counter() - began)
+        if answer.status not in (200, 303):
+            times.failed.append(f"{name}: {answer.status}")
+        return answer
+
+    async def person(number: int) -> str:
+        await timed("welcome", number, "/")
+        link = (await timed("begin", number, "/begin", {})).headers.get("location", "")
+        await timed("consent", number, link)
+        await timed("agree", number, link, {"phase": "consent", "agree": "yes"})
+        task = await timed("task", number, link)
+        if 'data-trial="task"' not in task.body:
+            times.failed.append("task: another page")
+        return link
+
+    links = await asyncio.gather(*(person(number) for number in range(people)), return_exceptions=True)
+    return times, [link for link in links if isinstance(link, str)]

@@ -1,0 +1,32 @@
+"""SQLite for an event loop: a statement runs at once where it takes less time than handing it to a thread."""
+
+import sqlite3
+from collections.abc import Callable
+from typing import Any
+
+import aiosqlite
+
+QUICK = ("SELECT", "INSERT", "UPDATE", "DELETE", "SAVEPOINT", "RELEASE", "ROLLBACK")
+
+
+class QuickConnection(aiosqlite.Connection):
+    """Uses its thread only for what may wait: for the lock of another process, or for the disk.
+
+    Readers of a database in WAL mode wait for nobody, and writers have the lock by then.
+    """
+
+    async def _execute(self, fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+        name = fn.__name__
+        waits = name in ("commit", "close") or (name == "execute" and not args[0].lstrip().startswith(QUICK))
+        if waits or self._connection is None:
+            return await super()._execute(fn, *args, **kwargs)  # type: ignore[no-untyped-call]
+        return fn(*args, **kwargs)
+
+
+def quick_connection(database: str, **options: Any) -> QuickConnection:
+    """A connection that is not open yet, as SQLAlchemy awaits it."""
+    connection = QuickConnection(
+        lambda: sqlite3.connect(database, **{**options, "check_same_thread": False}), iter_chunk_size=64
+    )
+    connection._thread.daemon = True
+    return connection
