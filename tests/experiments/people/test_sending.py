@@ -42,6 +42,8 @@ contact = "nobody@example.org"
 [study.pay]
 reward = 7.50
 bonus_for_all = 1.00
+screen_out = 0.50
+partial = true
 
 [study.recruitment]
 platform = "{platform}"
@@ -79,12 +81,25 @@ class Paid:
     async def _fill(self):
         store = await self.open()
         for number in (1, 2):
-            ids = self.platform.add(number)
-            person = await store.arrive(self.platform.name, f"{number:064}", ids, f"{number:064}", "survey")
+            person = await self._arrive(store, number, self.platform.add(number), "survey")
             if number == 1:
                 await store.finish_trial(person.id, "task", "x", "all delivered")
             await store.finish_phase(person.id, "survey", "completion", {}, status="finished")
         await store.close()
+
+    async def _arrive(self, store, number, ids, phase):
+        return await store.arrive(self.platform.name, f"{number:064}", ids, f"{number:064}", phase)
+
+    def leave(self, number, ids, phase, status):
+        """Somebody who leaves before the end."""
+
+        async def run():
+            store = await self.open()
+            person = await self._arrive(store, number, ids, phase)
+            await store.finish(person.id, status)
+            await store.close()
+
+        asyncio.run(run())
 
     def send(self, timeout=0.5):
         """Send what is decided; what became of each payment."""
@@ -202,6 +217,32 @@ def test_somebody_is_rejected_instead_of_paid(paid, capsys):
     assert main([*paid.words, "--send", "--dry-run"]) == 2
 
 
+def test_who_leaves_early_gets_what_the_rules_say(paid):
+    before = {"prolific": ("SCREENED OUT", "RETURNED", "TIMED-OUT")}
+    ends = before.get(
+        paid.platform.name, ("Pending",) * 3 if paid.platform.name == "connect" else ("Accepted",) * 3
+    )
+    ids = [paid.platform.add(number, end) for number, end in enumerate(ends, 3)]
+    paid.leave(3, ids[0], "device", "screened_out")
+    paid.leave(4, ids[1], "survey", "withdrawn")
+    paid.leave(5, ids[2], "survey", "timed_out")
+    assert main([*paid.words, "--send"]) == (1 if paid.platform.name == "external-question" else 0)
+    amounts = sorted(str(what) for _, what in paid.platform.paid())
+    usual = ["100", "approved", "approved"]
+    assert (
+        amounts
+        == {
+            "prolific": sorted(
+                [*usual, "525", "525"]
+            ),  # the platform has paid who was screened out by itself
+            "connect": sorted([*usual, "50", "525", "525"]),
+            "external-question": usual,  # no assignment was submitted for which it pays
+        }[paid.platform.name]
+    )
+    left = ["p00003-screen_out", "p00004-partial", "p00005-partial"]
+    assert sorted(paid.owed()) == (left if paid.platform.name == "external-question" else [])
+
+
 # Runs `mjsim study pay --send`, and kills itself at a point that its last word names.
 KILLED = """
 import os, signal, sys
@@ -223,8 +264,18 @@ for one in (Ledger,) if owner == "ledger" else payers:
     setattr(one, name, die(getattr(one, name), when))
 sys.exit(main(sys.argv[1:]))
 """
-POINTS = [f"{what} {when}" for what in ("ledger decide", "ledger begin_sending", "payer send", "ledger confirm")
-          for when in ("before", "after")]  # fmt: skip
+POINTS = [
+    f"{what} {when}"
+    for what in (
+        "ledger decide",
+        "ledger begin_sending",
+        "payer find",
+        "ledger fail",
+        "payer send",
+        "ledger confirm",
+    )
+    for when in ("before", "after")
+]  # each leaves what the next one needs
 
 
 @pytest.mark.slow
@@ -238,6 +289,7 @@ def test_a_kill_at_any_point_pays_once(paid):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("platform", ["prolific"], indirect=True)
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_a_kill_while_the_platform_answers_pays_once(paid, when):
     assert main(paid.words) == 0
