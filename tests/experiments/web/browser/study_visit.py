@@ -115,8 +115,14 @@ class StudyVisit:
             self._page.wait_for(f"document.querySelector('#play')?.dataset.trial === '{trial}'")
             choose(self._page, label)
             self._page.wait_for("document.querySelectorAll('#list li').length > 0")
+            self._look_by_mouse()
             episode = trial_episode(TrialConfig.of(settings[trial]), house)
             KeyPresser(self._page, house, episode).tidy()
+
+    def _look_by_mouse(self):
+        """A click captures the mouse, which Escape would release; keys go on working."""
+        self._page.click("#screen")
+        self._page.wait_for("document.pointerLockElement?.id === 'screen'")
 
     def _answer_survey(self):
         self._page.wait_for(f"document.querySelectorAll('fieldset.scale').length === {SCALES}")
