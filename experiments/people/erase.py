@@ -40,12 +40,28 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
     owed = await store.ledger.owed(in_doubt_after=datetime.timedelta())
     if mine := [payment.key for payment in owed if payment.person_id == person.id]:
         raise StoreError(f"{name} is owed {', '.join(mine)}: pay first, then erase")
-    study = await store.study()
+    told = await _erase_from_copies(store, folder, person.id, who)
+    visits = Visits(folder / VISITS)
+    played = any(row.person_id == person.id for row in await store.trials())
+    if played and not person.delete_wanted and not (visits.folder / person.token_hash).exists():
+        told.append(f"the runs of {name} are not here; delete {VISITS}/{person.token_hash} where they are")
+    await asyncio.to_thread(visits.remove, person.token_hash)
+    if (visits.folder / person.token_hash).exists():
+        raise StoreError(
+            f"{visits.folder / person.token_hash} cannot be deleted; delete it, then erase again"
+        )
+    await store.erase(person.id, who)
+    return told
+
+
+async def _erase_from_copies(store: Store, folder: Path, person_id: int, who: str) -> list[str]:
+    """Delete a person from the copies that the study knows of; what to tell about them."""
+    study, name = await store.study(), f"p{person_id:05d}"
 
     async def gone(backup: Store) -> bool:
-        if person.id not in {other.id for other in await backup.people()}:
+        if person_id not in {other.id for other in await backup.people()}:
             return False
-        await backup.erase(person.id, who, unpaid=True)
+        await backup.erase(person_id, who, unpaid=True)
         return True
 
     told = []
@@ -58,16 +74,6 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
                 told.append(f"{_shown(copy)} was written anew without {name}")
         elif await asyncio.to_thread(_remove_from_tables, path, name):
             told.append(f"{_shown(copy)} was written anew without {name}")
-    visits = Visits(folder / VISITS)
-    played = any(row.person_id == person.id for row in await store.trials())
-    if played and not (visits.folder / person.token_hash).exists():
-        told.append(f"the runs of {name} are not here; delete {VISITS}/{person.token_hash} where they are")
-    await asyncio.to_thread(visits.remove, person.token_hash)
-    if (visits.folder / person.token_hash).exists():
-        raise StoreError(
-            f"{visits.folder / person.token_hash} cannot be deleted; delete it, then erase again"
-        )
-    await store.erase(person.id, who)
     return told
 
 

@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field, replace
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from experiments.people.phases import phases_of_study
 from experiments.people.phases.base import Phase
 from experiments.people.phases.comprehension import Comprehension
 from experiments.people.phases.played import Played
+from experiments.people.readiness.reading import words_of
 from experiments.people.readiness.server import serving
 from experiments.people.recruitment.base import Leaving, Recruiter
 from experiments.people.server.app import Serving, StudyServer
@@ -128,7 +128,7 @@ class _DryRun:
         link = await self._arrive(shown=True)
         for phase in self._procedure.phases[:-1]:
             page = await self._page(link, phase.name)
-            self._walked.words[phase.name] = 0 if isinstance(phase, Played) else _words(page)
+            self._walked.words[phase.name] = 0 if isinstance(phase, Played) else words_of(page)
             await self._check_minimum(link, phase)
             await self._photograph(phase.name, self._url(link))
             if isinstance(phase, Played):
@@ -206,7 +206,7 @@ class _DryRun:
         query = {name: own.get(name) or some for name in self._recruiter.parameters}
         first = await self._client.get("/", params=query)
         if shown:
-            self._walked.words["welcome"] = _words(first.text)
+            self._walked.words["welcome"] = words_of(first.text)
             await self._photograph("welcome", str(first.url))
         answer = await self._client.post("/begin", data=query)
         if first.status_code != 200 or answer.status_code != 303:
@@ -299,27 +299,3 @@ def _example(phase: Phase) -> dict[str, str]:
     """A form that the phase takes; of somebody's own phase an empty one, unless it has an `example()`."""
     made: dict[str, str] = getattr(phase, "example", dict)()
     return made
-
-
-class _Text(HTMLParser):
-    """Counts the words that a reader sees."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.words, self._hidden = 0, 0
-
-    def handle_starttag(self, tag: str, attrs: Any) -> None:  # noqa: ARG002 - of the base
-        self._hidden += tag in ("head", "script", "noscript")
-
-    def handle_endtag(self, tag: str) -> None:
-        self._hidden -= tag in ("head", "script", "noscript")
-
-    def handle_data(self, data: str) -> None:
-        if not self._hidden:
-            self.words += len(data.split())
-
-
-def _words(page: str) -> int:
-    text = _Text()
-    text.feed(page)
-    return text.words
