@@ -18,7 +18,7 @@ from mjsim.importing.houses.meshes import SUFFIXES as MESHES
 from mjsim.importing.houses.mjcf import SUFFIXES as MJCF
 from mjsim.importing.houses.mjcf import read_mjcf
 from mjsim.importing.houses.plan import Plan, make_plan
-from mjsim.importing.houses.rooms import Rooms, find_rooms, read_rooms, words_of
+from mjsim.importing.houses.rooms import find_rooms, read_rooms, words_of
 from mjsim.importing.houses.sdf import SUFFIXES as SDF
 from mjsim.importing.houses.sdf import read_sdf
 from mjsim.importing.houses.solids import LOW, Solids, make_solids
@@ -120,7 +120,7 @@ def _converted(
     doors = [piece for piece in pieces if _is_door(piece)]
     still = [piece for piece in pieces if not _is_door(piece)]
     solids = make_solids(still)
-    floor = _floor_extent(still)
+    floor = _floor(still)
     leaves = make_solids(doors)
     plan = make_plan(solids.solids, leaves.solids, floor)
     opened = {leaf.name for leaf in leaves.solids if _between_rooms(plan, leaf.outline)}
@@ -132,7 +132,7 @@ def _converted(
     rooms = find_rooms(plan, given, drawn)
     bins = place_bins(plan, rooms, Catalogue.load())
     looks = make_looks(drawn, partial(plan.on, rooms.floor))
-    seen = _floor_share(drawn, plan, rooms)
+    seen = float((plan.floor & rooms.floor).sum() / rooms.floor.sum())
     name = label or source.name.split(".")[0].replace("_", " ").strip().capitalize()
     house = ImportedHouse(name, source.name, solids.solids, looks, plan, rooms, bins, seen >= _FLOOR_SEEN)
     triangles = sum(len(mesh.look.faces) for mesh in looks)
@@ -183,8 +183,10 @@ def _levels(pieces: Sequence[Piece]) -> tuple[float, float]:
     wide = np.convolve(total, np.ones(3), mode="same")
     levels = np.flatnonzero(wide >= _LEVEL * wide.max())
     lowest = levels[0] + int(np.argmax(total[levels[0] : levels[0] + 3]))
-    weights = area[flat] * (np.abs(bins - first - lowest) <= 1)
-    floor = float(np.average(heights, weights=weights))
+    near = np.abs(bins - first - lowest) <= 1
+    order = np.argsort(heights[near])
+    share = np.cumsum(area[flat][near][order])
+    floor = float(heights[near][order][np.searchsorted(share, share[-1] / 2)])  # the median of the area
     above = [(level + first) * 0.02 for level in levels if (level + first) * 0.02 > floor + _STOREY]
     return floor, (min(above) if above else np.inf)
 
@@ -238,19 +240,12 @@ def _between_rooms(plan: Plan, outline: Floats) -> bool:
     return all(plan.indoors[plan.cell(middle + sign * offset)] for sign in (-1, 1))
 
 
-def _floor_extent(pieces: Sequence[Piece]) -> tuple[Floats, Floats] | None:
-    """Corners of what lies at floor height, m, (2,) each."""
-    found = [p.surface.corners[np.abs(p.surface.corners[:, :, 2]).max(axis=1) < LOW] for p in pieces]
-    corners = np.concatenate([c.reshape(-1, 3) for c in found]) if found else np.empty((0, 3))
-    return (corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)) if len(corners) else None
-
-
-def _floor_share(pieces: Sequence[Piece], plan: Plan, rooms: Rooms) -> float:
-    """Share of the rooms' floor that the source draws."""
-    corners = np.concatenate([p.surface.corners for p in pieces if p.seen] or [np.empty((0, 3, 3))])
-    low = corners[np.abs(corners[:, :, 2]).max(axis=1) < LOW]
-    here = rooms.labels > 0
-    return float((plan.covered(low[:, :, :2]) & here).sum() / max(here.sum(), 1))
+def _floor(pieces: Sequence[Piece]) -> Floats:
+    """Triangles at floor height from above, m, (n, 3, 2)."""
+    found = [
+        p.surface.corners[np.abs(p.surface.corners[:, :, 2]).max(axis=1) < LOW] for p in pieces if p.seen
+    ]
+    return np.concatenate([np.empty((0, 3, 3)), *found])[:, :, :2]
 
 
 def _write_picture(catalogue: Path, out: Path) -> ImportDecision | None:

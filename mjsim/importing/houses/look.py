@@ -16,6 +16,7 @@ from mjsim.importing.surface import Floats, Surface, cleaned, joined
 
 BUDGET = 150_000  # triangles of a house
 _LEAST = 100  # triangles that every mesh keeps
+_LEAST_VERTICES = 4  # that MuJoCo asks of a mesh
 _SMALL, _FEW = 0.3, 1000  # m; triangles that are kept of smaller things
 CEILING = 2.2  # m; what is above is left out of views from above
 _SAME = 8  # of 255, colours that differ by less are one
@@ -35,9 +36,7 @@ def make_looks(pieces: Iterable[Piece], over_floor: Callable[[Floats], Mask]) ->
     parts = []
     for name, surface in _by_name(pieces):
         surface, _ = cleaned(surface)
-        high = (surface.corners[:, :, 2].min(axis=1) >= CEILING) & over_floor(
-            surface.corners.mean(axis=1)[:, :2]
-        )
+        high = (surface.corners[:, :, 2].min(axis=1) >= CEILING) & _over(surface, over_floor)
         for rows, is_high in ((~high, False), (high, True)):
             if rows.any():
                 parts.append((name, surface.select(rows), is_high))
@@ -49,7 +48,14 @@ def make_looks(pieces: Iterable[Piece], over_floor: Callable[[Floats], Mask]) ->
     for name, surface, high in materials:
         small = np.ptp(surface.corners.reshape(-1, 3), axis=0).max() < _SMALL
         found.append(DrawnMesh(name, _look(_reduced(surface, _FEW if small else limit)), high))
-    return tuple(found)
+    return tuple(mesh for mesh in found if len(mesh.look.vertices) >= _LEAST_VERTICES)
+
+
+def _over(surface: Surface, over_floor: Callable[[Floats], Mask]) -> Mask:
+    """Triangles (n,) that are over a room at their middle or halfway to a corner."""
+    middle = surface.corners.mean(axis=1)[:, :2]
+    halfway = (middle[:, None] + surface.corners[:, :, :2]) / 2
+    return np.asarray(over_floor(middle) | over_floor(halfway.reshape(-1, 2)).reshape(-1, 3).any(axis=1))
 
 
 def picture_key(look: Look) -> str:

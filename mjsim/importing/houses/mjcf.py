@@ -8,16 +8,29 @@ from typing import Any
 import mujoco
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 from PIL import Image
 
 from mjsim.errors import AssetError
 from mjsim.importing.houses.meshes import primitive
-from mjsim.importing.houses.values import TEXTURE_SIDE, HouseOptions, Missing, Piece, SourceScene, left_out
+from mjsim.importing.houses.values import (
+    TEXTURE_SIDE,
+    HouseOptions,
+    Missing,
+    NamedRoom,
+    Piece,
+    SourceScene,
+    left_out,
+)
 from mjsim.importing.surface import Floats, Surface
 from mjsim.model.model_files import read_model
+from mjsim.model.rooms import PREFIX, RoomMap
 
 SUFFIXES = (".xml", ".mjcf")
 _SEEN = (0, 1, 2)  # groups that viewers show
+_CLEAR = 0.9  # opacity; what collides and is clearer only marks where it collides
+_OPAQUE = 250  # of 255; pictures that are nowhere so opaque are shadows, and left out
+_COVER = 0.02  # m
 _ENDLESS = 15.0  # m, half of the side that a plane without end is given
 _GEOM = mujoco.mjtGeom
 
@@ -40,7 +53,21 @@ def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
         *missing.notes(),
         *([left_out(f"{len(absent)} missing pictures", ", ".join(absent[:4]))] if absent else []),
     ]
-    return SourceScene(pieces, "MJCF scene", tuple(notes))
+    return SourceScene(pieces, "MJCF scene", tuple(notes), _rooms(model))
+
+
+def _rooms(model: Any) -> tuple[NamedRoom, ...]:
+    """Rooms of a house of ours, which marks them by box sites; none of others."""
+    if not any(model.site(site).name.startswith(PREFIX) for site in range(model.nsite)):
+        return ()
+    rooms = RoomMap.from_model(model)
+    boxes: dict[str, list[tuple[float, float, float, float]]] = {}
+    for key, centre, half, axes in zip(rooms.keys, *rooms.rectangles, strict=True):
+        low, high = centre - np.abs(axes) @ half, centre + np.abs(axes) @ half
+        boxes.setdefault(key, []).append((*low.tolist(), *high.tolist()))
+    return tuple(
+        NamedRoom(key, key.replace("_", " ").capitalize(), tuple(found)) for key, found in boxes.items()
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +99,13 @@ def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: Missing) -
 
 def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]:
     """Pictures by the names of materials, and files that are not there; the model is left without textures."""
-    files = {
-        t.name: t.file for t in spec.textures if t.file
-    }  # pictures for cubes, too, are drawn on each side
+    files = {t.name: t.file for t in spec.textures if t.file}  # those for cubes are drawn on each side
+    made = {t.name: t.rgb1 for t in spec.textures if not t.file}
     images: dict[str, Floats] = {}
     found, absent = {}, []
     for material in spec.materials:
         name = next((t for t in material.textures if t in files), None)
+        material.rgba[:3] *= next((made[t] for t in material.textures if t in made), 1.0)
         for role in range(len(material.textures)):
             material.textures[role] = ""
         if name is None:
@@ -86,6 +113,9 @@ def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]
         if name not in images:
             try:
                 with Image.open(files[name]) as picture:
+                    if "A" in picture.getbands() and np.asarray(picture.getchannel("A")).max() < _OPAQUE:
+                        material.rgba[3] = 0.0  # a drawn shadow
+                        continue
                     small = picture.convert("RGB")
                     small.thumbnail((TEXTURE_SIDE, TEXTURE_SIDE))
                     images[name] = np.asarray(small, np.float64) / 255
@@ -110,10 +140,13 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[Piece]:
     shown = np.isin(model.geom_group, _SEEN) & (alpha > 0)
     bodies = model.geom_bodyid
     # Bodies of many scenes have geoms to see and others to collide. Where nothing collides, what is seen is solid.
-    has_look = np.isin(bodies, np.unique(bodies[shown & ~collides])) & (bodies > 0)
     has_solid = np.isin(bodies, np.unique(bodies[collides])) & (bodies > 0)
+    looks = np.flatnonzero(shown & ~collides)
     for geom in range(model.ngeom):
-        seen = bool(shown[geom] and not (collides[geom] and has_look[geom]))
+        seen = bool(
+            shown[geom]
+            and not (collides[geom] and (alpha[geom] < _CLEAR or _covered(model, data, geom, looks)))
+        )
         solid = bool(collides[geom] or (shown[geom] and not has_solid[geom]))
         surface = _surface(model, geom, pictures) if seen or solid else None
         if surface is not None:
@@ -121,6 +154,24 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[Piece]:
             frame[:3, :3], frame[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
             loose = bool(model.body_weldid[bodies[geom]] != 0)
             yield Piece(_name(model, geom), surface.moved(frame), seen, solid, loose)
+
+
+def _covered(model: Any, data: Any, geom: int, looks: NDArray[np.intp]) -> bool:
+    """Whether a geom that is only seen covers one that collides: then that is not to be seen itself."""
+    low, high = _extent(model, data, geom)
+    for look in looks[model.geom_bodyid[looks] == model.geom_bodyid[geom]].tolist():
+        first, last = _extent(model, data, look)
+        if (first <= low + _COVER).all() and (last >= high - _COVER).all():
+            return True
+    return False
+
+
+def _extent(model: Any, data: Any, geom: int) -> tuple[Floats, Floats]:
+    """Lower and upper corner of a box around a geom, m."""
+    rotation = data.geom_xmat[geom].reshape(3, 3)
+    centre = data.geom_xpos[geom] + rotation @ model.geom_aabb[geom, :3]
+    reach = np.abs(rotation) @ model.geom_aabb[geom, 3:]
+    return centre - reach, centre + reach
 
 
 def _name(model: Any, geom: int) -> str:

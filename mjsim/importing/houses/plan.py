@@ -20,6 +20,8 @@ _BAND = (0.05, 1.8)  # m, heights at which a person bumps into things
 _WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # m; what is at all these heights is a wall
 _GAP = 0.6  # m, half of the widest opening of the outer wall that is closed
 _PAD = 2 * _GAP + 0.3  # m around all things
+_DRAWN = 10.0  # times that a drawn floor counts
+_LEAST_SHARE = 0.15  # of the whole floor; less is a closet of a house that is open elsewhere
 _MIN_AREA = 3.0  # m^2 that walls must enclose to be those of a house
 
 Mask = NDArray[np.bool_]
@@ -34,6 +36,7 @@ class Plan:
     walls: Mask  # where it is a wall; doors that are open count
     doors: Mask  # where doors were that are open now
     indoors: Mask  # what the outer walls enclose, walls included
+    floor: Mask  # where the source draws a floor
     enclosed: bool  # whether there are such walls; else it is a rectangle
 
     @cached_property
@@ -48,8 +51,12 @@ class Plan:
 
     @cached_property
     def walkable(self) -> Mask:
-        """Where a person's middle can be: the largest connected part."""
-        return largest(self.clearance > BODY)
+        """Where a person's middle can be: the largest connected part, those with a drawn floor before others."""
+        parts, count = label(self.clearance > BODY)
+        if not count:
+            return np.zeros_like(self.free)
+        sizes = np.bincount(parts.ravel(), 1.0 + _DRAWN * self.floor.ravel())
+        return np.asarray(parts == sizes[1:].argmax() + 1)
 
     @property
     def area(self) -> float:
@@ -67,31 +74,26 @@ class Plan:
         cells = np.clip(np.floor((points - self.origin) / CELL).astype(int), 0, np.array(mask.shape) - 1)
         return np.asarray(mask[cells[:, 0], cells[:, 1]])
 
-    def covered(self, outlines: Iterable[Floats]) -> Mask:
-        """Cells that the convex hulls of outlines, each (k, 2), m, touch."""
-        return _raster(self.free.shape, self.origin, outlines)
 
-
-def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: tuple[Floats, Floats] | None) -> Plan:
+def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) -> Plan:
     """The plan of a house.
 
     Args:
         solids: All that collides.
         doors: Doors that stand open, not among the solids.
-        floor: Lower and upper corner of what is drawn at floor height, m, (2,) each; None where nothing is.
+        floor: Triangles at floor height, m, (n, 3, 2).
 
     Raises:
         AssetError: There is neither a wall nor a floor, the scene is too large, or nobody can stand in it.
     """
     corners = [np.array([s.low[:2], s.high[:2]]) for s in (*solids, *doors)]
-    if not corners and floor is None:
-        raise AssetError("has neither walls nor a floor; is it a house?")
+    ground = floor.reshape(-1, 2)
+    if len(ground) and (not corners or np.ptp(ground, axis=0).max() < MAX_SIDE):
+        corners.append(ground)
     if not corners:
-        corners = [np.array(floor)]
+        raise AssetError("has neither walls nor a floor; is it a house?")
     points = np.concatenate(corners)
     low, high = points.min(axis=0), points.max(axis=0)
-    if floor is not None and np.ptp(floor, axis=0).max() < MAX_SIDE:
-        low, high = np.minimum(low, floor[0]), np.maximum(high, floor[1])
     if (high - low).max() > MAX_SIDE:
         sides = " x ".join(f"{side:.4g}" for side in high - low)
         raise AssetError(
@@ -101,10 +103,13 @@ def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: tuple[Floa
     shape = tuple(np.ceil((high - low + 2 * _PAD) / CELL).astype(int).tolist())
     blocked, shut = (_at_heights(shape, origin, chosen, _BAND) for chosen in (solids, doors))
     walls = np.logical_and.reduce([_at_heights(shape, origin, solids, band) for band in _WALL]) | shut
-    indoors = _enclosed(walls)
-    plan = Plan(origin, blocked, walls, shut & ~blocked, indoors, enclosed=True)
-    if plan.area < _MIN_AREA:
-        plan = replace(plan, indoors=_rectangle(shape, origin, floor), enclosed=False)
+    # Windows have sills: what is low closes the outside off, too.
+    indoors = _enclosed(walls | _at_heights(shape, origin, solids, _WALL[0]))
+    drawn = _raster(shape, origin, floor)
+    plan = Plan(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
+    whole = replace(plan, indoors=_rectangle(drawn), enclosed=False)
+    if plan.area < max(_MIN_AREA, _LEAST_SHARE * whole.area):
+        plan = whole
     if plan.area < 1.0:
         raise AssetError(
             "leaves nowhere to walk: its walls enclose no floor, or what stands there fills it; "
@@ -119,12 +124,6 @@ def clearance(free: Mask) -> Floats:
     return np.asarray(distance_transform_edt(padded)[1:-1, 1:-1] * CELL)
 
 
-def largest(mask: Mask) -> Mask:
-    """The largest connected part of a mask."""
-    parts, count = label(mask)
-    return np.asarray(parts == np.bincount(parts.ravel())[1:].argmax() + 1) if count else mask
-
-
 def _enclosed(walls: Mask) -> Mask:
     """What walls enclose, walls included, once openings up to twice `_GAP` are closed."""
     distance = distance_transform_edt(~walls) * CELL if walls.any() else np.full(walls.shape, np.inf)
@@ -137,15 +136,15 @@ def _enclosed(walls: Mask) -> Mask:
     return np.asarray(~outside)
 
 
-def _rectangle(shape: tuple[int, ...], origin: Floats, floor: tuple[Floats, Floats] | None) -> Mask:
-    """The rectangle of the floor, or of all that stands there."""
-    inside = np.zeros(shape, bool)
+def _rectangle(floor: Mask) -> Mask:
+    """The rectangle of a floor, or of all that stands there."""
     edge = round(_PAD / CELL)
-    first, last = np.array([edge, edge]), np.array(shape) - edge
-    if floor is not None:
-        first, last = (np.rint((corner - origin) / CELL).astype(int) for corner in floor)
-        first = np.maximum(first, 0)
-    inside[first[0] : last[0], first[1] : last[1]] = True
+    inside = np.zeros_like(floor)
+    x, y = np.nonzero(floor)
+    if len(x):
+        inside[x.min() : x.max() + 1, y.min() : y.max() + 1] = True
+    else:
+        inside[edge:-edge, edge:-edge] = True
     return inside
 
 

@@ -20,7 +20,7 @@ from mjsim.importing.houses.values import NamedRoom, Piece
 from mjsim.importing.surface import Floats
 
 _NARROW = (0.65, 0.9, 1.2, 1.5, 1.8)  # m, half of the way that parts two rooms; the wider ones part halls
-_HALL = 40.0  # m^2, floor of a room that is rather parted at wider openings
+_HALL = 45.0  # m^2, floor of a room that is rather parted at wider openings
 _HALL_PART = 5.0  # m^2, at least, of each part
 _MIN_AREA = 1.5  # m^2 of floor; smaller ones belong to their neighbours
 _MIN_WALK = 0.5  # m^2 that can be walked on

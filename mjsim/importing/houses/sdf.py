@@ -20,6 +20,7 @@ from mjsim.importing.values import ImportDecision
 
 SUFFIXES = (".world", ".sdf")
 _VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
+_BUILT_IN = ("sun", "ground_plane")  # models of Gazebo
 _THIN = 0.002  # m, of planes
 _DEPTH = 20  # models within models
 _PLANE = 30.0  # m, greatest side of a plane
@@ -49,7 +50,8 @@ class _Place:
 class _Reader:
     def __init__(self, path: Path, options: HouseOptions) -> None:
         self._path = path
-        self._folders = [*options.models, path.parent, path.parent / "models", path.parent.parent / "models"]
+        near = [folder / name for folder in (path.parent, path.parent.parent) for name in ("", "models")]
+        self._folders = [*options.models, *near]
         for variable in _VARIABLES:
             self._folders += [Path(part) for part in os.environ.get(variable, "").split(":") if part]
         self.missing = Missing(options.skip_missing)
@@ -79,6 +81,13 @@ class _Reader:
         self, element: ET.Element, frame: Floats, depth: int, static: bool, name: str
     ) -> Iterator[Piece]:
         uri = (element.findtext("uri") or "").strip()
+        built_in = uri.rpartition("/")[2].lower().replace(" ", "_")
+        if built_in == "ground_plane":  # it says where the floor is; the house gets one of its own
+            ground = trimesh.creation.box((_PLANE, _PLANE, _THIN)).apply_translation((0, 0, -_THIN / 2))
+            surface = primitive(ground, np.array(PLAIN)).moved(frame @ _pose(element, self._path))
+            yield Piece(built_in, surface, seen=False, solid=False)
+        if built_in in _BUILT_IN:
+            return
         found = self._find(uri, None)
         if found is None:
             return
@@ -134,6 +143,8 @@ class _Reader:
     def _find(self, uri: str, folder: Path | None) -> Path | None:
         """File or folder of a URI; None where it is missing and left out."""
         scheme, _, rest = uri.rpartition("://")
+        if scheme.startswith("http"):  # Gazebo Fuel: the model may have been downloaded
+            rest = rest.rstrip("/").rpartition("/")[2]
         rest = rest.lstrip("/") if scheme == "model" else rest
         folders = [*([] if folder is None else [folder, folder.parent]), *self._folders]
         found = next((base / rest for base in folders if rest and (base / rest).exists()), None)
@@ -163,8 +174,8 @@ def _model_file(folder: Path) -> Path:
     if config.is_file():
         try:
             named = ET.fromstring(read_text(config)).findtext("sdf")
-        except (OSError, UnicodeDecodeError, ET.ParseError) as error:
-            raise AssetError(f"cannot read {config}: {error}; correct it") from error
+        except (OSError, UnicodeDecodeError, ET.ParseError):
+            named = None
         if named and (folder / named.strip()).is_file():
             return folder / named.strip()
     if (folder / "model.sdf").is_file():

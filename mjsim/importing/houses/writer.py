@@ -74,21 +74,23 @@ def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Pat
 
 def _assets(house: ImportedHouse, folder: Path) -> Iterator[str]:
     """Meshes, pictures and materials; writes their files."""
-    materials: dict[str, str] = {}
+    known: set[str] = set()
     for number, mesh in enumerate(house.looks):
         look, name = mesh.look, f"look_{number}"
         (folder / f"{name}.obj").write_text("\n".join(look_lines(look)) + "\n", encoding="utf-8")
         yield f'<mesh name="{name}" file="{name}.obj" inertia="shell"/>'
         material = _material(mesh)
-        if material in materials:
+        if material in known:
             continue
-        materials[material] = name
-        red, green, blue = look.colour if look.picture is None else (1.0, 1.0, 1.0)
+        known.add(material)
+        red, green, blue = look.colour
         texture = ""
         if look.picture is not None:
             picture = f"picture_{picture_key(look)}"
-            write_png(folder / f"{picture}.png", look.picture)
-            yield f'<texture name="{picture}" type="2d" file="{picture}.png"/>'
+            if picture not in known:
+                known.add(picture)
+                write_png(folder / f"{picture}.png", look.picture)
+                yield f'<texture name="{picture}" type="2d" file="{picture}.png"/>'
             texture = f' texture="{picture}"'
         rgba = f"{red:g} {green:g} {blue:g} 1"
         yield f'<material name="{material}"{texture} rgba="{rgba}" specular="0.1" shininess="0.2"/>'
@@ -100,9 +102,7 @@ def _assets(house: ImportedHouse, folder: Path) -> Iterator[str]:
 
 
 def _material(mesh: DrawnMesh) -> str:
-    if mesh.look.picture is not None:
-        return f"material_{picture_key(mesh.look)}"
-    return "colour_" + "_".join(f"{round(255 * c):02x}" for c in mesh.look.colour)
+    return f"material_{picture_key(mesh.look)}_" + "_".join(f"{round(255 * c):02x}" for c in mesh.look.colour)
 
 
 def _lights() -> Iterator[str]:
