@@ -37,7 +37,6 @@ EXTRA_WAYS = (  # rooms between which there may be another way, which makes a lo
     ("dining_room", "hall"),
     ("office", "living_room"),
     ("bedroom", "bathroom"),
-    ("bedroom", "shower_room"),
     ("utility", "kitchen"),
     ("utility", "hall"),
 )

@@ -18,9 +18,9 @@ from mjsim.houses.programme import NEEDS, Programme, draw_programme, use_of
 from mjsim.houses.values import WALL, Rectangle, Room
 
 GRID = 0.2  # m
-TRIES = 300  # programmes
-EFFORT = 0.15  # deterministic seconds of the solver for one programme
-SLACK, LARGE_SLACK = 0.25, 0.35  # share by which an area may differ from the wanted one; from nine rooms on
+TRIES = 500  # programmes
+EFFORT = 0.025  # deterministic seconds of the solver for one programme: most that have a plan have it sooner
+SLACK, LARGE_SLACK = 0.25, 0.45  # share by which an area may differ from the wanted one; from nine rooms on
 LARGE = 9  # rooms
 VOID = 1.2  # m, least sides of the corner that an L-shaped outline lacks
 
@@ -53,7 +53,7 @@ def draw_rooms(seed: int, rooms: int, attempt: int = 0) -> tuple[Programme, tupl
 def _solve(programme: Programme, rng: np.random.Generator) -> Mapping[str, Rectangle] | None:
     total = sum((math.sqrt(a) + WALL) ** 2 for a in programme.areas.values())
     ratio = rng.uniform(1.0, 1.7)
-    is_angular = rng.random() < 0.5 and len(programme.areas) > 1
+    is_angular = rng.random() < (0.5 if len(programme.areas) < LARGE else 0.85) and len(programme.areas) > 1
     lacks = rng.uniform(0.06, 0.16) if is_angular else 0.0
     width = round(math.sqrt(total / (1 - lacks) * ratio) / GRID)
     depth = round(total / (1 - lacks) / (width * GRID) / GRID)

@@ -31,7 +31,7 @@ NEEDS: Mapping[str, RoomNeeds] = {
     "bedroom_3": RoomNeeds("Third bedroom", (7.5, 14.0), 2.25, 1.9, True),
     "office": RoomNeeds("Office", (7.0, 13.0), 2.25, 1.9, True),
     "bathroom": RoomNeeds("Bathroom", (4.4, 9.0), 1.85, 2.1, False),
-    "shower_room": RoomNeeds("Shower room", (3.0, 6.0), 1.45, 2.4, False),
+    "shower_room": RoomNeeds("Shower room", (3.2, 6.0), 1.6, 2.4, False),
     "utility": RoomNeeds("Utility room", (3.0, 7.0), 1.45, 2.5, False),
 }
 _SMALL: Mapping[int, Sequence[tuple[str, ...]]] = {
@@ -60,6 +60,7 @@ _MORE = {  # what larger homes have besides, and how usual it is
     "utility": 1.2,
 }
 _LIVELY = ("living_room", "studio", "hall")
+HALL_PER_DOOR = (1.2, 1.9)  # m2
 DOOR, WIDE = 1.3, 2.0  # m of wall that two rooms share at least, for a door or an open passage
 
 
@@ -103,7 +104,11 @@ def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
         low, high = NEEDS[key].area
         areas[key] = low + (high - low) * float(np.clip(rng.normal(size, 0.15), 0.03, 0.97))
     hub = next(key for key in ("hall", *_LIVELY) if key in keys)
-    return Programme(areas, tuple(_ways(keys, hub, rng)), hub)
+    ways = _ways(keys, hub, rng)
+    if hub == "hall":  # it is as long as its doors need
+        doors = sum("hall" in (way.a, way.b) for way in ways)
+        areas[hub] = float(np.clip(rng.uniform(*HALL_PER_DOOR) * doors, *NEEDS[hub].area))
+    return Programme(areas, tuple(ways), hub)
 
 
 def _keys(rooms: int, rng: np.random.Generator) -> tuple[str, ...]:
