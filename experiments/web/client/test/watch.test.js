@@ -32,8 +32,9 @@ test("the state and the view of the person are shown, also what comes while the 
   say({ type: "state", phase: "running", reason: "", input: 0 });
   say(SCENE);
   say(SNAPSHOT);
-  expect([part("play").dataset.phase, part("note").textContent, part("world").hidden]).toEqual(["running", "p00001", false]);
+  expect([part("play").dataset.phase, part("note").textContent, part("world").hidden]).toEqual(["running", "p00001: the house is being loaded", false]);
   await later();
+  expect(part("note").textContent).toBe("p00001");
   expect(world.setObjects.mock.lastCall).toEqual([{ cup: { model: "mug", pose: SNAPSHOT.objects.cup } }]);
   await later();
   expect(world.setEye.mock.lastCall?.[0].position).toEqual([1.06, 2, 1.6]);

@@ -18,6 +18,7 @@ const hud = new Hud(() => "");
 const screen = new Screen(byId("screen", HTMLCanvasElement), (frame) => hud.reached(frame.step), () => say("this browser cannot decode the frames"));
 const drawn = world();
 let loaded = Promise.resolve(); // once the house is there
+let state = ""; // of the session, in words
 
 /** @param {string} text */
 function say(text) {
@@ -38,7 +39,8 @@ function take(message) {
   switch (message.type) {
     case "state":
       page.dataset.phase = message.phase;
-      say(STATES[message.phase]);
+      state = STATES[message.phase];
+      say(state);
       break;
     case "frame":
       byId("world", HTMLElement).hidden = true;
@@ -47,7 +49,8 @@ function take(message) {
     case "scene":
       if (!drawn) return say("this browser cannot draw what the person's browser draws");
       byId("world", HTMLElement).hidden = false;
-      loaded = drawn.load(message).catch(() => say("the house cannot be loaded"));
+      say("the house is being loaded");
+      loaded = drawn.load(message).then(() => say(state), () => say("the house cannot be loaded"));
       break;
     case "snapshot": // those that come while the house is loaded are taken in order after that
       loaded.then(() => drawn?.take(message, performance.now()));
