@@ -64,7 +64,7 @@ async def _run(study: "Study", arguments: argparse.Namespace) -> int:
     from experiments.people.recruitment import payer
     from experiments.people.store import Store
 
-    client = payer(study.settings.recruitment) if arguments.send or arguments.reject else None
+    client = payer(study.settings) if arguments.send or arguments.reject else None
     store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
     try:
         if arguments.paid:

@@ -9,7 +9,7 @@ from experiments.people.recruitment.external_question import ExternalQuestion, E
 from experiments.people.recruitment.link import OpenLink
 from experiments.people.recruitment.payer import Payer
 from experiments.people.recruitment.prolific import Prolific, ProlificPayer
-from experiments.people.study_file import Recruitment
+from experiments.people.study_file import Recruitment, Settings
 
 # Settings without which people of a platform cannot be served.
 NEEDED: Mapping[str, Sequence[str]] = {
@@ -17,6 +17,7 @@ NEEDED: Mapping[str, Sequence[str]] = {
     "connect": ("completed",),
     "external-question": ("sites",),
 }
+PAY_DOLLARS = ("connect", "external-question")
 
 
 def recruiter(settings: Recruitment) -> Recruiter:
@@ -39,19 +40,22 @@ def recruiter(settings: Recruitment) -> Recruiter:
             return ExternalQuestion(settings)
 
 
-def payer(settings: Recruitment) -> Payer:
+def payer(settings: Settings) -> Payer:
     """The client through which the platform of a study pays.
 
     Raises:
-        ConfigError: The platform pays nobody, or the environment lacks its secret.
+        ConfigError: The platform pays nobody, or not in the study's currency, or the environment lacks its secret.
     """
-    match settings.platform:
+    recruitment, currency = settings.recruitment, settings.pay.currency
+    if recruitment.platform in PAY_DOLLARS and currency != "USD":
+        raise ConfigError(f"study.pay.currency is {currency!r}; {recruitment.platform} pays in USD")
+    match recruitment.platform:
         case "prolific":
-            return ProlificPayer(settings)
+            return ProlificPayer(recruitment)
         case "connect":
-            return ConnectPayer(settings)
+            return ConnectPayer(recruitment)
         case "external-question":
-            return ExternalQuestionPayer(settings)
+            return ExternalQuestionPayer(recruitment)
     raise ConfigError(
-        f"study.recruitment.platform is {settings.platform!r}, which pays nobody; pay by hand and note it with --paid"
+        f"study.recruitment.platform is {recruitment.platform!r}, which pays nobody; pay by hand, and note it (--paid)"
     )

@@ -119,7 +119,7 @@ class Api:
             await asyncio.sleep(_pause(answer.headers.get("retry-after", "")))
         said = f"{answer.status_code} {' '.join(answer.text.split())[:MAX_TEXT]}".strip()
         if answer.status_code in (401, 403):
-            raise StoppedError(f"the platform does not accept the secret: {said}")
+            raise StoppedError(f"the platform lets nobody in with this secret: {said}")
         if answer.is_server_error:
             raise UnsureError(f"the platform is in trouble: {said}")
         if not answer.is_success:
@@ -144,9 +144,11 @@ class Api:
 
 
 def secret(name: str) -> str:
-    """A secret from the environment; a ConfigError names a missing one."""
+    """A secret from the environment; a ConfigError names one that is missing or cannot be sent."""
     if not (value := os.environ.get(name, "").strip()):
         raise ConfigError(f"{name} is not set in the environment; it holds the platform's secret for paying")
+    if not (value.isascii() and value.isprintable()):
+        raise ConfigError(f"{name} has characters that no secret has; copy it again from the platform")
     return value
 
 

@@ -46,7 +46,8 @@ from mjsim.scene_export.store import scenes_folder
 LOG = logging.getLogger("mjsim.study")
 NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s
 BEAT_PERIOD = 60.0  # s between two notes that somebody is still there
-SWEEP_PERIOD, CLOCK_SET = 60.0, 30.0  # s between two sweeps; by which the clock then is off if it was set
+SWEEP_PERIOD = 60.0  # s between two looks for people who never return
+CLOCK_SET = 30.0  # s by which the clock is off once it was set, or the machine slept
 SOCKETS_OF_A_PERSON = 2  # open at a time
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
 NEVER = 1e9  # s; as good as for ever
@@ -146,20 +147,31 @@ class StudyServer:
     async def _sweep(self) -> None:
         """End the participation of people who never return. Time in which this server did not run does not count."""
         away = self._study.settings.limits.timed_out_after
-        since, before = time.monotonic(), utc_now()
+        since = time.monotonic()
+        ahead = time.time() - since
         while True:
             await asyncio.sleep(SWEEP_PERIOD)
-            now = utc_now()
-            if abs((now - before).total_seconds() - SWEEP_PERIOD) > CLOCK_SET:
-                since = time.monotonic()  # signs of life are noted by that clock
-            before = now
-            if time.monotonic() - since < away:
+            now = time.monotonic()
+            if abs(time.time() - now - ahead) > CLOCK_SET:  # signs of life are noted by that clock
+                since, ahead = now, time.time() - now
+            if now - since < away:
                 continue
             try:
-                if gone := await self._store.time_out(now - datetime.timedelta(seconds=away)):
-                    LOG.info("%d people did not return", gone)
+                await self._end_abandoned(utc_now() - datetime.timedelta(seconds=away))
             except StoreError as error:  # the next sweep may find them
                 LOG.warning("%s", error)
+
+    async def _end_abandoned(self, before: datetime.datetime) -> None:
+        """End the participation of people of whom there is no sign of life since then.
+
+        A trial that was over when its page was closed is noted; its person may still answer the survey.
+        """
+        for person in await self._store.people():
+            if person.active and person.seen < before and person.phase in PLAYED:
+                async with self._lock(person):
+                    await self._procedure.after_trials(person)
+        if gone := await self._store.time_out(before):
+            LOG.info("%d people did not return", gone)
 
     async def _welcome(self, request: Request) -> Response:
         came = self._recruiter.arrive(request.query_params)

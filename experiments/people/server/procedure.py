@@ -59,7 +59,7 @@ class Procedure:
 
     async def now(self, person: Person, path: str) -> Now:
         """Where a person is; trials that are over are noted first."""
-        person = await self._after_trials(person)
+        person = await self.after_trials(person)
         if not person.active and person.status != "finished":
             return Now(person, None, 0, Visitor({}, 0.0, 0, path), 0.0)
         number = self._names.index(person.phase)
@@ -145,7 +145,7 @@ class Procedure:
         told = [found[name] for name in (STORY, FLYTHROUGH) if name in found and name in self._names]
         return [Ended(phase.name, phase.duration_s or 0.0) for phase in told]
 
-    async def _after_trials(self, person: Person) -> Person:
+    async def after_trials(self, person: Person) -> Person:
         """The person, after all trials that are over were noted; their runs are on the disk."""
         while person.active and person.phase in PLAYED:
             visit = await asyncio.to_thread(self.visits.named, person.token_hash)

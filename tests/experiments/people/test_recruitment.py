@@ -13,7 +13,7 @@ from experiments.people.recruitment import recruiter
 from experiments.people.recruitment.base import Preview, Refusal
 from experiments.people.study_file import Recruitment, read_people_study
 from experiments.study.designs import FOLDER
-from tests.experiments.people.test_server import begin, go_to, phase, post, serving
+from tests.experiments.people.test_server import begin, go_to, phase, play_trial, post, serving
 
 CODES = {"completed": "C0MPLETE", "screened_out": "SCREEN0UT", "no_consent": "N0C0NSENT"}
 PROLIFIC = Recruitment(platform="prolific", study_id="study0000001", **CODES)
@@ -185,3 +185,20 @@ def test_who_never_comes_back_has_timed_out_and_gives_the_place_away(tmp_path, m
             assert database.execute("SELECT status FROM person").fetchall() == [("timed_out",)]
             assert database.execute("SELECT state FROM assignment").fetchall() == [("released",)]
         database.close()
+
+
+def test_a_task_that_was_over_when_its_page_was_closed_is_noted(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.people.server.app.SWEEP_PERIOD", 0.1)
+    study = with_recruitment(PROLIFIC, abandoned_after=3.0, timed_out_after=3.0)
+    with serving(tmp_path, study) as client:
+        link = begin(client, **IDS)
+        go_to(client, link, study, "task")
+        play_trial(client, link, "task")
+        until, noted = time.monotonic() + 20.0, []
+        while not noted:
+            assert time.monotonic() < until
+            time.sleep(0.1)
+            with sqlite3.connect(tmp_path / "study.db") as database:
+                noted = database.execute("SELECT ended FROM trial WHERE phase = 'task'").fetchall()
+            database.close()
+        assert "Your opinion" in client.get(link).text

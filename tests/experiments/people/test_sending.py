@@ -106,7 +106,7 @@ class Paid:
 
         async def run():
             store = await self.open()
-            client = payer(self.study.settings.recruitment)
+            client = payer(self.study.settings)
             client._api._timeout = timeout
             try:
                 return [sent async for sent in Sender("paid", store, client).send()]
@@ -190,9 +190,10 @@ def test_nobody_is_asked_twice_where_the_secret_is_wrong_or_nobody_answers(paid,
     assert main(paid.words) == 0
     monkeypatch.setenv(paid.platform.variable, "another")
     (sent,) = paid.send().values()
-    assert (sent.state, sent.stops) == ("refused", True) and "does not accept the secret" in sent.text
-    monkeypatch.delenv(paid.platform.variable)
-    assert main([*paid.words, "--send"]) == 2
+    assert (sent.state, sent.stops) == ("refused", True) and "with this secret" in sent.text
+    for unusable in ("", "a\nb", "é"):
+        monkeypatch.setenv(paid.platform.variable, unusable)
+        assert main([*paid.words, "--send"]) == 2
     monkeypatch.setenv(paid.platform.variable, SECRET)
     settings, url = paid.study.settings, "http://127.0.0.1:9"
     recruitment = msgspec.structs.replace(settings.recruitment, api_url=url)
@@ -322,3 +323,11 @@ def test_settings_of_a_platform_are_named_with_their_line(tmp_path):
         number = next(i for i, row in enumerate(content.splitlines(), 1) if row.startswith(line))
         with pytest.raises(Exception, match=f"line {number}: .*{text}"):
             read_people_study(tmp_path / "study.toml")
+
+
+def test_a_platform_that_pays_dollars_pays_nothing_else(paid, capsys):
+    file = paid.file.read_text().replace("[study.pay]", '[study.pay]\ncurrency = "EUR"')
+    paid.file.write_text(file)
+    dollars = paid.platform.name != "prolific"  # where the currency is that of the platform's study
+    assert main([*paid.words, "--send"]) == (2 if dollars else 0)
+    assert ("pays in USD" in capsys.readouterr().err) is dollars
