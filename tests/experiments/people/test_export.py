@@ -194,9 +194,8 @@ def test_nothing_of_who_came_by_http_is_in_an_export(tmp_path):
 def _prolific(tmp_path):
     path = tmp_path / "study.toml"
     assert main(["study", "init", str(path)]) == 0
-    before = '[study.recruitment]\nplatform = "link"         # or "lab", "prolific"'
-    text = path.read_text()
-    assert before in text
     codes = 'completed = "CODE12345"\nscreened_out = "CODE12346"\nno_consent = "CODE12347"'
-    path.write_text(text.replace(before, f'[study.recruitment]\nplatform = "prolific"\n{codes}'))
+    text, times = re.subn('platform = "link".*', f'platform = "prolific"\n{codes}', path.read_text())
+    assert times == 1
+    path.write_text(text)
     return path
