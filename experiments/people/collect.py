@@ -13,6 +13,7 @@ from experiments.errors import ConfigError, RecordError, ReplayError
 from experiments.people.items import Item
 from experiments.people.store import Answer, Person, PhaseRow, Store, TrialRow
 from experiments.people.study_file import SURVEY, Study
+from experiments.record.origin import REHEARSAL
 from experiments.record.phases import TASK
 from experiments.record.run_directory import is_run, visit_folders
 from experiments.study.measures import LIKERT_PREFIX
@@ -49,6 +50,7 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
     A person who wanted their data deleted is not in them either.
     """
     people = [person for person in await store.people() if not person.delete_wanted]
+    check_people(study, people)
     trials = {row.person_id: row for row in await store.trials() if row.phase == TASK}
     answers, phases = await store.answers(), await store.phases()
     rows: list[Mapping[str, Any]] = []
@@ -70,6 +72,22 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
         row = {**_about(person, trial, passed), **run.row, **_answers(items, mine)}
         rows.append({key: harmless(value) if isinstance(value, str) else value for key, value in row.items()})
     return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable)
+
+
+def check_people(study: Study, people: Sequence[Person]) -> None:
+    """Keep people and those of rehearsals apart.
+
+    Raises:
+        RecordError: Somebody is simulated and the study is no rehearsal, or the other way round.
+    """
+    simulated = sum(person.platform == REHEARSAL for person in people)
+    if simulated and not study.rehearsal:
+        raise RecordError(
+            f"{simulated} of {len(people)} people are those of a rehearsal: nobody, with answers drawn at random; "
+            "name the folder of people, or give `mjsim study collect` the option --rehearsal"
+        )
+    if study.rehearsal and simulated < len(people):
+        raise RecordError(f"{len(people) - simulated} of {len(people)} people are no rehearsal")
 
 
 def collect_visits(folder: Path) -> Collected:

@@ -173,6 +173,7 @@ class Study:
     texts: Texts
     story: str
     exclusions: Exclusions | None
+    rehearsal: bool = False  # whether all its people are simulated
 
     @property
     def people(self) -> int:

@@ -3,6 +3,10 @@
 from collections.abc import Iterable
 
 HUMAN = "human"  # name of the participant that nothing simulates
+REHEARSAL = (
+    "rehearsal"  # name of the simulated participant of `mjsim study rehearse`, who answers questions too
+)
+REHEARSED = "Rehearsed, with answers drawn at random"
 SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 
 
@@ -12,6 +16,9 @@ def is_simulated(user: object) -> bool:
 
 
 def origin_of(users: Iterable[object]) -> str:
-    """What trials by participants of these names are: `Simulated`, `Partly simulated` or `Recorded from people`."""
+    """What trials by participants of these names are: `Simulated`, `Recorded from people`, and so on."""
+    users = set(users)
+    if users == {REHEARSAL}:
+        return REHEARSED
     kinds = {is_simulated(user) for user in users}
     return PARTLY_SIMULATED if len(kinds) > 1 else RECORDED if kinds == {False} else SIMULATED

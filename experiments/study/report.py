@@ -8,7 +8,7 @@ from experiments.analysis.statistics.effects import FTest
 from experiments.analysis.statistics.mixed import MixedModel
 from experiments.analysis.statistics.models import OrdinalModel
 from experiments.errors import ExperimentError
-from experiments.record.origin import RECORDED
+from experiments.record.origin import RECORDED, REHEARSED
 from experiments.study.analysis import ONE_WAY, STRICT, TWO_WAY, Analysis, Result, tests_of
 from experiments.study.assumptions import assumptions, specification_curve
 from experiments.study.figures import answers, by_condition, interactions, variances
@@ -21,6 +21,9 @@ TITLE = "Study of assistance and difficulty"
 CAUTION = (
     "These people were simulated. The numbers follow from a model of people and are no evidence about people; "
     "answers to survey questions are not simulated."
+)
+REHEARSAL = (
+    "This is a rehearsal: nobody took part, and answers were drawn at random. No number here says anything."
 )
 TEST_HEAD = ("measure", "test", "effect", "objects", "F", "df", "p", "partial η²", "90 % interval")
 PAIR_HEAD = (
@@ -80,7 +83,9 @@ def _summary(analysis: Analysis) -> Iterator[Block]:
 
 def _people(analysis: Analysis) -> Iterator[Block]:
     found, levels = analysis.table, analysis.table.levels()
-    if found.origin != RECORDED:
+    if found.origin == REHEARSED:
+        yield Paragraph(REHEARSAL)
+    elif found.origin != RECORDED:
         yield Paragraph(CAUTION)
     sizes = found.sizes()
     rows = [(condition, *(sizes[condition, n] for n in levels)) for condition in found.conditions()]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import RecordError
 from experiments.record.files import read_json
-from experiments.record.origin import RECORDED, origin_of
+from experiments.record.origin import RECORDED, REHEARSED, origin_of
 from experiments.record.phases import TASK
 from experiments.record.run_directory import VISIT, is_run, visit_folders
 from experiments.session.endings import ALL_DELIVERED
@@ -171,7 +171,7 @@ def study_table(
     columns = {name: numbers[column] for name, column in sources.items()}
     origin = origin_of(row["user"] for row in rows)
     answers = [name for name in columns if name.startswith(LIKERT_PREFIX)]
-    if origin != RECORDED and answers:
+    if origin not in (RECORDED, REHEARSED) and answers:
         raise RecordError(f"{path} has answers of simulated people ({answers[0]}); nothing simulates answers")
     _check_ranges(kept, numbers, measures, path)
     for name in answers:

@@ -143,7 +143,8 @@ class Leave(WireMessage, frozen=True):
 class Open(WireMessage, frozen=True):
     """Open a session in a worker: its journal's folder, its run directory, settings, earlier phases of the visit.
 
-    `restarted` tells that the worker before has died.
+    `restarted` tells that the worker before has died, `as_inputs_come` that control steps are taken as soon as their
+    inputs are promised, faster than real time, as in a rehearsal.
     """
 
     folder: str
@@ -151,6 +152,7 @@ class Open(WireMessage, frozen=True):
     config: dict[str, Any]
     before: list[dict[str, Any]] = []
     restarted: bool = False
+    as_inputs_come: bool = False
 
 
 class State(WireMessage, frozen=True):

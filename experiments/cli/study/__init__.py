@@ -11,6 +11,7 @@ SUBCOMMANDS = {
     "init": "experiments.cli.study.init",
     "check": "experiments.cli.study.check_study",
     "serve": "experiments.cli.study.serve",
+    "rehearse": "experiments.cli.study.rehearse",
     "collect": "experiments.cli.study.collect",
     "export": "experiments.cli.study.export",
     "pay": "experiments.cli.study.pay",

@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,9 @@ def add_parser(commands: Any) -> None:
     )
     add_served_study(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder of the table")
+    parser.add_argument(
+        "--rehearsal", action="store_true", help="DIR is that of a rehearsal, whose people are simulated"
+    )
     add_database(parser)
     add_force(parser, "replace tables that exist")
 
@@ -49,7 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     for name in (f"{NAME}.parquet", f"{NAME}.csv", TEXTS):
         check_file(arguments.out / name, replace=arguments.force)
     if _is_served(arguments):
-        found = asyncio.run(_collect(read_people_study(study_path(arguments.study)), arguments))
+        study = replace(read_people_study(study_path(arguments.study)), rehearsal=arguments.rehearsal)
+        found = asyncio.run(_collect(study, arguments))
     else:
         found = collect_visits(arguments.folder)
     for person, fault in found.unusable.items():

@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 from datetime import timedelta
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command
@@ -22,6 +23,7 @@ where it stays: a rule that is changed later changes nothing that was decided. -
 --send then lets the platform pay all that is owed. It may be repeated, and killed, at any time: nothing is paid twice.
 Its secret comes from the environment (MJSIM_PROLIFIC_TOKEN, MJSIM_CONNECT_KEY or MJSIM_EXTERNAL_QUESTION_TOKEN).
 Or pay by hand, then note each payment: --paid KEY --reference TEXT. A payment is noted once; a second time is refused.
+Both want a rehearsal of the study file that passed (`mjsim study rehearse`): --rehearsal OUT names it once.
 --reject PERSON --reason TEXT, before payments are decided, lets the platform reject what somebody did."""
 
 
@@ -39,6 +41,10 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--reject", metavar="PERSON", help="reject a person who finished, such as p00012")
     parser.add_argument("--reason", metavar="TEXT", help="what the person is told about --reject")
+    parser.add_argument(
+        "--rehearsal", type=Path, metavar="OUT", help="folder of a rehearsal that passed; needed once, to pay"
+    )
+    parser.add_argument("--without-rehearsal", action="store_true", help="pay without one; it is noted")
     add_database(parser)
 
 
@@ -62,11 +68,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 async def _run(study: "Study", arguments: argparse.Namespace) -> int:
     from experiments.people.recruitment import payer
+    from experiments.people.rehearsal.passed import require_rehearsal
     from experiments.people.store import Store
 
     client = payer(study.settings) if arguments.send or arguments.reject else None
     store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
     try:
+        if arguments.send or arguments.paid:
+            folder, without = arguments.rehearsal, arguments.without_rehearsal
+            await require_rehearsal(store, study, folder, without=without)
         if arguments.paid:
             await _note(store, arguments.paid, arguments.reference)
         elif arguments.reject and client is not None:

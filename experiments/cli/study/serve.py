@@ -22,6 +22,7 @@ from experiments.cli.server import (
 )
 from experiments.cli.study.database import DATABASE, add_database, sqlite_url
 from experiments.errors import ConfigError
+from experiments.record.origin import REHEARSAL
 from experiments.record.phases import FLYTHROUGH
 
 if TYPE_CHECKING:  # imported when the command runs, so that other commands start fast
@@ -49,6 +50,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: made once)"
     )
+    parser.add_argument("--rehearsal", type=float, metavar="FACTOR", help=argparse.SUPPRESS)  # of `rehearse`
     add_server_options(parser.add_argument_group("server"))
     group = parser.add_argument_group("researcher's page, health and metrics")
     group.add_argument("--researcher-port", type=number(0, 65535), metavar="PORT", help="serve them here")
@@ -67,6 +69,10 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.study.simulate import study_path
 
     study = read_people_study(study_path(arguments.study))
+    if arguments.rehearsal is not None:
+        from experiments.people.rehearsal.served import rehearsed
+
+        study = rehearsed(study, arguments.rehearsal)
     phases_of_study(study)  # own ones may be missing
     recruiter(study.settings.recruitment)  # codes may be missing
     check_public_url(arguments.public_url)
@@ -99,6 +105,7 @@ async def _serve(
     import numpy as np
 
     from experiments.people import VISITS
+    from experiments.people.collect import check_people
     from experiments.people.phases import phases_of_study
     from experiments.people.recruitment import recruiter
     from experiments.people.researcher.app import ResearcherServer, Watched
@@ -110,12 +117,16 @@ async def _serve(
 
     url = arguments.database or sqlite_url(arguments.out / DATABASE)
     store = await Store.open(url, study.settings.name, study.sha256)
+    check_people(study, await store.people())
     visits = Visits(arguments.out.absolute() / VISITS)
     procedure = Procedure(study, phases_of_study(study), store, visits, np.random.default_rng())
     metrics = Metrics()
     store.on_write(metrics.wrote)
     serving = Serving(_secret(arguments.out), film, arguments.trusted_proxy, metrics)
-    server = StudyServer(procedure, recruiter(study.settings.recruitment), pool, serving)
+    platform = recruiter(study.settings.recruitment)
+    if study.rehearsal:
+        platform.platform = REHEARSAL
+    server = StudyServer(procedure, platform, pool, serving)
     app = Timed(server.app(arguments.host, arguments.public_url), metrics)
     beside, (listener, researchers) = [], listeners
     if researchers is not None:

@@ -50,6 +50,7 @@ SWEEP_PERIOD = 60.0  # s between two looks for people who never return
 CLOCK_SET = 30.0  # s by which the clock is off once it was set, or the machine slept
 SOCKETS_OF_A_PERSON = 2  # open at a time
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
+REAL_TIME_EVERY = 20  # people of a rehearsal of whom one plays in real time
 NEVER = 1e9  # s; as good as for ever
 MAX_FORM = 64 * 1024  # bytes
 
@@ -284,7 +285,9 @@ class StudyServer:
         beating = asyncio.create_task(self._beat(person))
         try:
             await socket.accept()
-            await BrowserSocket(socket).serve(self.sessions.of(visit), visit.phase)
+            hurries = self._study.rehearsal and person.id % REAL_TIME_EVERY > 0
+            session = self.sessions.of(visit, as_inputs_come=hurries)
+            await BrowserSocket(socket).serve(session, visit.phase)
         finally:
             self._sockets.subtract([person.id])
             self._sockets += Counter()  # forgets those without any

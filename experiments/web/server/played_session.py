@@ -76,8 +76,11 @@ class PlayedSession:
         minimum: Mapping[str, float],
         scenes: MutableMapping[str, str],
         meter: Meter | None = None,
+        *,
+        as_inputs_come: bool = False,
     ) -> None:
         self.visit, self._minimum, self._scenes = visit, minimum, scenes
+        self._as_inputs_come = as_inputs_come
         self._meter = meter or Meter()
         self.browser: Browser | None = None
         self.heard = time.monotonic()
@@ -223,7 +226,11 @@ class PlayedSession:
         self._taken = self._step = 0
         self._came.clear()
         opening = Open(
-            str(visit.journal(trial)), str(visit.run(trial)), visit.settings(trial), visit.before(trial)
+            str(visit.journal(trial)),
+            str(visit.run(trial)),
+            visit.settings(trial),
+            visit.before(trial),
+            as_inputs_come=self._as_inputs_come,
         )
         while crashes < MAX_CRASHES:
             self._set(State())

@@ -32,11 +32,17 @@ class Sessions:
         self._sessions: dict[str, PlayedSession] = {}
         self._scenes: dict[str, str] = {}  # by house, of those that a worker has named
 
-    def of(self, visit: Visit) -> PlayedSession:
-        """The session of a visit."""
+    def of(self, visit: Visit, *, as_inputs_come: bool = False) -> PlayedSession:
+        """The session of a visit; `as_inputs_come` lets its clock run as fast as inputs come, not in real time."""
         if visit.name not in self._sessions:
             self._sessions[visit.name] = PlayedSession(
-                visit, self._pool, self._limit, self._minimum, self._scenes, self._meter
+                visit,
+                self._pool,
+                self._limit,
+                self._minimum,
+                self._scenes,
+                self._meter,
+                as_inputs_come=as_inputs_come,
             )
         return self._sessions[visit.name]
 

@@ -19,7 +19,10 @@ Send = Callable[[WireMessage], None]
 
 
 class Clock:
-    """Steps a session in real time; `sync` writes its journal through to the disk, `show` shows its state."""
+    """Steps a session in real time; `sync` writes its journal through to the disk, `show` shows its state.
+
+    With `as_inputs_come` a control step is due as soon as its inputs are promised, and states between are not shown.
+    """
 
     def __init__(
         self,
@@ -28,7 +31,10 @@ class Clock:
         sync: Callable[[], None],
         send: Send,
         show: Callable[[], None],
+        *,
+        as_inputs_come: bool = False,
     ) -> None:
+        self._as_inputs_come = as_inputs_come
         self._live, self._control, self._show = live, control, show
         self._schedule = Schedule(live.world.control_timestep, time.monotonic())
         self._acknowledger = _Acknowledger(sync, send)
@@ -41,7 +47,8 @@ class Clock:
             while live.end_reason is None and (phase := control.state.phase) is not OVER:
                 if phase is not READY:
                     self._log_notes()
-                self._show()
+                if not (self._as_inputs_come and self._follows_at_once()):
+                    self._show()
                 if phase is RUNNING:
                     self._wait_and_step()
                     control.pause_if_silent()
@@ -60,6 +67,8 @@ class Clock:
         """Take a control step when it is due and its inputs are there, unless the session stops meanwhile."""
         live, schedule = self._live, self._schedule
         session, step = live.session, live.session.record.step
+        if self._as_inputs_come:
+            schedule.start(time.monotonic())
         if (early := schedule.wait(time.monotonic(), promised=True)) > 0.0:
             time.sleep(early)
         left = schedule.wait(time.monotonic(), promised=False)
@@ -70,10 +79,20 @@ class Clock:
         self._acknowledger.check()
         live.step(self._control.take_inputs(step))
         schedule.take(promise.came)
-        promised = self._control.wait_for_promise(session.record.step, 0.0)
-        if promised.came is None or schedule.wait(time.monotonic(), promised=True) > 0.0:
-            self._show()  # else the next step follows at once, and the state after it is shown
+        if not self._follows_at_once():
+            self._show()  # else the state after the next step is shown
         self._acknowledger.request(live.input, session.record.step)
+
+    def _follows_at_once(self) -> bool:
+        """Whether the inputs of the next control step are there, and it is due."""
+        if self._control.state.phase is not RUNNING:
+            return False
+        promise = self._control.wait_for_promise(self._live.session.record.step, 0.0)
+        if promise.came is None:
+            return False
+        if self._as_inputs_come:
+            return not promise.missing
+        return self._schedule.wait(time.monotonic(), promised=True) <= 0.0
 
     def _note_lateness(self, promise: Promise) -> None:
         """Log a control step that is late by this machine's fault, and the first one without promised inputs."""

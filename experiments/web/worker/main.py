@@ -113,7 +113,9 @@ class Worker:
                         control.apply(Trigger.RESTORED, reason, last=live.input)
                     else:
                         control.apply(Trigger.OPENED)
-                    reason = Clock(live, control, journal.sync, self._send, viewer.look).run()
+                    sync, hurries = journal.sync, opened.as_inputs_come
+                    clock = Clock(live, control, sync, self._send, viewer.look, as_inputs_come=hurries)
+                    reason = clock.run()
                     viewer.live = viewer.drawer = None
                 live.end(reason)
         if not (is_run(run) and (run / records.TOPDOWN).is_file()):

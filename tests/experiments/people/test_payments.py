@@ -80,7 +80,7 @@ def test_a_payment_is_noted_once(tmp_path, capsys):
     asyncio.run(prepare())
     words = ["study", "pay", str(study), str(tmp_path)]
     assert main([*words, "--dry-run"]) == 0
-    paid = [*words, "--paid", "p00001-reward", "--reference", "receipt 1"]
+    paid = [*words, "--without-rehearsal", "--paid", "p00001-reward", "--reference", "receipt 1"]
     assert main(paid) == 2, "the dry run decided nothing"
     assert main(words) == 0
     assert main(paid) == 0

@@ -72,7 +72,7 @@ class Paid:
         self.file.write_text(STUDY.format(platform=platform.name, url=platform.url))
         self.study = read_people_study(self.file)
         asyncio.run(self._fill())
-        self.words = ["study", "pay", str(self.file), str(folder)]
+        self.words = ["study", "pay", str(self.file), str(folder), "--without-rehearsal"]
 
     async def open(self):
         url = f"sqlite:///{self.folder / 'study.db'}"

@@ -1,0 +1,1 @@
+"""Rehearsals: simulated people go through a study's real server, before real people do."""

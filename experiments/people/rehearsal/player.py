@@ -1,0 +1,151 @@
+"""A simulated participant of a trial: what it does next, from what the protocol tells a page (docs/protocol.md)."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from experiments.house import House
+from planner.errors import UnreachableError
+
+STEP = 0.04  # s of a control step
+STEPS = 16  # control steps for which it decides at once
+NEAR = 0.15  # m from a corner of a path from which the next one counts
+ALIGNED = 0.7  # rad off the way within which it walks
+SEEN = 0.8  # m from a viewpoint from which it has looked there
+STUCK = 0.05  # m that it has to get on in `STUCK_AFTER` decisions
+STUCK_AFTER = 6
+BACKWARDS = 3  # decisions for which it steps back then
+PRESS_GAP = 15  # control steps between two presses
+
+
+class Player:
+    """Tidies up by the shortest ways: what the display leads to, else what it holds or knows of, else it searches.
+
+    Args:
+        house: The house, which people know from the film.
+        rng: Source of chance.
+    """
+
+    def __init__(self, house: House, rng: np.random.Generator) -> None:
+        self._house, self._rng = house, rng
+        self._models: dict[str, str] = {}
+        self._places: dict[str, tuple[float, float]] = {}  # of objects that are not tidied up
+        self._held: tuple[str | None, str | None] = (None, None)
+        self._goal: tuple[float, float] | None = None
+        self._reach: Any = None
+        self._speeds: Mapping[str, float] = {}
+        self._searched: list[tuple[float, float]] = []
+        self._trail: list[tuple[float, float]] = []
+        self._back = 0
+        self._pressed = -PRESS_GAP
+        self.state: Mapping[str, Any] | None = None
+
+    @property
+    def step(self) -> int:
+        """The control step that comes next."""
+        return 0 if self.state is None else int(self.state["step"])
+
+    def take(self, message: Mapping[str, Any]) -> None:
+        """See what the server shows."""
+        match message["type"]:
+            case "scene":
+                self._speeds = message["speeds"]
+            case "moment":
+                self._reach = message["reach"]
+            case "markers":
+                self._take_markers(message["markers"])
+            case "snapshot":
+                self._take_snapshot(message)
+
+    def act(self) -> dict[str, Any]:
+        """What is pressed and held for the next control steps, as fields of an input."""
+        state = self.state
+        if state is None or state["busy"]:
+            return {}
+        if self._reach is not None and self.step - self._pressed >= PRESS_GAP:
+            self._pressed = self.step
+            return {"press": "act"}
+        x, y, heading = state["body"][:3]
+        if self._is_stuck((x, y)):
+            self._back = BACKWARDS
+        if self._back:
+            self._back -= 1
+            sideways = float(self._rng.uniform(-1.0, 1.0))
+            return {"forward": -1.0, "left": sideways, "turn": sideways}
+        return self._walk((x, y), heading, self._aim((x, y)))
+
+    def _take_markers(self, markers: Any) -> None:
+        goals = [m["position"] for m in markers if m["role"] == "goal"]
+        self._goal = (goals[0][0], goals[0][1]) if goals else None
+        for marker in markers:
+            if marker["role"] == "flagpole" and marker["object"] is not None:
+                self._places[marker["object"]] = marker["position"][0], marker["position"][1]
+
+    def _take_snapshot(self, state: Mapping[str, Any]) -> None:
+        self.state = state
+        self._models |= state["models"]
+        for name in filter(None, self._held):
+            if name not in state["held"]:  # put away
+                self._models.pop(name, None)
+                self._places.pop(name, None)
+        self._held = (state["held"][0], state["held"][1])
+        for name, pose in state["objects"].items():
+            if name in self._models and not self._is_tidy(name, pose):
+                self._places[name] = pose[0], pose[1]
+        for name in filter(None, self._held):
+            self._places.pop(name, None)
+
+    def _is_tidy(self, name: str, pose: Any) -> bool:
+        center = self._house.receptacles[self._receptacle(name)].center
+        return math.dist(pose[:2], center[:2]) < 0.5
+
+    def _receptacle(self, name: str) -> str:
+        catalogue = self._house.catalogue
+        return catalogue.categories[catalogue.objects[self._models[name]].category].receptacle
+
+    def _aim(self, here: tuple[float, float]) -> tuple[float, float]:
+        """Where to go."""
+        if self._goal is not None:
+            return self._goal
+        held = [name for name in self._held if name is not None]
+        wanted = [] if all(self._held) else list(self._places.values())
+        bins = [self._house.approaches[self._receptacle(name)] for name in held if name in self._models]
+        if wanted or bins:
+            targets = [(float(p[0]), float(p[1])) for p in (wanted or bins)]
+            return min(targets, key=lambda target: math.dist(target, here))
+        return self._unseen(here)
+
+    def _unseen(self, here: tuple[float, float]) -> tuple[float, float]:
+        """The nearest place from which it has not looked yet."""
+        places = [(float(x), float(y)) for group in self._house.viewpoints.values() for x, y in group]
+        self._searched += [p for p in places if p not in self._searched and math.dist(p, here) < SEEN]
+        left = [place for place in places if place not in self._searched]
+        if not left:
+            self._searched.clear()
+            left = [place for place in places if math.dist(place, here) > SEEN]
+        return min(left, key=lambda place: math.dist(place, here))
+
+    def _walk(self, here: tuple[float, float], heading: float, aim: tuple[float, float]) -> dict[str, Any]:
+        geodesics = self._house.geodesics
+        try:
+            path = geodesics.shortest_path(here, aim).points.tolist()
+        except UnreachableError:
+            path = [aim]
+        ahead = next((p for p in [*path[1:], aim] if math.dist(p, here) > NEAR), aim)
+        gap = math.atan2(ahead[1] - here[1], ahead[0] - here[0]) - heading
+        gap = (gap + math.pi) % (2.0 * math.pi) - math.pi
+        seconds = STEP * STEPS
+        turn = max(-1.0, min(1.0, gap / (self._speeds["turning_speed"] * seconds)))
+        forward = 0.0
+        if abs(gap) < ALIGNED:
+            forward = min(1.0, math.dist(ahead, here) / (self._speeds["walking_speed"] * seconds))
+        return {"forward": forward, "turn": turn}
+
+    def _is_stuck(self, here: tuple[float, float]) -> bool:
+        self._trail = [*self._trail[-STUCK_AFTER:], here]
+        stuck = len(self._trail) > STUCK_AFTER and math.dist(self._trail[0], here) < STUCK
+        if stuck:
+            self._trail.clear()
+        return stuck
