@@ -3,8 +3,12 @@
 import multiprocessing
 from pathlib import Path
 
+import mujoco
 import pytest
 
+from experiments.cli.main import main
+from experiments.errors import ConfigError
+from experiments.trials.design import read_design
 from mjsim.errors import HouseError
 from mjsim.houses.generated import generate, house_files
 from mjsim.houses.recipe import VERSION, generated_names, parse_name, read_recipe, split_of
@@ -95,3 +99,23 @@ def test_a_range_of_seeds_names_houses_and_a_split_some_of_them() -> None:
 def test_a_malformed_range_is_refused(houses: str) -> None:
     with pytest.raises(HouseError, match="names no house"):
         generated_names(houses)
+
+
+def test_the_command_writes_a_house_that_stock_mujoco_loads(tmp_path: Path) -> None:
+    out = tmp_path / "house"
+    assert (
+        main(["house", "generate", "--rooms", "2", "--seed", "11", "--no-pictures", "--out", str(out)]) == 0
+    )
+    assert mujoco.MjModel.from_xml_path(str(out / "house.xml")).ngeom > 100
+    assert len(Catalogue.load(str(out)).rooms) == 2
+    assert Catalogue.load(str(out / "recipe.json")) == Catalogue.load("generated:11?rooms=2")
+
+
+def test_people_of_a_design_get_a_house_each(tmp_path: Path) -> None:
+    path = tmp_path / "design.toml"
+    cell = 'objects = 4\nassistance = "none"\nhouses = "generated:5:8?rooms=3"\n'
+    path.write_text(f"[[cells]]\n{cell}")
+    assert [trial.house for trial in read_design(path).trials] == generated_names("generated:5:8?rooms=3")
+    path.write_text(f'[[cells]]\n{cell}house = "apartment"\n')
+    with pytest.raises(ConfigError, match="leave out house and episode"):
+        read_design(path)
