@@ -13,6 +13,7 @@ from typing import Any
 from experiments.errors import RecordError
 from experiments.people.codebook import Variable, codebook
 from experiments.people.collect import FREE, Collected, collect, harmless, person_name
+from experiments.people.copies import note_copy
 from experiments.people.store import Answer, Person, Store, TrialRow
 from experiments.people.study_file import Study
 from experiments.record.files import write_json
@@ -77,6 +78,7 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
         for row in trials:
             shutil.copytree(folder / row.folder, made / RUNS / _name(row) / row.phase)
         made.chmod(0o755)
+        note_copy(folder, "export", out)
         if out.exists():
             exchange(made, out)
         else:

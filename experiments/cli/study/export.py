@@ -51,13 +51,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _export(study: "Study", arguments: argparse.Namespace) -> "Exported":
-    from experiments.people.copies import note_copy
     from experiments.people.export import export
     from experiments.people.store import Store
 
     store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
     try:
-        note_copy(arguments.folder, "export", arguments.out)
         return await export(study, store, arguments.folder, arguments.out, replace=arguments.force)
     finally:
         await store.close()
