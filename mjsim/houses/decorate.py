@@ -8,7 +8,7 @@ from mjsim.houses.chance import stream
 from mjsim.houses.furniture.catalogue import KINDS
 from mjsim.houses.furniture.look import Look
 from mjsim.houses.furniture.piece import Piece, moved
-from mjsim.houses.space import WALL_GAP, Place, Space
+from mjsim.houses.space import BLINDS, WALL_GAP, Place, Space
 from mjsim.houses.values import BACK, SIDES, FloorPlan, Side, Window
 
 LOW = 1.15  # m: pictures hang over what is lower
@@ -83,7 +83,7 @@ def _dress(space: Space, window: Window, use: str, look: Look, rng: np.random.Ge
             below = radiator.size[2]
     reach = half + 0.33
     room = window.center - reach > low and window.center + reach < high
-    dry = use not in ("kitchen", "bathroom", "shower_room", "utility")
+    dry = use not in BLINDS
     top = _tallest(space, side, window.center - reach, window.center + reach, 0.15)
     if dry and room and top < window.sill - 0.2 and rng.random() < 0.8:
         beside = max(

@@ -28,6 +28,7 @@ JAMB = 0.12  # m of wall between an opening and a corner
 LEAF_DEPTH = 0.06  # m
 LEAST_GLASS = 1 / 10  # of the floor, in rooms that need daylight
 WINDOW_TOP = 2.2  # m
+BESIDE_SHOWER = 1.85  # m, least wall of a bathroom that has a window and room for a shower beside it
 NARROW_SILL, LOW_SILL, USUAL_SILL, KITCHEN_SILL = 1.4, 0.4, 0.95, 1.1  # m
 SECOND_WAY, SECOND_WINDOW = 0.25, 0.45  # chances
 EXTRA_WAYS = (  # rooms between which there may be another way, which makes a loop
@@ -183,8 +184,10 @@ def _windows(plan: FloorPlan, room: Room, rng: np.random.Generator) -> list[Wind
             if needs_light:
                 wanted = max(wanted, LEAST_GLASS * room.floor.area / (WINDOW_TOP - sill))
             width = min(wanted, room_for, 2.6)
-            if width < 0.55:
+            if width < 0.55 or (not needs_light and free_high - free_low < BESIDE_SHOWER):
                 continue
+            if not needs_light:
+                shift = round(shift)  # at one end, so that a shower finds a corner
             at = free_low + 0.2 + width / 2 + shift * (room_for - width)
             windows.append(Window(room.key, side, round(at, 3), round(width, 3), sill, WINDOW_TOP))
             break

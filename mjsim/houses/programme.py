@@ -31,7 +31,7 @@ NEEDS: Mapping[str, RoomNeeds] = {
     "bedroom_3": RoomNeeds("Third bedroom", (7.5, 14.0), 2.25, 1.9, True),
     "office": RoomNeeds("Office", (7.0, 13.0), 2.25, 1.9, True),
     "bathroom": RoomNeeds("Bathroom", (4.4, 9.0), 1.85, 2.1, False),
-    "shower_room": RoomNeeds("Shower room", (3.2, 6.0), 1.6, 2.4, False),
+    "shower_room": RoomNeeds("Shower room", (3.6, 6.0), 1.65, 2.4, False),
     "utility": RoomNeeds("Utility room", (3.0, 7.0), 1.45, 2.5, False),
 }
 _SMALL: Mapping[int, Sequence[tuple[str, ...]]] = {

@@ -18,6 +18,7 @@ SNUG, APART = 0.09, 0.62  # m: gaps are at most, or at least, so wide, for nobod
 WALL_GAP = 0.01  # m, behind furniture
 BEFORE_WINDOW = 0.6  # m, depth in which nothing is higher than the sill
 CURTAIN = 0.3  # m beside a window, the same
+BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # rooms without curtains
 TRIES = 14  # places of a piece that are tried for free ways
 _CELL = 0.05  # m, of the grid on which ways are looked for
 
@@ -73,7 +74,7 @@ class Space:
                 low, high = (leaf.x0, leaf.x1) if door.leaf.side in ("south", "north") else (leaf.y0, leaf.y1)
                 space.hung.append((door.leaf.side, low, high, 0.0))
         for window in plan.windows_of(room.key):
-            half = window.width / 2 + CURTAIN
+            half = window.width / 2 + (0.03 if room.use in BLINDS else CURTAIN)
             zone = floor.along(window.side, window.center - half, window.center + half, 0, BEFORE_WINDOW)
             space.windows.append((zone.x0, zone.y0, zone.x1, zone.y1, window.sill))
             space.hung.append((window.side, window.center - half - 0.05, window.center + half + 0.05, 0.0))
