@@ -280,6 +280,9 @@ POINTS = [
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "platform", PLATFORMS if "MJSIM_FAULTS" in os.environ else ["prolific"], indirect=True
+)
 def test_a_kill_at_any_point_pays_once(paid):
     for point in POINTS:
         words = [sys.executable, "-c", KILLED, *paid.words, "--send", point]
