@@ -216,7 +216,11 @@ class Person:
         return await self._answered("POST", path, data=data)
 
     async def _answered(self, method: str, path: str, **more: Any) -> httpx.Response:
-        answer = await self._around.client.request(method, path, headers=self._headers, **more)
+        try:
+            answer = await self._around.client.request(method, path, headers=self._headers, **more)
+        except httpx.TransportError as error:  # people load the page again
+            self._fault(f"{method} of a page was not answered: {type(error).__name__}")
+            answer = await self._around.client.request(method, path, headers=self._headers, **more)
         if answer.is_server_error:
             self._fault(f"{method} of a page was answered with {answer.status_code}")
         return answer

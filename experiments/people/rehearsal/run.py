@@ -59,7 +59,7 @@ async def rehearse(
     planned = plan_people(
         names, settings.people, settings.seed, per_minute=settings.per_minute, dropouts=settings.dropouts
     )
-    done = [rehearsed for rehearsed in known.values() if rehearsed.outcome]
+    done = [rehearsed for rehearsed in known.values() if rehearsed.outcome not in ("", "stuck")]
     for rehearsed in done:
         on_person(rehearsed)
     left = [one for one in planned if one.number not in {rehearsed.number for rehearsed in done}]

@@ -11,7 +11,7 @@ from experiments.record.origin import REHEARSAL
 def rehearsed(study: Study, factor: float) -> Study:
     """A study whose people are simulated, and in which all waiting takes 1/`factor` of the time."""
     settings = study.settings
-    away = ("idle", "abandoned_after", "timed_out_after")
+    away = ("abandoned_after", "timed_out_after")
     shorter = {name: getattr(settings.limits, name) / factor for name in away}
     limits = msgspec.structs.replace(settings.limits, **shorter)
     minimum = {name: seconds / factor for name, seconds in settings.minimum.items()}

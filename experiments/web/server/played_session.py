@@ -205,6 +205,7 @@ class PlayedSession:
     async def _run(self) -> None:
         """Play what is left of the visit."""
         await self._limit.acquire(self._tell_position)
+        self.heard = time.monotonic()  # who waits in the queue need do nothing
         try:
             while self.visit.phase in PLAYED:
                 await self._play(self.visit.phase)

@@ -88,8 +88,14 @@ class WorkerPool:
         """A new worker. A fork server that was just killed still takes connections, until another one replaces it."""
         until = time.monotonic() + END_TIMEOUT
         while True:
+            starting = asyncio.ensure_future(asyncio.to_thread(WorkerProcess, asyncio.get_running_loop()))
             try:
-                return await asyncio.to_thread(WorkerProcess, asyncio.get_running_loop())
+                return await asyncio.shield(starting)
+            except asyncio.CancelledError:
+                starting.add_done_callback(
+                    self._discard_started
+                )  # the thread goes on, and nobody wants its worker
+                raise
             except (EOFError, ConnectionError) as error:
                 if time.monotonic() > until:
                     raise OSError("the fork server ended") from error
@@ -100,6 +106,10 @@ class WorkerPool:
         ending = asyncio.ensure_future(asyncio.to_thread(worker.end))
         self._ending.add(ending)
         ending.add_done_callback(self._ending.discard)
+
+    def _discard_started(self, starting: asyncio.Future[WorkerProcess]) -> None:
+        if not starting.cancelled() and starting.exception() is None:
+            self.discard(starting.result())
 
     async def close(self) -> None:
         """Wait until all workers have ended."""
