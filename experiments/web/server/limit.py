@@ -40,11 +40,13 @@ class SessionLimit:
 
     def release(self) -> None:
         """Give the place to the session that has waited longest."""
-        if not self._waiting:
-            self._free += 1
-            return
-        self._waiting.pop(next(iter(self._waiting))).set_result(None)
-        self._announce()
+        while self._waiting:
+            turn = self._waiting.pop(next(iter(self._waiting)))
+            if not turn.done():  # else it was cancelled just now
+                turn.set_result(None)
+                self._announce()
+                return
+        self._free += 1
 
     def _announce(self) -> None:
         for position, on_position in enumerate(self._waiting, start=1):
