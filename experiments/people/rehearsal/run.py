@@ -149,7 +149,8 @@ async def _send(
                 kept.write(msgspec.json.encode(rehearsed) + b"\n")
                 on_person(rehearsed)
 
-            first = people[0].arrives
+            new = [one.arrives for one in people if one.number not in known]
             async with asyncio.TaskGroup() as group:
                 for one in people:
-                    group.create_task(live(one, (one.arrives - first) / settings.factor))
+                    wait = one.arrives - new[0] if one.number not in known else 0.0
+                    group.create_task(live(one, wait / settings.factor))
