@@ -35,6 +35,7 @@ from mjsim.model.validation.report import Report, check_house_name
 REPORT, PICTURE = "report.json", "preview.png"
 _STOREY = 2.1  # m above a floor, from where on another floor is another storey
 _LEVEL = 0.4  # share of the largest level that a floor has at least
+_BIN, _STEP = 0.02, 0.3  # m: resolution of heights; what lies on the lowest area within a step is the floor
 _UPWARD = 0.2  # share of level surfaces that face up, from where on only these count
 _FLAT = 0.95  # cosine of the slope of a floor
 _FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself
@@ -177,17 +178,18 @@ def _levels(pieces: Sequence[Piece]) -> tuple[float, float]:
     heights = corners[flat, :, 2].mean(axis=1)
     if not len(heights):
         raise AssetError("has no level surface; is it a house, and which way is up (--up)?")
-    bins = np.round(heights / 0.02).astype(int)
+    bins = np.round(heights / _BIN).astype(int)
     first = bins.min()
     total = np.bincount(bins - first, area[flat])
-    wide = np.convolve(total, np.ones(3), mode="same")
+    wide = np.convolve(total, np.ones(3))[1:-1]
     levels = np.flatnonzero(wide >= _LEVEL * wide.max())
-    lowest = levels[0] + int(np.argmax(total[levels[0] : levels[0] + 3]))
+    near_ground = levels[levels <= levels[0] + round(_STEP / _BIN)]  # ground, slab and floor are often layers
+    lowest = near_ground[np.argmax(total[near_ground])] if np.ptp(near_ground) <= 2 else near_ground[-1]
     near = np.abs(bins - first - lowest) <= 1
     order = np.argsort(heights[near])
     share = np.cumsum(area[flat][near][order])
     floor = float(heights[near][order][np.searchsorted(share, share[-1] / 2)])  # the median of the area
-    above = [(level + first) * 0.02 for level in levels if (level + first) * 0.02 > floor + _STOREY]
+    above = [height for height in (levels + first) * _BIN if height > floor + _STOREY]
     return floor, (min(above) if above else np.inf)
 
 

@@ -1,5 +1,7 @@
 """Mesh files as parts of a scene: every node in its place, in metres and z up where the file says so."""
 
+import io
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +11,7 @@ import trimesh
 from trimesh.transformations import rotation_matrix, scale_matrix
 
 from mjsim.errors import AssetError
-from mjsim.files import check_input
+from mjsim.files import check_input, read_bytes
 from mjsim.importing.houses.values import TEXTURE_SIDE
 from mjsim.importing.reading import Beside, check_mesh_file, parsing, surface_of
 from mjsim.importing.surface import Floats, Surface
@@ -54,7 +56,8 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, S
     elif suffix == ".dae":
         whole = whole @ _collada_frame(path)
     with parsing(path):
-        scene = trimesh.load_scene(path, process=False, resolver=_Nearby(path))
+        source = _without_comments(path) if suffix == ".dae" else path
+        scene = trimesh.load_scene(source, file_type=suffix[1:], process=False, resolver=_Nearby(path))
         known: dict[str, Surface] = {}
         parts = []
         for node in sorted(scene.graph.nodes_geometry):
@@ -77,6 +80,11 @@ def primitive(mesh: trimesh.Trimesh, colour: Floats) -> Surface:
     corners = np.asarray(mesh.triangles, np.float64)
     count = len(corners)
     return Surface(corners, np.tile(colour, (count, 3, 1)), np.zeros((count, 3, 2)), np.full(count, -1))
+
+
+def _without_comments(path: Path) -> io.BytesIO:
+    """A COLLADA file without comments: pycollada drops a geometry that has one."""
+    return io.BytesIO(re.sub(rb"<!--.*?-->", b"", read_bytes(path), flags=re.DOTALL))
 
 
 def _collada_frame(path: Path) -> Floats:

@@ -1,6 +1,7 @@
 """`mjsim import house`: scenes of other simulators become houses that `mjsim check` accepts, or are refused."""
 
 import json
+import os
 import tomllib
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from experiments.cli import main as cli
 from mjsim.errors import AssetError
 from mjsim.importing.houses.house_import import import_house
 from mjsim.importing.houses.values import HouseOptions
+from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.model.validation.compiled import Compiled
@@ -163,6 +165,44 @@ def test_an_mjcf_scene_stands_still_and_walls_that_were_only_seen_are_solid(tmp_
     low, high = colliding(house, "cupboard")
     np.testing.assert_allclose(high - low, (0.8, 0.57, 1.0), atol=0.02)
     assert house.model.ntex >= 1  # the plaster
+
+
+@pytest.mark.slow
+def test_our_apartment_imports_with_its_rooms_and_its_floor(tmp_path):
+    _, catalogue = imported(tmp_path, models_root() / "houses" / "apartment" / "house.xml")
+    ours, again = compiled_house(Catalogue.load()), compiled_house(catalogue)
+    bins = np.array([r.center[:2] for house in (ours, again) for r in house.receptacles.values()])
+    rng = np.random.default_rng(0)
+    for one, other in ((ours, again), (again, ours)):
+        points = np.array([one.navigable.sample(rng) for _ in range(1000)])
+        points = points[np.linalg.norm(points[:, None] - bins, axis=2).min(axis=1) > 0.9]  # bins move
+        same = [np.linalg.norm(other.navigable.snap(p, np.inf) - p) < 0.03 for p in points]
+        assert np.mean(same) >= 0.98
+        assert np.mean([one.rooms.room_at(p) == other.rooms.room_at(p) for p in points]) >= 0.98
+
+
+PUBLIC = os.environ.get("MJSIM_PUBLIC_HOUSES", "")
+
+
+@pytest.mark.skipif(not PUBLIC, reason="MJSIM_PUBLIC_HOUSES names no folder with houses of others")
+def test_public_houses_import_without_editing_or_are_refused_in_one_line(tmp_path):
+    """Every world and scene below the folder; docs/import.md names those that were tried."""
+    files = [
+        p
+        for end in ("*.world", "libero_*.xml", "*.scene_instance.json")
+        for p in sorted(Path(PUBLIC).rglob(end))
+    ]
+    assert files
+    usable = 0
+    for number, source in enumerate(files):
+        try:
+            _, report = import_house(source, tmp_path / str(number), HouseOptions(skip_missing=True))
+        except AssetError as error:
+            assert "\n" not in str(error)
+            print(f"refused: {error}")
+        else:
+            usable += report.usable
+    print(f"{usable} of {len(files)} can be used")
 
 
 INCLUDE = "<include><uri>model://chair</uri></include>"
