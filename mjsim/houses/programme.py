@@ -49,6 +49,13 @@ _SMALL: Mapping[int, Sequence[tuple[str, ...]]] = {
         ("living_room", "bedroom", "bedroom_2", "bathroom"),
         ("living_room", "bedroom", "office", "bathroom"),
     ),
+    5: (
+        ("hall", "living_room", "kitchen", "bedroom", "bathroom"),
+        ("hall", "living_room", "kitchen", "bedroom", "bathroom"),
+        ("hall", "living_room", "bedroom", "bedroom_2", "bathroom"),
+        ("living_room", "kitchen", "bedroom", "bedroom_2", "bathroom"),
+        ("living_room", "kitchen", "bedroom", "office", "bathroom"),
+    ),
 }
 _CORE = ("hall", "living_room", "kitchen", "bedroom", "bathroom")
 _MORE = {  # what larger homes have besides, and how usual it is
