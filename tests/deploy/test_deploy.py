@@ -13,71 +13,26 @@ from pathlib import Path
 import httpx
 import pytest
 import yaml
+from nginx_site import DEPLOY, STUDY, make_certificate, nginx_before
 from scripted_workers import hello
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from benchmarks.support.play_hostile import NGINX, free_ports, listens
+from benchmarks.support.play_hostile import free_ports
 from benchmarks.support.play_server import PATIENCE
 from experiments.cli.main import parser
-
-DEPLOY = Path(__file__).parents[2] / "deploy"
-STUDY = """
-[[cells]]
-assistance = "none"
-objects = 1
-people = 2
-house_seeds = 0
-fidelity = "event"
-
-[study]
-name = "small"
-title = "A small study"
-institution = "a test"
-contact = "nobody@example.org"
-phases = ["consent", "task", "completion"]
-"""
-MAIN = """user root; daemon off; pid {0}/pid; error_log {0}/error.log; events {{}}
-http {{ client_body_temp_path {0}/body; proxy_temp_path {0}/proxy; fastcgi_temp_path {0}/f; uwsgi_temp_path {0}/u;
-  scgi_temp_path {0}/s; include {0}/mjsim.conf; }}
-"""
 
 
 @pytest.fixture
 def certificate(tmp_path):
-    key, made = tmp_path / "key.pem", tmp_path / "made.pem"
-    names = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"]
-    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", *names]
-    subprocess.run([*command, "-keyout", key, "-out", made], check=True, capture_output=True)
-    return made, key
-
-
-def site(folder, hosts, port, certificate):
-    """The configuration for this machine."""
-    text = (DEPLOY / "nginx" / "mjsim.conf").read_text()
-    servers = "".join(f"    server 127.0.0.1:{host};\n" for host in hosts)
-    for old, new in {
-        "    server 127.0.0.1:8000;\n": servers,
-        "/etc/letsencrypt/live/study.example.org/fullchain.pem": str(certificate[0]),
-        "/etc/letsencrypt/live/study.example.org/privkey.pem": str(certificate[1]),
-        "/var/cache/nginx-mjsim": f"{folder}/cache",
-        "listen 443 ssl": f"listen 127.0.0.1:{port} ssl",
-        "study.example.org": "localhost",
-    }.items():
-        assert old in text
-        text = text.replace(old, new)
-    return re.sub(r"listen (80|\[::\]:.*);", "", text)
+    return make_certificate(tmp_path)
 
 
 @pytest.fixture
 def served(tmp_path, certificate):
     """URL of a study behind NGINX with TLS, and the folder of both."""
-    if NGINX is None or shutil.which("openssl") is None:
-        pytest.skip("no NGINX or openssl on this machine")
     front, behind = free_ports(2)
     (tmp_path / "study.toml").write_text(STUDY)
-    (tmp_path / "mjsim.conf").write_text(site(tmp_path, [behind], front, certificate))
-    (tmp_path / "nginx.conf").write_text(MAIN.format(tmp_path))
     url = f"https://localhost:{front}"
     words = ["--out", "out", "--port", str(behind), "--public-url", url, "--trusted-proxy", "127.0.0.1"]
     with (tmp_path / "log.txt").open("w") as log:
@@ -87,14 +42,10 @@ def served(tmp_path, certificate):
             stdout=log,
             stderr=log,
         )
-        nginx = subprocess.Popen([str(NGINX), "-c", str(tmp_path / "nginx.conf")], stderr=log)
-        until = time.monotonic() + PATIENCE
-        while not (listens(front) and listens(behind)) and time.monotonic() < until:
-            time.sleep(0.05)
-        yield url, tmp_path
-        for process in (nginx, study):
-            process.terminate()
-            process.wait()
+        with nginx_before(tmp_path, [behind], front, certificate):
+            yield url, tmp_path
+        study.terminate()
+        study.wait()
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ SUBCOMMANDS = {
     "pay": "experiments.cli.study.pay",
     "backup": "experiments.cli.study.backup",
     "restore": "experiments.cli.study.restore",
+    "hosts": "experiments.cli.study.hosts",
     "researcher": "experiments.cli.study.researcher",
     "erase": "experiments.cli.study.erase",
     "forget": "experiments.cli.study.forget",

@@ -51,7 +51,11 @@ def add_parser(commands: Any) -> None:
         "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: made once)"
     )
     parser.add_argument("--rehearsal", type=float, metavar="FACTOR", help=argparse.SUPPRESS)  # of `rehearse`
-    add_server_options(parser.add_argument_group("server"))
+    server = parser.add_argument_group("server")
+    add_server_options(server)
+    server.add_argument(
+        "--host-name", metavar="NAME", help="of this host, where several share a database (docs/deploy.md)"
+    )
     group = parser.add_argument_group("researcher's page, health and metrics")
     group.add_argument("--researcher-port", type=number(0, 65535), metavar="PORT", help="serve them here")
     group.add_argument(
@@ -122,7 +126,7 @@ async def _serve(
     procedure = Procedure(study, phases_of_study(study), store, visits, np.random.default_rng())
     metrics = Metrics()
     store.on_write(metrics.wrote)
-    serving = Serving(_secret(arguments.out), film, arguments.trusted_proxy, metrics)
+    serving = Serving(_secret(arguments.out), film, arguments.trusted_proxy, metrics, arguments.host_name)
     platform = recruiter(study.settings.recruitment)
     if study.rehearsal:
         platform.platform = REHEARSAL

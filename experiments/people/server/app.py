@@ -27,6 +27,7 @@ from experiments.people.phases.base import Again, Page
 from experiments.people.phases.played import Played
 from experiments.people.recruitment.base import Arrival, Leaving, Preview, Recruiter, Refusal
 from experiments.people.retention import forget_daily
+from experiments.people.server.host import HostOfVisits
 from experiments.people.server.procedure import Now, Procedure
 from experiments.people.store import Person, utc_now
 from experiments.people.study_file import CONSENT
@@ -64,12 +65,18 @@ class Serving:
         film: Of the house, if the study shows one.
         proxies: Whose word about the address of a person is believed.
         meter: Is told what sessions measure.
+        host: Name of this host, where several share a database; None for the only one.
     """
 
     secret: bytes
     film: Path | None = None
     proxies: tuple[Network, ...] = ()
     meter: Meter | None = None
+    host: str | None = None
+
+
+class _ElsewhereError(Exception):
+    """Another host has a person."""
 
 
 class StudyServer:
@@ -93,6 +100,9 @@ class StudyServer:
         )
         self._new = Rate(*NEW_PEOPLE)
         self._sockets: Counter[int] = Counter()  # by person
+        self._host = (
+            None if serving.host is None else HostOfVisits(serving.host, self._store, procedure.visits)
+        )
         self._locks: dict[str, asyncio.Lock] = {}
 
     def app(self, host: str, public: str | None = None) -> Starlette:
@@ -124,7 +134,11 @@ class StudyServer:
                     embedded_by=self._recruiter.embedded_by,
                 ),
             ],
-            exception_handlers={404: self._unknown, StoreError: self._out_of_order},
+            exception_handlers={
+                404: self._unknown,
+                _ElsewhereError: self._elsewhere,
+                StoreError: self._out_of_order,
+            },
             lifespan=self._lifespan,
         )
 
@@ -134,6 +148,8 @@ class StudyServer:
         if days := self._study.settings.limits.keep_days:
             visits = self._procedure.visits.folder
             tasks.append(asyncio.create_task(forget_daily(self._store, visits, days)))
+        if self._host is not None:
+            tasks.append(asyncio.create_task(self._host.keep(self.sessions)))
         try:
             yield
         finally:
@@ -143,6 +159,9 @@ class StudyServer:
                     await task
             await self.sessions.release()
             await self._pool.close()
+            if self._host is not None:
+                with suppress(StoreError):  # it is silent soon
+                    await self._host.leave()
             await self._store.close()
 
     async def _sweep(self) -> None:
@@ -275,6 +294,9 @@ class StudyServer:
         token = socket.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
         visit = None if person is None else await asyncio.to_thread(self._procedure.visits.find, token)
+        if person is not None and self._host is not None and not await self._host.has(person):
+            await socket.send_denial_response(Response(status_code=404))  # the proxy asks the next host
+            return
         if person is None or visit is None or not person.active or visit.phase not in PLAYED:
             await socket.close(1008)
             return
@@ -404,9 +426,16 @@ class StudyServer:
         state = (await self._store.study()).state
         return {"open": None, "paused": "paused"}.get(state, "full")
 
+    async def _elsewhere(self, request: Request, _: Exception) -> Response:
+        """With 404 a proxy asks the next host; where there is none, the person reads this."""
+        return self._message(request, "paused", 404)
+
     async def _person(self, request: Request) -> Person | None:
         token = request.path_params["token"]
-        return await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
+        person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
+        if person is not None and self._host is not None and not await self._host.has(person):
+            raise _ElsewhereError
+        return person
 
     def _lock(self, person: Person) -> asyncio.Lock:
         """Held while a person's phase is read or changed, so that two pages of one person take turns."""

@@ -39,7 +39,8 @@ DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "current_setting('synchronous_commit')": ("on", "local", "remote_write", "remote_apply"),
     },
 }
-PATIENCE_S = 20  # for locks and for connections
+PATIENCE_S = 20  # for locks and for connections to be made
+TURN_S = 60  # for a connection that others use
 TRIES = 9
 CONNECTIONS = 10  # kept open
 TOGETHER = 64  # changes in one transaction of SQLite
@@ -252,7 +253,7 @@ def _engine(url: URL) -> AsyncEngine:
             url,
             hide_parameters=True,
             connect_args={"timeout": PATIENCE_S, "async_creator_fn": quick_connection},
-            pool_timeout=PATIENCE_S,
+            pool_timeout=TURN_S,
             pool_size=CONNECTIONS,
             max_overflow=0,  # each is a thread, and takes longer to make than to wait for
         )
@@ -265,7 +266,7 @@ def _engine(url: URL) -> AsyncEngine:
         hide_parameters=True,
         isolation_level="READ COMMITTED",
         pool_pre_ping=True,
-        pool_timeout=PATIENCE_S,
+        pool_timeout=TURN_S,
         pool_size=CONNECTIONS,
     )
 

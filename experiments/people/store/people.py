@@ -23,6 +23,7 @@ _FIELDS = (
     person.c.created,
     person.c.seen,
     person.c.delete_wanted,
+    person.c.host,
 )
 
 

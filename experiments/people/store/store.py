@@ -17,6 +17,7 @@ from experiments.people.store.copies import back_up, one_file
 from experiments.people.store.endings import Endings
 from experiments.people.store.engine import Database
 from experiments.people.store.erasure import Erasure
+from experiments.people.store.hosts import Hosts
 from experiments.people.store.ledger import Ledger
 from experiments.people.store.part import new_id, note
 from experiments.people.store.people import People
@@ -27,7 +28,7 @@ from experiments.people.store.upgrade import upgrade
 from experiments.people.store.values import AuditRow, StudyRow, StudyState, utc_now
 
 
-class Store(People, Assignments, Phases, Endings, Erasure):
+class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
     """The database of one study. What a method has returned from is on the disk.
 
     Every method raises :class:`~experiments.errors.StoreError` where the database cannot do it.

@@ -113,6 +113,7 @@ person = Table(
     Column("created", Utc, nullable=False),
     Column("seen", Utc, nullable=False),
     Column("delete_wanted", Boolean, nullable=False),
+    Column("host", String(NAME)),  # that keeps what is played; NULL where there is but one
     UniqueConstraint("study_id", "platform_key"),
     **OPTIONS,
 )
@@ -143,6 +144,18 @@ assignment = Table(
     Column("order_seed", BigInteger, nullable=False),
     Column("created", Utc, nullable=False),
     UniqueConstraint("study_id", "cell", "place", "active"),
+    **OPTIONS,
+)
+
+host = Table(
+    "host",
+    metadata,
+    _id(),
+    _of("study"),
+    Column("name", String(NAME), nullable=False),
+    Column("seen", Utc, nullable=False),
+    Column("draining", Boolean, nullable=False),
+    UniqueConstraint("study_id", "name"),
     **OPTIONS,
 )
 

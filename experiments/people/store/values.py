@@ -48,6 +48,7 @@ class Person:
         phase: Name of the phase that is under way.
         seen: Last sign of life.
         delete_wanted: Whether the person withdrew and wants the data deleted.
+        host: Of several, the one that keeps what the person plays; None where nothing was played, or there is but one.
         returning: Whether :meth:`Store.arrive` found the person instead of making one.
     """
 
@@ -59,12 +60,27 @@ class Person:
     created: datetime
     seen: datetime
     delete_wanted: bool
+    host: str | None = None
     returning: bool = False
 
     @property
     def active(self) -> bool:
         """Whether the participation is under way."""
         return self.status in ACTIVE
+
+
+@dataclass(frozen=True)
+class Host:
+    """One of several machines that serve a study.
+
+    Attributes:
+        seen: When it was heard of last.
+        draining: Whether it takes no new visits.
+    """
+
+    name: str
+    seen: datetime
+    draining: bool
 
 
 @dataclass(frozen=True)

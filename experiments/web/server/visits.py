@@ -178,6 +178,12 @@ class Visits:
         """The visit that a token belongs to; a RecordError where its file is damaged."""
         return self.named(token_hash(token)) if TOKEN.fullmatch(token) else None
 
+    def find_again(self, name: str) -> Visit | None:
+        """The visit with a name as its folder has it now, which may have come from another machine."""
+        with self._lock:
+            self._known.pop(name, None)
+        return self.named(name)
+
     def named(self, name: str) -> Visit | None:
         """The visit with a name; a RecordError where its file is damaged."""
         path = self.folder / name / VISIT

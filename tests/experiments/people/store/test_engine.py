@@ -26,11 +26,11 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "later"
-down_revision = "0001"
+down_revision = "0002"
 
 
 def upgrade() -> None:
-    op.add_column("person", sa.Column("host", sa.String(100), nullable=False, server_default="here"))
+    op.add_column("person", sa.Column("place", sa.String(100), nullable=False, server_default="here"))
 '''
 
 # Twenty people at a time come, get a place, answer and are paid; a line is printed for what has been acknowledged.
@@ -130,13 +130,13 @@ async def test_a_later_form_keeps_what_is_there_and_an_older_program_refuses_it(
     people = [await arrive(number) for number in range(3)]
     await store.save_answers(people[0].id, "consent", {"age": 30})
     later = shutil.copytree(MIGRATIONS, tmp_path / "migrations")
-    (later / "versions" / "0002_later.py").write_text(LATER)
+    (later / "versions" / "0003_later.py").write_text(LATER)
     await upgrade(store._database, later)
     await upgrade(store._database, later)
     assert [person.token_hash for person in await store.people()] == [person.token_hash for person in people]
     assert len(await store.answers()) == 1
     async with store._database.reading() as connection:
-        assert (await connection.execute(text("SELECT host FROM person"))).scalars().all() == ["here"] * 3
+        assert (await connection.execute(text("SELECT place FROM person"))).scalars().all() == ["here"] * 3
     with pytest.raises(StoreError, match="newer mjsim"):
         await Store.open(url, "pilot", "0" * 64)
 
