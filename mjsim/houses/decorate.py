@@ -12,6 +12,7 @@ from mjsim.houses.space import BLINDS, WALL_GAP, Place, Space
 from mjsim.houses.values import BACK, SIDES, FloorPlan, Side, Window
 
 LOW = 1.15  # m: pictures hang over what is lower
+MOST_HUNG = 3  # on the walls of a room: every picture is a texture of its own
 _WALLS: dict[str, tuple[str, ...]] = {
     "hall": ("picture", "wall_mirror", "picture", "clock"),
     "kitchen": ("clock", "picture", "wall_shelf", "pinboard"),
@@ -168,7 +169,7 @@ def _walls(space: Space, use: str, look: Look, rng: np.random.Generator) -> None
     for side in (SIDES[i] for i in rng.permutation(4)):
         low, high = space.room.floor.wall(side)
         for start, end in _stretches(space, side, low, high):
-            if rng.random() > 0.8 or hung >= 4:
+            if rng.random() > 0.75 or hung >= MOST_HUNG:
                 continue
             kind = kinds[hung % len(kinds)]
             piece = KINDS[kind].make(rng, look, smaller=int(end - start < 1.5))

@@ -11,7 +11,7 @@ CEILING = 2.6  # m
 
 def picture(b: Builder) -> Piece:
     """One to three framed pictures on a wall."""
-    many = b.pick(1, 1, 1, 2, 3) if b.smaller == 0 else 1
+    many = b.pick(1, 1, 1, 1, 2, 3) if b.smaller == 0 else 1
     frame, border = b.pick(b.wood, "black", "white", b.metal), b.pick(0.02, 0.03, 0.05)
     w = b.pick(0.8, 1.0, 0.7) if many == 1 and not b.smaller else b.pick(0.4, 0.5)
     h = round(w * b.pick(0.75, 1.0, 1.33), 2) if w < 0.75 else round(0.75 * w, 2)
