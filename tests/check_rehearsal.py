@@ -94,14 +94,19 @@ class _Check:
             )
 
     def places(self):
-        """Nobody shares a place; who finished has one that is finished, who left has none."""
+        """Nobody shares a place; who finished has one that is finished, who left has none.
+
+        A place that was given away while its person was away stays with the next one, even if both finish.
+        """
         taken = Counter((r["cell"], r["place"]) for r in self.rows["assignment"] if r["state"] != "released")
         self.is_true(all(count == 1 for count in taken.values()), "two people have one place")
         status = {row["id"]: row["status"] for row in self.rows["person"]}
         for row in self.rows["assignment"]:
             finished = status[row["person_id"]] == "finished"
+            given_away = row["state"] == "released" and taken[row["cell"], row["place"]] == 1
             self.is_true(
-                (row["state"] == "finished") == finished, f"place of {row['person_id']}: {row['state']}"
+                (row["state"] == "finished") == finished or (finished and given_away),
+                f"place of {row['person_id']}: {row['state']}",
             )
             left = status[row["person_id"]] in ("withdrawn", "screened_out", "no_consent", "timed_out")
             self.is_true(not (left and row["state"] == "held"), f"{row['person_id']} left and holds a place")
