@@ -1,9 +1,10 @@
 """People who arrive at a study at the same moment, each at an address of their own, over real HTTP."""
 
 import asyncio
+import json
 import time
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlencode, urlsplit
@@ -31,7 +32,7 @@ name = "small"
 title = "A small study"
 institution = "a test"
 contact = "nobody@example.org"
-phases = ["consent", "task", "completion"]
+phases = {phases}
 
 [study.limits]
 sessions = {sessions}
@@ -39,12 +40,18 @@ sessions = {sessions}
 
 
 def study_process(
-    folder: Path, *words: str, people: int = 250, sessions: int = 20, fidelity: str = "event"
+    folder: Path,
+    *words: str,
+    people: int = 250,
+    sessions: int = 20,
+    fidelity: str = "event",
+    phases: Sequence[str] = ("consent", "task", "completion"),
 ) -> PlayProcess:
     """A server of a small study in a folder, with two cells of so many people."""
+    values = {"people": people, "sessions": sessions, "fidelity": fidelity, "phases": json.dumps(phases)}
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "study.toml"
-    file.write_text(STUDY.format(people=people, sessions=sessions, fidelity=fidelity))
+    file.write_text(STUDY.format(**values))
     return PlayProcess(folder / "out", *PROXIED, *words, command=("study", "serve", str(file)))
 
 

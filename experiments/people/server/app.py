@@ -261,8 +261,9 @@ class StudyServer:
         if person is None:
             return Response(status_code=404)
         form = await sent_form(request)
-        now = await self._procedure.now(person, request.url.path)
-        await self._procedure.save(now, str(form.get("phase", "")), form)
+        async with self._lock(person):  # so that an answer does not replace a later one
+            now = await self._procedure.now(person, request.url.path)
+            await self._procedure.save(now, str(form.get("phase", "")), form)
         return Response(status_code=204)
 
     async def _ask_to_leave(self, request: Request) -> Response:
