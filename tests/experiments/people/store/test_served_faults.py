@@ -12,7 +12,7 @@ from benchmarks.support.study_people import ask, study_process
 from experiments.people.study_file import read_people_study
 
 PEOPLE = 4
-MANY = int(os.environ.get("MJSIM_FAULTS", "12"))  # for each database
+MANY = int(os.environ.get("MJSIM_FAULTS", "6"))  # for each database
 FEW = 4
 SYNC = {"sqlite": "sqlite", "mysql": "mysql+pymysql", "postgresql": "postgresql+psycopg"}
 KIND = {"mysql": "mariadb", "postgresql": "postgresql"}
