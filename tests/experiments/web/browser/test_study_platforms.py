@@ -8,12 +8,13 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 
 import pytest
+from nginx_site import make_certificate, nginx_before
 
 from benchmarks.support.play_hostile import NGINX, free_ports, listens
 from benchmarks.support.play_server import PATIENCE
-from tests.deploy.test_deploy import MAIN, certificate, site
 from tests.experiments.people.platforms.emulator import SECRET
 from tests.experiments.people.platforms.external_question import ExternalQuestion
 from tests.experiments.people.platforms.prolific import STUDY as PROLIFIC_STUDY
@@ -22,7 +23,6 @@ from tests.experiments.web.browser.key_presser import WATCH
 from tests.experiments.web.browser.pages import FIREFOX, XVFB, Chromium, firefox, virtual_screen
 from tests.experiments.web.browser.study_visit import STUDY, StudyVisit
 
-__all__ = ["certificate"]  # a fixture
 RECRUITMENT = """
 [study.recruitment]
 platform = "{name}"
@@ -54,29 +54,24 @@ def secure_page(request, tmp_path, browser):
 
 
 @pytest.fixture
-def served(tmp_path, platform, certificate):
+def served(tmp_path, platform):
     """URL of a study, and its folder."""
     front, behind = free_ports(2)
     study_id = PROLIFIC_STUDY if platform.name == "prolific" else ""
     recruitment = RECRUITMENT.format(name=platform.name, url=platform.url, study_id=study_id)
     (tmp_path / "study.toml").write_text(STUDY + recruitment)
-    (tmp_path / "mjsim.conf").write_text(site(tmp_path, [behind], front, certificate))
-    (tmp_path / "nginx.conf").write_text(MAIN.format(tmp_path))
     url = f"https://localhost:{front}" if NGINX else f"http://localhost:{behind}"
     words = ["--out", "out", "--port", str(behind), "--public-url", url, "--trusted-proxy", "127.0.0.1"]
     with (tmp_path / "log.txt").open("w") as log:
         command = [sys.executable, "-m", "mjsim", "study", "serve", "study.toml", "--no-open", *words]
-        processes = [subprocess.Popen(command, cwd=tmp_path, stdout=log, stderr=log)]
-        if NGINX:
-            command = [str(NGINX), "-c", str(tmp_path / "nginx.conf")]
-            processes.append(subprocess.Popen(command, stderr=log))
-        until = time.monotonic() + PATIENCE
-        while not (listens(behind) and (listens(front) or not NGINX)) and time.monotonic() < until:
-            time.sleep(0.05)
+        server = subprocess.Popen(command, cwd=tmp_path, stdout=log, stderr=log)
+    until = time.monotonic() + PATIENCE
+    while not listens(behind) and time.monotonic() < until:
+        time.sleep(0.05)
+    with nginx_before(tmp_path, [behind], front, make_certificate(tmp_path)) if NGINX else nullcontext():
         yield url, tmp_path
-        for process in reversed(processes):
-            process.terminate()
-            process.wait()
+    server.terminate()
+    server.wait()
 
 
 @pytest.fixture
@@ -113,7 +108,17 @@ def test_a_whole_visit_from_the_platform_and_back(served, platform, secure_page)
     last = "Submission received" if platform.name == "prolific" else "The task has been submitted"
     page.wait_for(f"{TITLE} === '{last}'")
     visit.check_record()
-    pay = [sys.executable, "-m", "mjsim", "study", "pay", "study.toml", "out", "--send"]
+    pay = [
+        sys.executable,
+        "-m",
+        "mjsim",
+        "study",
+        "pay",
+        "study.toml",
+        "out",
+        "--send",
+        "--without-rehearsal",
+    ]
     subprocess.run(pay, cwd=folder, check=True)
     assert sorted(str(what) for _, what in platform.paid()) == ["100", "approved"]
     with sqlite3.connect(folder / "out" / "study.db") as database:
