@@ -7,6 +7,7 @@ from typing import Any
 import aiosqlite
 
 QUICK = ("SELECT", "INSERT", "UPDATE", "DELETE", "SAVEPOINT", "RELEASE", "ROLLBACK")
+SLOW = ("Connection.commit", "Connection.close")
 
 
 class QuickConnection(aiosqlite.Connection):
@@ -16,8 +17,8 @@ class QuickConnection(aiosqlite.Connection):
     """
 
     async def _execute(self, fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-        name = fn.__name__
-        waits = name in ("commit", "close") or (name == "execute" and not args[0].lstrip().startswith(QUICK))
+        name = fn.__qualname__
+        waits = name in SLOW or (name.endswith(".execute") and not args[0].lstrip().startswith(QUICK))
         if waits or self._connection is None:
             return await super()._execute(fn, *args, **kwargs)  # type: ignore[no-untyped-call]
         return fn(*args, **kwargs)
