@@ -1,0 +1,96 @@
+"""The pages that people see: those of phases, the last one, and messages."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from experiments.people.phases.base import Again
+from experiments.people.recruitment.base import Leaving, Recruiter
+from experiments.people.server.procedure import Now
+from experiments.people.store import Person
+from experiments.people.study_file import CONSENT, Study
+from experiments.web.server.pages import page
+
+
+class StudyPages:
+    """Pages of a study in its words.
+
+    Args:
+        study: The study.
+        recruiter: To which people return.
+        steps: How many phases there are.
+    """
+
+    def __init__(self, study: Study, recruiter: Recruiter, steps: int) -> None:
+        self._study, self._recruiter, self._steps = study, recruiter, steps
+
+    def show(self, request: Request, template: str, status: int = 200, **values: Any) -> Response:
+        """A page from a template, with the texts that all pages have."""
+        section: Any = values.get("section")
+        if "paragraphs" not in values:
+            values["paragraphs"] = section.paragraphs()
+        common, lang = self._study.texts["common"], self._study.settings.language
+        return page(request, template, status, common=common, lang=lang, **values)
+
+    def message(self, request: Request, name: str, status: int = 200) -> Response:
+        """A message, by the name of its text."""
+        words = self._study.texts["welcome"]
+        heading = {"title": words[f"{name}_title"]}
+        return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
+
+    def phase(
+        self, request: Request, now: Now, identity: Mapping[str, str], refused: Again | None = None
+    ) -> Response:
+        """The page of the phase in which a person is; trials have pages of their own.
+
+        Args:
+            request: Asks for it.
+            now: Where the person is.
+            identity: The platform's ids of the person.
+            refused: What was wrong with what was sent.
+        """
+        if now.phase is None:
+            return self._left(request, now.person)
+        shown = now.phase.page(now.visitor, refused)
+        if now.number < self._steps:
+            return self.show(request, shown.template, **{**self._around(now), **shown.values})
+        section = self._study.texts["completion"]
+        values = {**shown.values, "paragraphs": section.paragraphs(), "completion": section}
+        back = self._recruiter.way_back("finished", identity)
+        return self.show(request, shown.template, **values, back=back, finished=True)
+
+    def _around(self, now: Now) -> dict[str, Any]:
+        """What the pages of all phases have."""
+        common, name = self._study.texts["common"], now.phase.name if now.phase else ""
+        step = common["step"].replace("{step}", str(now.number))
+        section = self._study.texts.get(name)
+        return {
+            "step": step.replace("{steps}", str(self._steps)),
+            "path": now.visitor.path,
+            "phase": name,
+            "wait": now.wait,
+            "optional": name in self._study.settings.optional,
+            "leave": name != CONSENT,
+            "paragraphs": section.paragraphs() if section else [],
+            "story_title": self._study.texts["story"]["title"],
+        }
+
+    def _left(self, request: Request, person: Person) -> Response:
+        """The last page of somebody who did not finish."""
+        names: Mapping[str, tuple[str, str, Leaving]] = {
+            "no_consent": ("consent", "declined", "no_consent"),
+            "withdrawn": ("withdrawal", "left", "withdrawn"),
+            "screened_out": (person.phase, "failed", "screened_out"),
+        }
+        section, text, how = names.get(person.status, ("welcome", "timed_out", "timed_out"))
+        words = self._study.texts[section]
+        return self.show(
+            request,
+            "completion",
+            section={"title": words[f"{text}_title"]},
+            paragraphs=[words[text]],
+            completion=self._study.texts["completion"],
+            back=self._recruiter.way_back(how, {}),
+        )

@@ -1,0 +1,89 @@
+"""Trials of people: their page, and the sockets over which they are played."""
+
+import asyncio
+import logging
+from collections import Counter
+from contextlib import suppress
+
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.websockets import WebSocket
+
+from experiments.errors import StoreError
+from experiments.people.server.procedure import Procedure
+from experiments.people.store import Person
+from experiments.web.server.browser_socket import BrowserSocket
+from experiments.web.server.limit import SessionLimit
+from experiments.web.server.meter import Meter
+from experiments.web.server.pages import page
+from experiments.web.server.pool import WorkerPool
+from experiments.web.server.sessions import Sessions
+from experiments.web.server.visits import PLAYED, Visit
+
+LOG = logging.getLogger("mjsim.study")
+BEAT_PERIOD = 60.0  # s between two notes that somebody is still there
+SOCKETS_OF_A_PERSON = 2  # open at a time
+REAL_TIME_EVERY = 20  # people of a rehearsal of whom one plays in real time
+NEVER = 1e9  # s; as good as for ever
+
+
+class Trials:
+    """Trials under way on this server.
+
+    Args:
+        procedure: Of the study.
+        pool: Makes workers.
+        meter: Is told what sessions measure.
+
+    Attributes:
+        sessions: Those under way.
+    """
+
+    def __init__(self, procedure: Procedure, pool: WorkerPool, meter: Meter | None) -> None:
+        self._study, self._store = procedure.study, procedure.store
+        settings = self._study.settings
+        self._minimum = {name: 0.0 if name in settings.optional else NEVER for name in PLAYED}
+        limit = SessionLimit(settings.limits.sessions)
+        self.sessions = Sessions(pool, limit, settings.limits.idle, self._minimum, meter)
+        self._sockets: Counter[int] = Counter()  # by person
+
+    def page(self, request: Request, visit: Visit) -> Response:
+        """The page of the trial that is next or under way."""
+        settings = visit.settings(visit.phase)
+        return page(
+            request,
+            "play",
+            trial=visit.phase,
+            objects=settings["objects"],
+            draw=settings["draw"],
+            scene=self.sessions.scene(settings),
+            wait=self._minimum[visit.phase],
+            leave=f"{request.url.path}/withdrawal",
+        )
+
+    async def play(self, socket: WebSocket, person: Person, visit: Visit) -> None:
+        """Serve a socket of a person."""
+        if not person.active or visit.phase not in PLAYED or self._sockets[person.id] >= SOCKETS_OF_A_PERSON:
+            await socket.close(1008)
+            return
+        self._sockets[person.id] += 1
+        beating = asyncio.create_task(self._beat(person))
+        try:
+            await socket.accept()
+            hurries = self._study.rehearsal and person.id % REAL_TIME_EVERY > 0
+            session = self.sessions.of(visit, as_inputs_come=hurries)
+            await BrowserSocket(socket).serve(session, visit.phase)
+        finally:
+            self._sockets.subtract([person.id])
+            self._sockets += Counter()  # forgets those without any
+            beating.cancel()
+            with suppress(asyncio.CancelledError):
+                await beating
+
+    async def _beat(self, person: Person) -> None:
+        while True:
+            try:
+                await self._store.beat(person.id)
+            except StoreError as error:  # the next one may be noted
+                LOG.warning("%s", error)
+            await asyncio.sleep(BEAT_PERIOD)
