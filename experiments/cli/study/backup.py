@@ -34,19 +34,20 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.study.simulate import study_path
 
     study = read_people_study(study_path(arguments.study))
-    from experiments.people.copies import note_copy
-
-    note_copy(arguments.folder, "backup", arguments.out)
-    asyncio.run(_back_up(study, database_url(arguments), arguments.out))
+    asyncio.run(_back_up(study, arguments))
     print(f"{arguments.out} (restore it with `mjsim study restore {arguments.out} {DATABASE}`)")
     return 0
 
 
-async def _back_up(study: "Study", url: str, out: Path) -> None:
+async def _back_up(study: "Study", arguments: argparse.Namespace) -> None:
+    from experiments.people.copies import note_copy
     from experiments.people.store import Store
+    from experiments.people.store.copies import check_new
 
-    store = await Store.open(url, study.settings.name, study.sha256)
+    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
     try:
-        await store.backup(out)
+        check_new(arguments.out)  # what is not ours must not be noted as a copy
+        note_copy(arguments.folder, "backup", arguments.out)
+        await store.backup(arguments.out)
     finally:
         await store.close()

@@ -19,13 +19,18 @@ from experiments.people.store.upgrade import upgrade
 ROWS = 1000  # at a time
 
 
+def check_new(path: Path) -> None:
+    """Raise StoreError if a backup has another file in its way."""
+    if path.exists():
+        raise StoreError(f"{path} is there already: name a new file for the backup.")
+
+
 async def back_up(source: Database, path: Path) -> None:
     """Write every row, as of one moment, to a new SQLite file, which is there whole or not at all.
 
     Raises StoreError if the file exists or cannot be written.
     """
-    if path.exists():
-        raise StoreError(f"{path} is there already: name a new file for the backup.")
+    check_new(path)
     part = path.with_name(f"{path.name}.part")
     part.unlink(missing_ok=True)
     target = Database(f"sqlite:///{part}")

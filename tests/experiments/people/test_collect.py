@@ -8,6 +8,7 @@ import pytest
 
 from experiments.cli.main import main
 from experiments.people.collect import TEXTS, collect, harmless, write_collected
+from experiments.people.copies import copies
 from experiments.people.store import Store
 from experiments.people.study_file import read_people_study
 from experiments.study.designs import FOLDER
@@ -116,6 +117,9 @@ def test_a_person_is_erased_from_database_and_files_and_backups_move_the_rest(tm
     names = [str(study_file), str(folder)]
     assert main(["study", "erase", *names, "p00001", "--who", "me"]) == 0
     assert main(["study", "erase", *names, "p00001", "--who", "me"]) == 2, "there is nobody any more"
+    assert main(["study", "backup", *names, "--out", str(study_file)]) == 2, "it is there already"
+    assert main(["study", "backup", *names, "--out", str(tmp_path / "b.db"), "--database", "../.."]) == 2
+    assert not copies(folder), "nothing was written"
     assert main(["study", "backup", *names, "--out", str(tmp_path / "backup.db")]) == 0
     moved = tmp_path / "moved"
     moved.mkdir()
