@@ -18,7 +18,8 @@ DESCRIPTION = """\
 Run a benchmark of the source checkout and print what it measured, as ratios where possible, so that the figures hold on
 other machines as well. A benchmark is a module in benchmarks/ that defines measure() -> dict of JSON values, and
 lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, hours, workers, only,
-parts, seeds and objects; the options of the same name set them. picture(result, path) may draw the result."""
+parts, seeds, objects, rooms, first_seed and out; the options of the same name set them. picture(result, path) may draw
+the result."""
 
 
 def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
@@ -65,7 +66,7 @@ def add_parser(commands: Any) -> None:
     add_force(parser, "replace a picture that exists")
     group = parser.add_argument_group("size of the benchmark, where it has such an option")
     for name, kind, metavar, text in OPTIONS:
-        group.add_argument(f"--{name}", type=kind, metavar=metavar, help=text)
+        group.add_argument(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
     group.add_argument("--quick", action="store_true", help="a smaller run")
 
 
@@ -115,6 +116,9 @@ OPTIONS = (
     ("parts", lambda text: text.split(","), "NAME,..", "run only the parts of these names"),
     ("seeds", positive, "N", "houses for each number of objects"),
     ("objects", int_list, "N,..", "numbers of objects"),
+    ("rooms", int_list, "N,..", "sizes of homes, such as 1:11"),
+    ("first_seed", natural, "N", "seed of the first home"),
+    ("out", Path, "DIR", "folder of what is kept, so that it can be continued"),
 )
 
 

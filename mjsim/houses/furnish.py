@@ -14,11 +14,12 @@ from mjsim.houses.furniture.look import Look, draw_look
 from mjsim.houses.furniture.piece import Mount as Holder
 from mjsim.houses.furniture.piece import Piece, flattened, moved
 from mjsim.houses.space import Place, Space
-from mjsim.houses.usual import MUSTS, OFTEN, ROUNDS, SHARES, USUAL
+from mjsim.houses.usual import LITTLE, MUSTS, OFTEN, ROUNDS, SHARES, USUAL
 from mjsim.houses.values import FloorPlan, Furnishing, Mount, Palette, Placement, Rectangle, Side
 
 ATTEMPTS = 6
 SIZES = 4  # a piece is made so often, each time smaller, for a lack of space
+BARE = 0.28  # of the floor
 IN_VAIN = 4  # so many tries, and a room is left as it is
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 BINS = {  # receptacle -> width, depth, height, m, and the uses of rooms that it belongs to, the best first
@@ -193,18 +194,26 @@ class Home:
                 self.put(space, "armchair")
 
     def usual(self) -> None:
-        """What rooms usually have, until enough of the floor is furnished."""
+        """What rooms usually have, until enough of the floor is furnished, and more where a home is still bare."""
         for space in self.spaces:
-            use = self.uses[space.room.key]
-            rng = stream(self.seed, "usual", space.room.key)
-            share = float(rng.uniform(*SHARES.get(use, (0.3, 0.38))))
-            in_vain = 0
-            first, *others = USUAL.get(use, (((), 0.0),))
-            wishes = [first, *(others[i] for _ in range(ROUNDS) for i in rng.permutation(len(others)))]
-            for number, (kinds, chance) in enumerate(wishes):
-                order = [kinds[i] for i in rng.permutation(len(kinds))][:IN_VAIN]
-                if rng.random() < chance and (space.share < share or number == 0) and in_vain < IN_VAIN:
-                    in_vain += not self._one_more(space, order, number)
+            self._usual(space)
+        for space in self.spaces:
+            if sum(s.area for s in self.spaces) < BARE * self.plan.area:
+                self._usual(space, again=1)
+            if all(piece.kind in BINS for piece, _ in space.stood):
+                _ = any(self.put(space, kind) for kind in LITTLE)
+
+    def _usual(self, space: Space, again: int = 0) -> None:
+        use = self.uses[space.room.key]
+        rng = stream(self.seed, "usual", space.room.key, *again * ["again"])
+        share = float(rng.uniform(*SHARES.get(use, (0.3, 0.38)))) + 0.08 * again
+        in_vain = 0
+        first, *others = USUAL.get(use, (((), 0.0),))
+        wishes = [first, *(others[i] for _ in range(ROUNDS) for i in rng.permutation(len(others)))]
+        for number, (kinds, chance) in enumerate(wishes, 100 * again):
+            order = [kinds[i] for i in rng.permutation(len(kinds))][:IN_VAIN]
+            if rng.random() < chance and (space.share < share or number == 0) and in_vain < IN_VAIN:
+                in_vain += not self._one_more(space, order, number)
 
     def _one_more(self, space: Space, kinds: Sequence[str], number: int) -> bool:
         """The first of some kinds that has a place and is not yet there often enough."""

@@ -19,6 +19,9 @@ WALL_GAP = 0.01  # m, behind furniture
 BEFORE_WINDOW = 0.6  # m, depth in which nothing is higher than the sill
 CURTAIN = 0.3  # m beside a window, the same
 BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # rooms without curtains
+AROUND = 0.76  # m around what stands free
+NEAR = BODY + 0.15  # m from the middle of a body to a piece that somebody uses
+UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 TRIES = 14  # places of a piece that are tried for free ways
 _CELL = 0.05  # m, of the grid on which ways are looked for
 
@@ -50,6 +53,7 @@ class Space:
     solids: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     keep: list[Spot] = field(default_factory=list)  # no piece may stand there
     use: list[Spot] = field(default_factory=list)  # as `keep`; somebody must be able to go there
+    near: list[Spot] = field(default_factory=list)  # solids that somebody must be able to come near to
     doors: list[tuple[float, float]] = field(default_factory=list)  # points within them
     windows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     hung: list[tuple[Side, float, float, float]] = field(default_factory=list)  # side, from, to, lowest point
@@ -70,7 +74,7 @@ class Space:
             space.hung.append((side, door.center - half - 0.12, door.center + half + 0.12, 0.0))
             if door.leaf is not None and door.leaf.room == room.key:
                 leaf = door.leaf.floor
-                space.keep.append((leaf.x0, leaf.y0, leaf.x1, leaf.y1))
+                space.solids.append((leaf.x0, leaf.y0, leaf.x1, leaf.y1, door.height))
                 low, high = (leaf.x0, leaf.x1) if door.leaf.side in ("south", "north") else (leaf.y0, leaf.y1)
                 space.hung.append((door.leaf.side, low, high, 0.0))
         for window in plan.windows_of(room.key):
@@ -110,7 +114,9 @@ class Space:
         best: list[int] = fits[np.argsort(-scores, kind="stable")[:TRIES]].tolist()
         for k in best:
             spots, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, uses))
-            if self.connected(spots, zones):
+            used = [] if piece.kind in UNUSED else spots
+            if self.connected(spots, zones, used):
+                self.near += used
                 x, y, turns, along = places[k].tolist()
                 place = Place(x, y, int(turns), None if free else SIDES[int(turns)], along)
                 self.stand(piece, place, spots, zones)
@@ -156,13 +162,13 @@ class Space:
     def _fits(self, boxes: Floats, tops: Floats, uses: Floats, free: bool) -> NDArray[np.bool_]:
         """Which places (n) are free, by the boxes (n, k, 4) of the parts and the places of use (n, u, 4)."""
         floor = self.room.floor
-        slack = 0.66 if free else -1e-6
+        slack = AROUND if free else -1e-6
         low, high = np.array([floor.x0, floor.y0]) + slack, np.array([floor.x1, floor.y1]) - slack
         ok = ((boxes[..., :2] >= low) & (boxes[..., 2:] <= high)).all(axis=(1, 2))
         inner = (uses[..., :2] >= low - 0.02) & (uses[..., 2:] <= high + 0.02)
         ok &= free | inner.all(axis=(1, 2))
         solids = np.array(self.solids).reshape(-1, 5)[:, :4]
-        ok &= ~_overlap(boxes, solids, 0.66 if free else 0.0) & ~_overlap(uses, solids)
+        ok &= ~_overlap(boxes, solids, AROUND if free else 0.0) & ~_overlap(uses, solids)
         ok &= ~_overlap(boxes, np.array([*self.keep, *self.use]).reshape(-1, 4))
         for *zone, sill in self.windows:
             ok &= ~_overlap(boxes[:, tops > sill], np.array([zone]))
@@ -198,8 +204,14 @@ class Space:
             score -= 0.5 * middle
         return np.asarray(score)
 
-    def connected(self, spots: Iterable[Spot], zones: Iterable[Spot] = ()) -> bool:
-        """Whether a body comes from each door to each place of use, with solids at `spots` and use of `zones`, too."""
+    def connected(self, spots: Iterable[Spot], zones: Iterable[Spot] = (), near: Iterable[Spot] = ()) -> bool:
+        """Whether a body comes from each door to each place of use, and near to what is used.
+
+        Args:
+            spots: Where something is to stand as well.
+            zones: Places of its use.
+            near: What of it is used.
+        """
         floor = self.room.floor
         nx, ny = math.ceil(floor.width / _CELL), math.ceil(floor.depth / _CELL)
         free = np.zeros((nx + 2, ny + 2), np.uint8)
@@ -210,13 +222,18 @@ class Space:
             free[max(i, 0) + 1 : u + 1, max(j, 0) + 1 : v + 1] = 0
         distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _CELL
         _, islands = cv2.connectedComponents((distance > BODY).astype(np.uint8), connectivity=4)
-        targets = [(x - 0.25, y - 0.25, x + 0.25, y + 0.25) for x, y in self.doors] + [*self.use, *zones]
+        targets: list[tuple[Spot, ...]] = [((x - 0.25, y - 0.25, x + 0.25, y + 0.25),) for x, y in self.doors]
+        targets += [(zone,) for zone in (*self.use, *zones)]
+        # Not around corners: there it would be farther away.
+        targets += [(_grown(spot, NEAR, 0), _grown(spot, 0, NEAR)) for spot in (*self.near, *near)]
         common: set[int] | None = None
-        for x0, y0, x1, y1 in targets:
-            i, j = int((x0 - floor.x0) / _CELL) + 1, int((y0 - floor.y0) / _CELL) + 1
-            u, v = int((x1 - floor.x0) / _CELL) + 2, int((y1 - floor.y0) / _CELL) + 2
-            here = set(np.unique(islands[max(i, 0) : u, max(j, 0) : v]).tolist()) - {0}
-            common = here if common is None else common & here
+        for boxes in targets:
+            here: set[int] = set()
+            for x0, y0, x1, y1 in boxes:
+                i, j = int((x0 - floor.x0) / _CELL) + 1, int((y0 - floor.y0) / _CELL) + 1
+                u, v = int((x1 - floor.x0) / _CELL) + 2, int((y1 - floor.y0) / _CELL) + 2
+                here.update(islands[max(i, 0) : u, max(j, 0) : v].ravel().tolist())
+            common = here - {0} if common is None else common & here
             if not common:
                 return False
         return True
@@ -226,6 +243,10 @@ def _moved(spots: Sequence[Spot], places: Floats) -> Floats:
     """Rectangles of a piece at each of n places, shape (n, k, 4)."""
     turned = np.array([[moved(spot, 0.0, 0.0, turns * math.pi / 2) for spot in spots] for turns in range(4)])
     return np.asarray(turned.reshape(4, -1, 4)[places[:, 2].astype(int)] + places[:, None, [0, 1, 0, 1]])
+
+
+def _grown(spot: Spot, x: float, y: float) -> Spot:
+    return spot[0] - x, spot[1] - y, spot[2] + x, spot[3] + y
 
 
 def _spot(box: Sequence[float]) -> Spot:

@@ -80,6 +80,7 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (("mirror_wardrobe", "low_bookcase", "armchair", "standing_mirror"), 0.6),
     ),
 }
+LITTLE: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")  # where nothing else fits
 ROUNDS = 3  # through these lists
 OFTEN = {
     "armchair": 2,

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from benchmarks import play
+from benchmarks import houses, play
 from benchmarks._command import benchmark, benchmark_names
-from benchmarks.support import play_load
+from benchmarks.support import home_figures, play_load
 from benchmarks.support.play_browser import SeenFrame, SimulatedBrowser
 from benchmarks.support.play_load import median_width
 from experiments.cli.main import main
@@ -80,3 +80,11 @@ def test_latencies_where_no_frame_comes_are_infinite_and_fail(monkeypatch):
     assert (result["latency"]["jpeg_p95_ms"], result["latency"]["jpeg_fps"]) == (math.inf, 0.0)
     said = [line for line in play.lines(result) if "FAIL" in line]
     assert len(said) == 3
+
+
+def test_a_generated_home_is_measured_without_a_fault():
+    row = home_figures.figures((3, 50_000))
+    assert not [key for key in houses.FAULTS if row.get(key)]
+    assert row["kinds"]["toilet"] == 1
+    assert all(figure([row]) >= 0 for figure, *_ in houses.REQUIREMENTS.values())
+    assert houses.COLUMNS["overlap"]([row, row]) == 1.0

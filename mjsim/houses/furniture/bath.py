@@ -107,17 +107,25 @@ def bathtub(b: Builder) -> Piece:
     x = side * (w / 2 - 0.06)
     b.rod("chrome", (x, d / 2, 0.72), (x - side * 0.14, d / 2, 0.7), 0.018)
     b.post("chrome", x, d / 2, (h, 0.74), 0.015)
-    if b.chance(0.6):
+    parts = [(-w / 2, 0.0, w / 2, d, 0.62)]
+    high = 0.0  # m of it, from the end with the taps
+    if b.smaller < 2 and b.chance(0.6):
+        high = 0.4
         b.post("chrome", x, d / 2, (0.74, 2.05), 0.011)
         b.rod("chrome", (x, d / 2, 2.05), (x - side * 0.22, d / 2, 2.09), 0.011)
         b.post("chrome", x - side * 0.24, d / 2, (2.05, 2.07), 0.1)
         if b.chance(0.6):
+            high = 0.82
             b.box("pane", 0.8, (d - 0.045, d - 0.037), (h, 1.98), side * (w / 2 - 0.4), seen=True)
             b.box("chrome", 0.02, (d - 0.05, d - 0.03), (h, 1.98), side * (w / 2 - 0.8), seen=True)
+    if high:
+        middle = side * (w / 2 - high)
+        tops = (0.62, 2.1) if side > 0 else (2.1, 0.62)
+        parts = [(-w / 2, 0.0, middle, d, tops[0]), (middle, 0.0, w / 2, d, tops[1])]
     return b.piece(
         (w, d, 2.1),
         use=((-0.4, d, 0.4, d + 0.55),),
-        parts=((-w / 2, 0, w / 2, d, 0.62),),
+        parts=parts,
         stands="left" if side < 0 else "right",
     )
 

@@ -14,6 +14,7 @@ Point = tuple[float, float, float]
 T = TypeVar("T")
 PANEL = 0.016  # m, thickness of doors and drawers
 GAP = 0.008  # m, between them
+_THINGS = ("vase", "plant", "books", "bowl", "box", "candles")
 FACING = 'xyaxes="-1 0 0 0 0 1"'  # an image that is seen from +y
 
 
@@ -169,17 +170,18 @@ class Builder:
         else:
             self.box(self.metal, min(0.18, 0.4 * wide), out, (v - 0.007, v + 0.007), u, seen=True)
 
-    def clutter(self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0) -> None:
-        """Small things on a top of width `w` around `x`."""
+    def clutter(
+        self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
+    ) -> None:
+        """Small things on a top of width `w` around `x`; `low` ones end 0.13 m above it."""
+        things = ("books", "bowl", "box", "candles") if low else _THINGS
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
             u = x + w * ((i + 0.5) / places - 0.5) + 0.05 * float(self.rng.uniform(-1, 1))
-            getattr(self, f"_{self.pick('vase', 'plant', 'books', 'bowl', 'box', 'candles')}")(
-                u, sum(y) / 2, z
-            )
+            getattr(self, f"_{self.pick(*things)}")(u, sum(y) / 2, z)
 
     def _vase(self, x: float, y: float, z: float) -> None:
-        tall = float(self.rng.uniform(0.08, 0.13))
+        tall = float(self.rng.uniform(0.07, 0.1))
         self.soft(self.pick(*self.look.accents), (x, y, z + tall), (0.6 * tall, 0.6 * tall, tall))
         if self.chance(0.5):
             self.soft(self.pick("leaves", "accent_a", "accent_b"), (x, y, z + 2.1 * tall), (0.08, 0.08, 0.09))
@@ -187,7 +189,7 @@ class Builder:
     def _plant(self, x: float, y: float, z: float) -> None:
         self.post(self.pick("pot_a", "pot_b"), x, y, (z, z + 0.1), 0.055)
         leaves = self.pick("leaves", "leaves_dark", "leaves_pale")
-        self.soft(leaves, (x, y, z + 0.19), (0.1, 0.09, self.pick(0.1, 0.13)))
+        self.soft(leaves, (x, y, z + 0.18), (0.1, 0.09, self.pick(0.1, 0.12)))
 
     def _books(self, x: float, y: float, z: float) -> None:
         for i, (w, d) in enumerate(((0.22, 0.15), (0.19, 0.14), (0.17, 0.12))[: self.pick(2, 3)]):

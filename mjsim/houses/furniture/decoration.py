@@ -237,7 +237,7 @@ def floor_lamp(b: Builder) -> Piece:
         b.post("bulb", 0, r, (tall + 0.055, tall + 0.07), 0.12)
     else:
         b.post("shade", 0, r, (tall - 0.1, tall + 0.18), b.pick(0.16, 0.2))
-    return b.piece((0.4, 0.4, tall + 0.24), parts=((-0.17, 0, 0.17, 2 * r, tall),))
+    return b.piece((0.4, 0.4, tall + 0.24), parts=((-0.17, 0, 0.17, 2 * r, tall + 0.24),))
 
 
 def standing_mirror(b: Builder) -> Piece:

@@ -8,6 +8,7 @@ from mjsim.houses.furniture.piece import Mount, Piece, group
 WIDE = 0.6  # m, a module
 DEEP = 0.62  # m, with the worktop
 TOP = 0.9  # m, of the worktop
+ON_TOP = 1.09  # m, of what stands on it, a little below the sills of kitchens
 TALL = 2.05  # m, of fridges and tall ovens
 LOW, HIGH = 1.5, 2.15  # m, of what hangs on the wall: bins of a dish rack need 0.3 m of air
 HOOD = 2.5  # m, its pipe's end
@@ -32,7 +33,7 @@ class Run:
             if self.hanging and name in ("drawers", "doors", "dishwasher", "sink") and self.b.chance(0.85):
                 top = self._hang(x)
             if name not in ("fridge", "tall_oven"):  # low where a window may be
-                self.b.box("tile", WIDE, (0.0, 0.008), (TOP, LOW if top > TOP else TOP + 0.05), x, seen=True)
+                self.b.box("tile", WIDE, (0.0, 0.008), (TOP, LOW if top > LOW else TOP + 0.05), x, seen=True)
             self.parts.append((x - WIDE / 2, 0.0, x + WIDE / 2, DEEP, top))
         use = ((-self.w / 2, DEEP, self.w / 2, DEEP + 0.9),)
         size = (self.w, DEEP, max(LOW, *(part[4] for part in self.parts)))
@@ -53,22 +54,24 @@ class Run:
 
     def _drawers(self, x: float) -> float:
         self.b.fronts(self.b.front, WIDE, (0.1, 0.85), FRONT, 1, 3, x)
-        top = self._base(x)
+        self._base(x)
         if self.b.chance(0.5):
-            self.b.clutter(0.3, (0.15, 0.35), TOP, 1, x)
-        return top
+            self.b.clutter(0.3, (0.15, 0.35), TOP, 1, x, low=True)
+            return ON_TOP
+        return TOP
 
     def _doors(self, x: float) -> float:
         self.b.fronts(self.b.front, WIDE, (0.1, 0.85), FRONT, self.b.pick(1, 2), 1, x, doors=True)
-        top = self._base(x)
-        if self.b.chance(0.5):  # a kettle or a toaster
-            paint = self.b.pick("steel", "white", "accent_a", "black")
-            if self.b.chance(0.5):
-                self.b.post(paint, x, 0.3, (TOP, TOP + 0.2), 0.075)
-                self.b.box("black", 0.03, (0.38, 0.42), (TOP + 0.04, TOP + 0.18), x, seen=True)
-            else:
-                self.b.box(paint, 0.28, (0.2, 0.36), (TOP, TOP + 0.18), x, seen=True)
-        return top
+        self._base(x)
+        if not self.b.chance(0.5):
+            return TOP
+        paint = self.b.pick("steel", "white", "accent_a", "black")  # of a kettle or a toaster
+        if self.b.chance(0.5):
+            self.b.post(paint, x, 0.3, (TOP, ON_TOP), 0.075)
+            self.b.box("black", 0.03, (0.38, 0.42), (TOP + 0.04, ON_TOP - 0.02), x, seen=True)
+        else:
+            self.b.box(paint, 0.28, (0.2, 0.36), (TOP, ON_TOP - 0.02), x, seen=True)
+        return ON_TOP
 
     def _rack(self, x: float) -> float:
         """Where the bin for dishes stands."""
@@ -97,10 +100,10 @@ class Run:
             b.box("steel", 0.476, (edge - 0.006, edge + 0.006), (0.715, TOP + 0.003), x)
         b.box("steel", 0.476, (0.122, 0.488), (0.7, 0.715), x, seen=True)
         b.post("dark", x, y, (0.715, 0.719), 0.035)
-        b.post("chrome", x, 0.06, (TOP, TOP + 0.24), 0.014)
-        b.rod("chrome", (x, 0.06, TOP + 0.24), (x, 0.2, TOP + 0.28), 0.012)
-        b.rod("chrome", (x, 0.2, TOP + 0.28), (x, 0.26, TOP + 0.22), 0.012)
-        return TOP
+        b.post("chrome", x, 0.06, (TOP, TOP + 0.15), 0.014)
+        b.rod("chrome", (x, 0.06, TOP + 0.15), (x, 0.2, TOP + 0.175), 0.012)
+        b.rod("chrome", (x, 0.2, TOP + 0.175), (x, 0.26, TOP + 0.13), 0.012)
+        return ON_TOP
 
     def _cooker(self, x: float) -> float:
         b = self.b

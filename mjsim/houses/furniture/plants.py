@@ -23,10 +23,10 @@ def _pot(b: Builder, r: float, h: float, y: float) -> str:
     return b.pick(*_GREENS)
 
 
-def _potted(b: Builder, r: float, wide: float, tall: float, low: float = 1.0) -> Piece:
+def _potted(b: Builder, r: float, wide: float, tall: float) -> Piece:
     """A plant whose leaves reach `wide` around the middle of its pot, at y = wide; nobody walks into the pot."""
     reach = max(r, 0.8 * wide)  # neighbours stay out of its leaves
-    return b.piece((2 * wide, 2 * wide, tall), parts=((-reach, wide - reach, reach, wide + reach, low),))
+    return b.piece((2 * wide, 2 * wide, tall), parts=((-reach, wide - reach, reach, wide + reach, tall),))
 
 
 def bush(b: Builder) -> Piece:
@@ -48,7 +48,7 @@ def tree(b: Builder) -> Piece:
         : b.pick(2, 3)
     ]:
         b.soft(green, (u, y + v, tall - 0.1 + up), (size, size, size))
-    return _potted(b, r, y, tall + 0.3, 1.5)
+    return _potted(b, r, y, tall + 0.35)
 
 
 def snake_plant(b: Builder) -> Piece:
@@ -83,7 +83,7 @@ def cactus(b: Builder) -> Piece:
         z = h + tall * b.pick(0.4, 0.55)
         b.rod("leaves_dark", (0, y, z), (side * 0.14, y, z), 0.04, shape="capsule")
         b.rod("leaves_dark", (side * 0.14, y, z), (side * 0.14, y, z + 0.2), 0.04, shape="capsule")
-    return _potted(b, r, y, h + tall + 0.07, 0.9)
+    return _potted(b, r, y, h + tall + 0.07)
 
 
 def fern_stand(b: Builder) -> Piece:
@@ -101,7 +101,7 @@ def fern_stand(b: Builder) -> Piece:
         b.soft(
             green, (0.19 * math.cos(a), y + 0.18 * math.sin(a), h + 0.17), (0.11, 0.035, 0.03), (0, 0.6, a)
         )
-    return _potted(b, r, y, h + 0.36, 1.1)
+    return _potted(b, r, y, h + 0.36)
 
 
 KINDS = (bush, tree, snake_plant, palm, cactus, fern_stand)

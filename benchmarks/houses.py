@@ -1,0 +1,221 @@
+"""Generated homes of seeds that nobody chose: whether each is usable, what it costs, and how much they differ."""
+
+import itertools
+import json
+import multiprocessing
+import statistics
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+
+from benchmarks.support.home_figures import WAY, figures, remade
+from benchmarks.support.requirements import outcome
+from mjsim.houses.values import ROOMS
+from mjsim.sources import ROOT, digest_of
+
+T = TypeVar("T")
+Rows = Sequence[dict[str, Any]]
+COUNT, QUICK = 100, 2  # of each size
+FIRST_SEED = 50_000
+OUT = Path("runs/bench-houses")
+AGAIN = 10  # one home of so many is made again in another process
+FURNISHED = (0.25, 0.45)  # of the floor
+FAULTS = ("failure", "errors", "warnings", "empty", "unusable", "windows_behind", "lacking", "areas_off")
+
+
+def _count(key: str) -> Callable[[Rows], float]:
+    return lambda rows: sum(len(row[key]) for row in rows)
+
+
+def _homes(key: str) -> Callable[[Rows], float]:
+    return lambda rows: sum(bool(row[key]) for row in rows)
+
+
+def _of(key: str, summary: Callable[[Sequence[Any]], float]) -> Callable[[Rows], float]:
+    return lambda rows: summary([row[key] for row in rows if row[key] is not None] or [0.0])
+
+
+def _different(key: str) -> Callable[[Rows], float]:
+    return lambda rows: len({json.dumps(row[key]) for row in rows})
+
+
+def _percentile(values: Sequence[float]) -> float:
+    return float(np.percentile(values, 99))
+
+
+def _overlap(key: str) -> Callable[[Rows], float]:
+    """Mean over all pairs of homes of the pieces that both have, as a share of those that either has (with numbers)."""
+
+    def mean(rows: Rows) -> float:
+        bags: list[Counter[str]] = [Counter(row[key]) for row in rows]
+        shares = [(a & b).total() / (a | b).total() for a, b in itertools.combinations(bags, 2)]
+        return statistics.fmean(shares) if shares else 0.0
+
+    return mean
+
+
+def _unique_armchairs(rows: Rows) -> float:
+    looks = Counter(form for row in rows for form in row["armchairs"])
+    return 100 * sum(count == 1 for count in looks.values()) / max(1, looks.total())
+
+
+def _small(rows: Rows) -> Rows:
+    return [row for row in rows if row["rooms"] <= 8]
+
+
+def _by_size(rows: Rows) -> dict[int, Rows]:
+    return {
+        size: [row for row in rows if row["rooms"] == size] for size in sorted({row["rooms"] for row in rows})
+    }
+
+
+COLUMNS: Mapping[str, Callable[[Rows], float]] = {  # of the table, for homes of one size
+    "homes": len,
+    "m2": _of("area", statistics.median),
+    "made in s": _of("make_s", statistics.median),
+    "99 %": _of("make_s", _percentile),
+    "checked, most s": _of("check_s", max),
+    "furnished": _of("share", statistics.median),
+    "least": _of("share", min),
+    "doorway m": _of("doorway", min),
+    "way m": _of("way", min),
+    "draws": _of("draws", max),
+    "door graphs": _different("door_graph"),
+    "overlap": _overlap("specimens"),
+    "by kind alone": _overlap("kinds"),
+}
+REQUIREMENTS: Mapping[str, tuple[Callable[[Rows], float], str, float]] = {
+    "homes with errors of mjsim check": (_homes("errors"), "<=", 0),
+    "homes with warnings, %": (lambda rows: 100 * _homes("warnings")(rows) / len(rows), "<=", 1),
+    "plan and furniture up to 8 rooms, median CPU s": (
+        lambda rows: COLUMNS["made in s"](_small(rows)),
+        "<=",
+        1,
+    ),
+    "the same, 99 %": (lambda rows: COLUMNS["99 %"](_small(rows)), "<=", 5),
+    "the same of any size, most": (_of("make_s", max), "<=", 20),
+    "check, most CPU s": (_of("check_s", max), "<=", 2),
+    "narrowest doorway, clear, m": (
+        lambda rows: COLUMNS["doorway m"]([r for r in rows if r["rooms"] > 1]),
+        ">=",
+        0.85,
+    ),
+    "narrowest way into a room, m": (_of("way", min), ">=", WAY),
+    "pieces that nobody comes to by ways of 0.70 m": (_count("unusable"), "<=", 0),
+    "windows behind something higher than the sill": (_count("windows_behind"), "<=", 0),
+    "homes that lack something they must have": (_homes("lacking"), "<=", 0),
+    "least share of the floor that is furnished": (_of("share", min), ">=", FURNISHED[0]),
+    "most": (_of("share", max), "<=", FURNISHED[1]),
+    "rooms with nothing": (_count("empty"), "<=", 0),
+    "rooms with an area out of its range, %": (
+        lambda rows: 100 * _count("areas_off")(rows) / sum(row["rooms"] for row in rows),
+        "<=",
+        5,
+    ),
+    "different door graphs, by use of rooms": (_different("door_graph"), ">=", 300),
+    "kinds of furniture": (lambda rows: len({kind for row in rows for kind in row["kinds"]}), ">=", 60),
+    "mean overlap of furniture in homes of one size": (
+        lambda rows: statistics.fmean(COLUMNS["overlap"](mine) for mine in _by_size(rows).values()),
+        "<=",
+        0.35,
+    ),
+    "palettes, in steps of 0.2 of a colour": (_different("palette"), ">=", 30),
+    "armchairs that look as no other one, %": (_unique_armchairs, ">=", 50),
+    "draw calls of a home without objects, most": (_of("draws", max), "<=", 80),
+}
+
+
+def measure(
+    quick: bool = False,
+    count: int | None = None,
+    rooms: Sequence[int] = range(ROOMS[0], ROOMS[1] + 1),
+    first_seed: int = FIRST_SEED,
+    workers: int = 1,
+    out: Path = OUT,
+) -> dict[str, Any]:
+    """Run the benchmark; everything in it can be written as JSON.
+
+    Args:
+        quick: Two homes of each size.
+        count: Homes of each size.
+        rooms: Sizes.
+        first_seed: Of the first home; the others follow.
+        workers: Processes.
+        out: Folder that keeps the figures of every home; those that are there are not measured again.
+    """
+    each = count or (QUICK if quick else COUNT)
+    homes = [(size, first_seed + each * (size - ROOMS[0]) + i) for i in range(each) for size in rooms]
+    code = digest_of(
+        *(ROOT / "mjsim" / name for name in ("houses", "model", "scene_export")),
+        Path(__file__).parent / "support",
+    )
+    rows = {(row["rooms"], row["seed"]): row for row in _kept(out) if row["code"] == code}
+    missing = [home for home in homes if home not in rows]
+    out.mkdir(parents=True, exist_ok=True)
+    with (out / "homes.jsonl").open("a", encoding="utf-8") as file:
+        for row in _in_workers(figures, missing, workers, "homes"):
+            rows[row["rooms"], row["seed"]] = row | {"code": code}
+            file.write(json.dumps(rows[row["rooms"], row["seed"]]) + "\n")
+            file.flush()
+    found = [rows[home] for home in homes]
+    built = [row for row in found if "failure" not in row]
+    again = [(row["rooms"], row["seed"]) for row in built[::-AGAIN]]
+    others = sum(
+        rows[home]["digest"] != same
+        for home, same in zip(again, _in_workers(remade, again, workers, "again"), strict=True)
+    )
+    return {
+        "homes": len(found),
+        "failed": len(found) - len(built),
+        "other_bytes": others,
+        "sizes": {
+            size: {name: figure(mine) for name, figure in COLUMNS.items()}
+            for size, mine in _by_size(built).items()
+        },
+        "figures": {name: figure(built) for name, (figure, *_) in REQUIREMENTS.items()},
+        "faults": [
+            f"generated:{row['seed']}?rooms={row['rooms']}: {key.replace('_', ' ')}: {row[key]}"
+            for row in found
+            for key in FAULTS
+            if row.get(key)
+        ],
+    }
+
+
+def _kept(out: Path) -> Iterator[dict[str, Any]]:
+    path = out / "homes.jsonl"
+    if path.is_file():
+        for line in path.read_text(encoding="utf-8").splitlines():
+            if line.endswith("}"):  # the last one may have been cut off
+                yield json.loads(line)
+
+
+def _in_workers(
+    run: Callable[[tuple[int, int]], T], homes: Sequence[tuple[int, int]], workers: int, what: str
+) -> Iterator[T]:
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield from track(pool.map(run, homes), what, total=len(homes), console=Console(stderr=True))
+
+
+def lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result for people."""
+    yield from result["faults"]
+    yield "| rooms | " + " | ".join(COLUMNS) + " |"
+    yield "|---" * (len(COLUMNS) + 1) + "|"
+    for size, row in result["sizes"].items():
+        yield f"| {size} | " + " | ".join(f"{cell:.3g}" for cell in row.values()) + " |"
+    own = {f"not built, of {result['homes']}": "failed", "made again with other bytes": "other_bytes"}
+    for name, key in own.items():
+        yield _judged(name, result[key], "<=", 0)
+    for name, (_, relation, bound) in REQUIREMENTS.items():
+        yield _judged(name, result["figures"][name], relation, bound)
+
+
+def _judged(name: str, value: float, relation: str, bound: float) -> str:
+    return f"{name}: {value:.4g} ({relation} {bound:g}: {outcome(value, relation, bound)})"

@@ -1,0 +1,256 @@
+"""What is measured of a generated home: its files, the geometry of its model, rooms and openings of its recipe."""
+
+import hashlib
+import itertools
+import json
+import math
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, label
+
+from mjsim.houses.generated import CATALOGUE, RECIPE, generate, house_files
+from mjsim.houses.programme import NEEDS
+from mjsim.houses.recipe import read_recipe
+from mjsim.houses.values import WALL, Door, FloorPlan, Window
+from mjsim.model.assets import models_root
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.clearance import ClearanceField
+from mjsim.model.house import CompiledHouse, compiled_house
+from mjsim.model.validation.report import check_house_name
+from mjsim.scene_export.export import HOUSE, export_scene
+from mjsim.scene_export.store import SCENE
+
+CELL = 0.0125  # m
+BAND = (0.05, 1.8)  # m, heights in which a person bumps into things
+WAY = 0.70  # m
+REACH = 0.60  # m from the middle of a person to a piece that the person uses
+BEFORE_WINDOW = 0.5  # m
+HEIGHTS, ACROSS = (0.1, 0.5, 1.0, 1.5, 1.9), (-0.15, -0.05, 0.0, 0.05, 0.15)  # m, of rays in doorways
+SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)  # groups of geoms
+UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
+KITCHENS = ("straight_kitchen", "corner_kitchen")  # each has a sink, a cooker and a fridge
+SEATS = {"sofa": 2, "corner_sofa": 4, "bench": 2} | dict.fromkeys(
+    ("armchair", "dining_chair", "stool", "bar_stool", "office_chair", "pouf"), 1
+)
+BEDS = ("double_bed", "single_bed", "bunk_bed")
+THINGS: Mapping[str, tuple[str, ...]] = {
+    "toilet": ("toilet",),
+    "washbasin": ("washbasin",),
+    "bath or shower": ("bathtub", "shower"),
+    "cooker and sink": (*KITCHENS, "kitchenette"),
+    "fridge": (*KITCHENS, "fridge"),
+    "table": ("table", "round_table", "bar_table"),
+}
+
+
+def figures(home: tuple[int, int]) -> dict[str, Any]:
+    """All figures of the home of (rooms, seed); everything can be written as JSON."""
+    about: dict[str, Any] = {"rooms": home[0], "seed": home[1]}
+    try:
+        files, about["make_s"] = _made(home)
+        with tempfile.TemporaryDirectory() as folder:
+            for name, content in files.items():
+                (Path(folder) / name).parent.mkdir(exist_ok=True)
+                (Path(folder) / name).write_bytes(content)
+            start = time.process_time()
+            report = check_house_name(str(Path(folder) / CATALOGUE))
+            about["check_s"] = time.process_time() - start
+            catalogue = Catalogue.load(str(Path(folder) / CATALOGUE))
+            plan = read_recipe(Path(folder) / RECIPE).plan
+            scene = json.loads(export_scene(catalogue)[SCENE])
+            measured = _Home(compiled_house(catalogue), plan).figures()
+    except Exception as error:  # whatever it is, the home cannot be used
+        return {**about, "failure": f"{type(error).__name__}: {error}"}
+    return {
+        **about,
+        "digest": _digest(files),
+        "errors": [str(f) for f in report.findings if f.severity == "error"],
+        "warnings": [str(f) for f in report.findings if f.severity != "error"],
+        "draws": scene["sizes"][HOUSE]["draw_calls"],
+        **measured,
+    }
+
+
+def remade(home: tuple[int, int]) -> str:
+    """The digest of the home of (rooms, seed), which is made again."""
+    return _digest(_made(home)[0])
+
+
+def _made(home: tuple[int, int]) -> tuple[Mapping[str, bytes], float]:
+    """The files of a home, and the CPU time, s, of plan and furniture."""
+    start = time.process_time()
+    recipe, furnishing = generate(home[1], home[0])
+    seconds = time.process_time() - start
+    return house_files(recipe, furnishing, models_root()), seconds
+
+
+def _digest(files: Mapping[str, bytes]) -> str:
+    digests = (name.encode() + hashlib.sha256(files[name]).digest() for name in sorted(files))
+    return hashlib.sha256(b"".join(digests)).hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A piece of furniture with the upright boxes around its geoms, rows of x0, y0, z0, x1, y1, z1, m."""
+
+    room: str
+    kind: str
+    shown: NDArray[np.float64]  # of all, (n, 6)
+    solid: NDArray[np.float64]  # of what a person bumps into, (k, 6)
+    form: str  # hash of shapes, places and colours
+
+    @property
+    def stands(self) -> bool:
+        return bool(self.solid[:, 2].min(initial=math.inf) < 0.5)
+
+    @property
+    def size(self) -> tuple[float, ...]:
+        """To 0.1 m, the longer side first."""
+        x, y, z = np.round(self.shown[:, 3:].max(axis=0) - self.shown[:, :3].min(axis=0), 1).tolist()
+        return max(x, y), min(x, y), z
+
+
+class _Home:
+    """A compiled home with a grid of the distances of its floor to what stands there."""
+
+    def __init__(self, house: CompiledHouse, plan: FloorPlan) -> None:
+        self._model, self._data, self._plan = house.model, house.data, plan
+        self._pieces = list(self._all_pieces())
+        self._field = ClearanceField.from_model(self._model, low=BAND[0], high=BAND[1], resolution=CELL)
+        self._rooms = {r.key: self._cells(r.floor.x0, r.floor.y0, r.floor.x1, r.floor.y1) for r in plan.rooms}
+
+    def figures(self) -> dict[str, Any]:
+        plan, standing = self._plan, [piece for piece in self._pieces if piece.stands]
+        kinds = Counter(piece.kind for piece in self._pieces)
+        floors = [self._field.distance[cells] for cells in self._rooms.values()]
+        doorways = [self._clear(door) for door in plan.doors if not door.is_front]
+        return {
+            "door_graph": _door_graph(plan),
+            "area": plan.area,
+            "areas_off": [r.key for r in plan.rooms if not _within(r.floor.area, NEEDS[r.key].area)],
+            "share": sum(int((floor <= 0).sum()) for floor in floors) / sum(floor.size for floor in floors),
+            "empty": sorted(set(self._rooms) - {piece.room for piece in standing}),
+            "doorway": min(doorways, default=None),
+            "way": self._way(),
+            "unusable": list(self._unusable(standing)),
+            "windows_behind": [
+                f"{p.room}: {p.kind}" for w in plan.windows for p in standing if self._hides(p, w)
+            ],
+            "lacking": list(_lacking(plan, kinds)),
+            "kinds": kinds,
+            "specimens": sorted(f"{piece.kind} {piece.size}" for piece in self._pieces if len(piece.shown)),
+            "armchairs": [piece.form for piece in self._pieces if piece.kind == "armchair"],
+            "palette": self._palette(),
+        }
+
+    def _all_pieces(self) -> Iterator[_Piece]:
+        """What stands, hangs and lies: bodies called `room/kind_number`."""
+        model, data = self._model, self._data
+        for body in range(1, model.nbody):
+            room, _, name = model.body(body).name.partition("/")
+            kind, _, number = name.rpartition("_")
+            geoms = np.flatnonzero(model.geom_bodyid == body)
+            if not number.isdigit() or not len(geoms):
+                continue
+            looks = (model.geom_type, model.geom_pos, model.geom_size, model.mat_rgba[model.geom_matid])
+            form = np.round(np.column_stack([of[geoms] for of in looks]), 3)
+            geoms = geoms[model.geom_type[geoms] != mujoco.mjtGeom.mjGEOM_PLANE]  # drawn shadows
+            turns, boxes = data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_aabb[geoms]
+            middles = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turns, boxes[:, :3])
+            halves = np.einsum("gij,gj->gi", np.abs(turns), boxes[:, 3:])
+            shown = np.hstack([middles - halves, middles + halves])
+            hit = (model.geom_contype[geoms] > 0) & (shown[:, 5] > BAND[0]) & (shown[:, 2] < BAND[1])
+            yield _Piece(room, kind, shown, shown[hit], hashlib.sha256(form.tobytes()).hexdigest()[:12])
+
+    def _cells(self, x0: float, y0: float, x1: float, y1: float) -> tuple[slice, slice]:
+        i, u = (round((x - self._field.origin_x) / CELL) for x in (x0, x1))
+        j, v = (round((y - self._field.origin_y) / CELL) for y in (y0, y1))
+        return slice(max(i, 0), u + 1), slice(max(j, 0), v + 1)
+
+    def _free(self, width: float) -> NDArray[np.bool_]:
+        """Where the middle of a disc of a diameter may be that comes into all rooms; nowhere where none can."""
+        islands, _ = label(self._field.distance >= width / 2)
+        seen = [set(np.unique(islands[cells]).tolist()) for cells in self._rooms.values()]
+        return np.isin(islands, list(set.intersection(*seen) - {0}))
+
+    def _way(self) -> float:
+        """Diameter, m, of the widest disc that comes into all rooms, to a cell, up to 1.2 m."""
+        low, high = 0, round(1.2 / CELL)
+        while low < high:
+            middle = (low + high + 1) // 2
+            low, high = (middle, high) if self._free(middle * CELL).any() else (low, middle - 1)
+        return low * CELL
+
+    def _unusable(self, pieces: list[_Piece]) -> Iterator[str]:
+        """Pieces to which nobody comes, from within the room, by ways of `WAY`; plants and lamps are only seen."""
+        free = self._free(WAY - CELL)
+        for room, cells in self._rooms.items():
+            away = np.full(free.shape, math.inf)
+            away[cells] = distance_transform_edt(~free[cells]) * CELL if free[cells].any() else math.inf
+            for piece in pieces:
+                near = [away[self._cells(x0, y0, x1, y1)].min() for x0, y0, _, x1, y1, _ in piece.solid]
+                if piece.room == room and piece.kind not in UNUSED and min(near) > REACH:
+                    yield f"{room}: {piece.kind}"
+
+    def _clear(self, door: Door) -> float:
+        """Clear width, m, of a doorway, by rays from its middle to both sides."""
+        floor = self._plan.room(door.rooms[0]).floor
+        middle = floor.along(door.side, door.center, door.center, -WALL / 2, -WALL / 2).center
+        along, across = np.eye(3)[[0, 1] if door.side in ("south", "north") else [1, 0]]
+        geom, widths = np.zeros(1, np.int32), []
+        for height, beside in itertools.product(HEIGHTS, ACROSS):
+            start = np.array([*middle, height]) + beside * across
+            rays = [
+                mujoco.mj_ray(self._model, self._data, start, s * along, SOLID, 1, -1, geom) for s in (-1, 1)
+            ]
+            widths.append(sum(ray if ray >= 0 else math.inf for ray in rays))
+        return float(min(widths))
+
+    def _hides(self, piece: _Piece, window: Window) -> bool:
+        """Whether a piece is before a window and higher than its sill."""
+        low, high = window.center - window.width / 2, window.center + window.width / 2
+        zone = self._plan.room(window.room).floor.along(window.side, low, high, 0.0, BEFORE_WINDOW)
+        x0, y0, _, x1, y1, top = piece.shown.T
+        inside = (x0 < zone.x1) & (x1 > zone.x0) & (y0 < zone.y1) & (y1 > zone.y0)
+        return bool((inside & (top > window.sill + 0.01)).any())
+
+    def _palette(self) -> list[float]:
+        """Colours of wood, fronts and cloth of the home's furniture, in steps of 0.2."""
+        names = {self._model.material(i).name: i for i in range(self._model.nmat)}
+        found = [names[name] for name in ("wood_a", "wood_b", "front_a", "cloth_a") if name in names]
+        return [round(float(v) * 5) / 5 for v in self._model.mat_rgba[found, :3].ravel()]
+
+
+def _door_graph(plan: FloorPlan) -> str:
+    """Which rooms have doors to which, by use: the same for plans that only call their bedrooms otherwise."""
+    uses = {room.key: room.use for room in plan.rooms} | {"outside": "outside"}
+    bedrooms = [key for key, use in uses.items() if use == "bedroom"]
+    forms = []
+    for order in itertools.permutations(range(len(bedrooms))):
+        names = uses | {key: f"bedroom {i}" for key, i in zip(bedrooms, order, strict=True)}
+        ways = [sorted(names[room] for room in (*door.rooms, "outside")[:2]) for door in plan.doors]
+        forms.append(sorted("-".join(way) for way in ways))
+    return ", ".join(min(forms))
+
+
+def _within(value: float, bounds: tuple[float, float]) -> bool:
+    return bounds[0] - 0.01 <= value <= bounds[1] + 0.01
+
+
+def _lacking(plan: FloorPlan, kinds: Counter[str]) -> Iterator[str]:
+    """What a home must have and this one does not."""
+    bedrooms = sum(room.use in ("bedroom", "studio") for room in plan.rooms)
+    if sum(kinds[kind] for kind in BEDS) < bedrooms:
+        yield "beds"
+    if sum(seats * kinds[kind] for kind, seats in SEATS.items()) < bedrooms + 1:
+        yield "seats"
+    yield from (thing for thing, of in THINGS.items() if not any(kinds[kind] for kind in of))
