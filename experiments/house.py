@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from experiments.errors import ConfigError
 from mjsim.episode import POINTS, Episode
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.disorder import Disorder
 from mjsim.model.footprint import Footprint
 from mjsim.model.house import compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
@@ -122,13 +123,18 @@ class House:
             if np.any(rooms == key)
         }
 
-    def sample_episode(self, *, objects: int, seed: int, points: int = POINTS) -> Episode:
+    def sample_episode(
+        self, *, objects: int, seed: int, points: int = POINTS, disorder: Disorder | None = None
+    ) -> Episode:
         """Sample a disorganized house (PAPER section 4).
 
         Raises:
             SamplingError: `objects` is out of range, or the house is too small for the points.
         """
-        return sample_episode(self.catalogue, self.sampling_floor, objects=objects, seed=seed, points=points)
+        floor = self.sampling_floor
+        return sample_episode(
+            self.catalogue, floor, objects=objects, seed=seed, points=points, disorder=disorder
+        )
 
     def sample_points(self, *, seed: int, points: int = POINTS) -> NDArray[np.float64]:
         """The points of a seed where objects may lie, m, shape (points, 2).

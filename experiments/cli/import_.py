@@ -1,10 +1,11 @@
-"""`mjsim import`: objects from mesh files, houses from scenes of other simulators."""
+"""`mjsim import`: objects from mesh files, houses and episodes of other simulators."""
 
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from experiments.cli import import_episodes
 from experiments.cli.options import HelpFormatter
 from mjsim.importing import require_extra
 from mjsim.importing.values import AXES, UNITS, ImportDecision, ImportOptions
@@ -25,7 +26,7 @@ def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     # `help` lets completion list it; the overview has its own line.
     top = commands.add_parser(
-        "import", help=None, description="Make objects and houses from files of others."
+        "import", help=None, description="Make objects, houses and episodes from files of others."
     )
     kinds = top.add_subparsers(title="what to import", metavar="KIND", required=True)
     parser = kinds.add_parser(
@@ -53,6 +54,7 @@ def add_parser(commands: Any) -> None:
         "--density", type=float, metavar="D", help="kg/m3 (default: 400, and a mass that is allowed)"
     )
     _add_house(kinds)
+    import_episodes.add_parser(kinds)
 
 
 def _add_house(kinds: Any) -> None:

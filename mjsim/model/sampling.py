@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from mjsim.episode import POINTS, Episode, PlacedObject, StartPose
 from mjsim.errors import SamplingError, brief
 from mjsim.model.catalogue import Catalogue
+from mjsim.model.disorder import Disorder
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigablePoints
 from mjsim.model.settling import settle
@@ -47,6 +48,7 @@ def sample_episode(
     objects: int,
     seed: int,
     points: int = POINTS,
+    disorder: Disorder | None = None,
 ) -> Episode:
     """Sample a disorganized house.
 
@@ -60,6 +62,8 @@ def sample_episode(
             multiple of their number.
         seed: Not negative.
         points: Size of the pool of points that the levels draw from; that of the house where it has fewer.
+        disorder: How far objects lie from where they belong: of the pool, each takes a point about as far from its
+            receptacle. None for the first points, which are anywhere.
 
     Returns:
         The episode, its objects at rest on the floor.
@@ -83,6 +87,10 @@ def sample_episode(
     pool = house_points(catalogue, navigable, seed=seed, points=points)
     categories = _point_categories(catalogue, points, _rng(seed, _Purpose.CATEGORIES))[:objects]
     models = _point_models(catalogue, categories, _rng(seed, _Purpose.MODELS, objects))
+    if disorder is not None:
+        receptacles = compiled_house(catalogue).receptacles
+        homes = [receptacles[catalogue.categories[key].receptacle].center[:2] for key in categories]
+        pool = pool[disorder.assign(pool, np.array(homes), seed)]
     placed = tuple(
         PlacedObject(f"object_{i:02d}", category, model, (float(x), float(y)), (0, 0, 0), (1, 0, 0, 0))
         for i, (category, model, (x, y)) in enumerate(zip(categories, models, pool[:objects], strict=True))

@@ -1,0 +1,198 @@
+"""Reading of rearrangement episodes of others: which objects are out of place, and how far.
+
+RoomR (AI2-THOR rearrangement) has the poses at the start and at the goal; Housekeep has the receptacle on which each
+object lies and those on which it may.
+"""
+
+import gzip
+import io
+import math
+import pickle  # nosec B403: read by an unpickler that allows no class
+import re
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import msgspec
+import numpy as np
+
+from mjsim.errors import EpisodeError, brief
+from mjsim.files import MAX_INPUT, read_bytes
+
+MOVED = 0.05  # m; RoomR's objects differ by less between two simulations of the same pose
+HOUSE = 60.0  # m; objects that fell out of the scene are farther away
+IN_PLACE, MISPLACED, OPENED = "in place", "misplaced", "opened"
+
+
+@dataclass(frozen=True)
+class EpisodeObject:
+    """An object of an episode."""
+
+    scene: str
+    episode: str
+    name: str
+    kind: str
+    state: str  # `in place`, `misplaced` or `opened` (a drawer or a door that is open otherwise than wanted)
+    distance: float | None = None  # m over the floor to where it belongs; None if not misplaced or not known
+
+
+class _Point(msgspec.Struct):
+    x: float
+    y: float
+    z: float
+
+
+class _Pose(msgspec.Struct):
+    name: str
+    position: _Point
+
+
+class _Openable(msgspec.Struct):
+    name: str
+
+
+class _RoomR(msgspec.Struct):
+    starting_poses: list[_Pose]
+    target_poses: list[_Pose]
+    openable_data: list[_Openable] = []
+
+
+class _Housekeep(msgspec.Struct):
+    scene_id: str
+    episode_id: int | str
+    objs_keys: list[str]
+    objs_cats: list[str]
+    objs_pos: list[tuple[float, float, float]]
+    recs_pos: list[tuple[float, float, float]]
+    start_matrix: list[list[float]]
+    end_matrix: list[list[float]]
+
+
+class _HousekeepFile(msgspec.Struct):
+    episodes: list[_Housekeep]
+
+
+class _NoClass(pickle._Unpickler):
+    """An unpickler for plain containers, numbers and strings.
+
+    It is the one in Python: that in C takes memory for as many values as the file claims to have.
+    """
+
+    def find_class(self, module: str, name: str) -> NoReturn:
+        """Refuse every class and function."""
+        raise EpisodeError(f"names {module}.{name}, and only plain lists, tables, numbers and text are read")
+
+
+def read_episodes(path: Path) -> list[EpisodeObject]:
+    """Read a file of RoomR (`.pkl`, `.pkl.gz`) or Housekeep (`.json`, `.json.gz`).
+
+    Raises:
+        EpisodeError: The file cannot be read, is no such file, or holds a class; nothing of it is run.
+    """
+    name = path.name.lower().removesuffix(".gz")
+    readers: dict[str, Callable[[bytes], list[EpisodeObject]]] = {
+        ".pkl": _read_roomr,
+        ".json": _read_housekeep,
+    }
+    reader = readers.get(Path(name).suffix)
+    if reader is None:
+        raise EpisodeError(
+            f"{path} is of no kind that can be read; give .pkl.gz of RoomR or .json.gz of Housekeep"
+        )
+    try:
+        found = reader(_unzipped(path))
+    except OSError as error:
+        raise EpisodeError(f"cannot read {path}: {error.strerror or error}; is it complete?") from error
+    except (EpisodeError, msgspec.ValidationError, msgspec.DecodeError) as error:
+        raise EpisodeError(brief(f"{path}: {error}")) from error
+    if not found:
+        raise EpisodeError(f"{path} holds no object; give a file with episodes")
+    return found
+
+
+def _unzipped(path: Path) -> bytes:
+    data = read_bytes(path)
+    if not path.name.lower().endswith(".gz"):
+        return data
+    try:
+        with gzip.open(io.BytesIO(data)) as file:
+            content = file.read(MAX_INPUT + 1)
+    except (EOFError, zlib.error) as error:
+        raise OSError(str(error)) from error
+    if len(content) > MAX_INPUT:
+        raise EpisodeError(f"holds more than {MAX_INPUT // 10**6} MB; split it")
+    return content
+
+
+def _unpickled(data: bytes) -> Any:
+    try:
+        return _NoClass(io.BytesIO(data)).load()
+    except EpisodeError:
+        raise
+    except Exception as error:  # a damaged or hostile pickle raises nearly anything
+        raise EpisodeError(
+            f"is no pickle of plain values ({type(error).__name__}); is it complete?"
+        ) from error
+
+
+def _read_roomr(data: bytes) -> list[EpisodeObject]:
+    scenes = msgspec.convert(_unpickled(data), dict[str, list[_RoomR]])
+    return [
+        found
+        for scene, episodes in scenes.items()
+        for number, episode in enumerate(episodes)
+        for found in _roomr_objects(scene, str(number), episode)
+    ]
+
+
+def _roomr_objects(scene: str, number: str, episode: _RoomR) -> Iterator[EpisodeObject]:
+    goals = {pose.name: pose.position for pose in episode.target_poses}
+    for pose in episode.starting_poses:
+        kind = pose.name.partition("_")[0]
+        if pose.name not in goals:
+            raise EpisodeError(f"{scene}, episode {number}: {pose.name!r} has no target pose")
+        here, there = pose.position, goals[pose.name]
+        moved = math.dist((here.x, here.y, here.z), (there.x, there.y, there.z)) > MOVED
+        distance = _distance(math.hypot(here.x - there.x, here.z - there.z)) if moved else None
+        yield EpisodeObject(scene, number, pose.name, kind, MISPLACED if moved else IN_PLACE, distance)
+    for openable in episode.openable_data:
+        yield EpisodeObject(scene, number, openable.name, openable.name.partition("_")[0], OPENED)
+
+
+def _read_housekeep(data: bytes) -> list[EpisodeObject]:
+    episodes = msgspec.json.decode(data, type=_HousekeepFile).episodes
+    return [found for episode in episodes for found in _housekeep_objects(episode)]
+
+
+def _housekeep_objects(episode: _Housekeep) -> Iterator[EpisodeObject]:
+    scene, number = Path(episode.scene_id).stem, str(episode.episode_id)
+    shape = len(episode.recs_pos), len(episode.objs_keys)
+    try:
+        start, end = (np.array(m, float).reshape(shape) for m in (episode.start_matrix, episode.end_matrix))
+        objects, receptacles = (
+            np.array(episode.objs_pos).reshape(-1, 3),
+            np.array(episode.recs_pos).reshape(-1, 3),
+        )
+        columns = zip(episode.objs_keys, episode.objs_cats, objects, start.T, end.T, strict=True)
+        for name, kind, position, where, right in columns:
+            if not where.any() or where @ right:
+                yield EpisodeObject(scene, number, name, kind, IN_PLACE)
+                continue
+            offsets = (receptacles[right > 0] - position)[:, [0, 2]]  # y is up
+            nearest = _distance(float(np.hypot(*offsets.T).min())) if len(offsets) else None
+            yield EpisodeObject(scene, number, name, kind, MISPLACED, nearest)
+    except ValueError as error:
+        raise EpisodeError(
+            f"{scene}, episode {number}: tables do not fit {shape[0]} places and {shape[1]} objects"
+        ) from error
+
+
+def _distance(metres: float) -> float | None:
+    return round(metres, 3) if metres <= HOUSE else None
+
+
+def kind_of(name: str) -> str:
+    """A kind as words: `ButterKnife` and `butter_knife` give `butter knife`."""
+    return " ".join(re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)).lower()

@@ -1,0 +1,81 @@
+"""How much is out of place in a house, and how far, as numbers that episodes can be drawn from."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from mjsim.errors import EpisodeError, brief
+from mjsim.files import read_text
+
+_COUNTS, _DISTANCES = 0, 1  # keys of the random streams
+
+
+class _Count(msgspec.Struct):
+    objects: Annotated[int, msgspec.Meta(ge=0)]
+    episodes: Annotated[int, msgspec.Meta(ge=1)]
+
+
+class _File(msgspec.Struct):
+    misplaced: list[_Count]
+    distances: list[Annotated[float, msgspec.Meta(ge=0.0)]]
+
+
+@dataclass(frozen=True)
+class Disorder:
+    """Disorder as it was observed.
+
+    Attributes:
+        misplaced: How many objects are out of place, in each episode.
+        distances: Of each of them over the floor to where it belongs, m, where that is known.
+    """
+
+    misplaced: tuple[int, ...]
+    distances: tuple[float, ...]
+
+    @classmethod
+    def load(cls, path: Path) -> "Disorder":
+        """Read the `disorder.json` of `mjsim import episodes`; `EpisodeError` where it cannot be read."""
+        try:
+            found = msgspec.json.decode(read_text(path), type=_File)
+        except (OSError, UnicodeDecodeError, msgspec.MsgspecError) as error:
+            raise EpisodeError(brief(f"cannot read disorder {path}: {error}")) from error
+        counts = tuple(c.objects for c in found.misplaced for _ in range(c.episodes))
+        if not any(counts) or not found.distances:
+            raise EpisodeError(f"{path} has no misplaced object with a distance; import other episodes")
+        return cls(counts, tuple(found.distances))
+
+    def tables(self) -> dict[str, list[dict[str, int]] | list[float]]:
+        """What `load` reads, to be written as JSON."""
+        counts = sorted(Counter(self.misplaced).items())
+        return {
+            "misplaced": [{"objects": n, "episodes": k} for n, k in counts],
+            "distances": sorted(self.distances),
+        }
+
+    def count(self, seed: int, most: int) -> int:
+        """A number of objects as often as it was observed, of those from 1 to `most`."""
+        fitting = [n for n in self.misplaced if 1 <= n <= most]
+        if not fitting:
+            raise EpisodeError(f"no episode has 1 to {most} misplaced objects; allow more")
+        return int(np.random.default_rng([seed, _COUNTS]).choice(fitting))
+
+    def assign(self, points: NDArray[np.float64], homes: NDArray[np.float64], seed: int) -> NDArray[np.intp]:
+        """Which point each object takes, so that it lies about as far from its home as objects were observed to.
+
+        Args:
+            points: Free points (p, 2), m.
+            homes: Where the objects belong (k, 2), m, k <= p.
+            seed: Of the distances that are drawn.
+
+        Returns:
+            Rows of `points`, shape (k,), none twice.
+        """
+        wanted = np.random.default_rng([seed, _DISTANCES]).choice(self.distances, len(homes))
+        reached = np.linalg.norm(points - homes[:, None], axis=2)
+        return np.asarray(linear_sum_assignment(np.abs(reached - wanted[:, None]))[1])
