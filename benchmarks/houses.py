@@ -199,7 +199,9 @@ def _kept(out: Path) -> Iterator[dict[str, Any]]:
 def _in_workers(
     run: Callable[[tuple[int, int]], T], homes: Sequence[tuple[int, int]], workers: int, what: str
 ) -> Iterator[T]:
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+    """In fresh processes, which compile their kernels with a home that does not count."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, initializer=figures, initargs=((ROOMS[0], 0),)) as pool:
         yield from track(pool.map(run, homes), what, total=len(homes), console=Console(stderr=True))
 
 

@@ -19,7 +19,7 @@ from mjsim.houses.values import FloorPlan, Furnishing, Mount, Palette, Placement
 
 ATTEMPTS = 6
 SIZES = 4  # a piece is made so often, each time smaller, for a lack of space
-BARE = 0.28  # of the floor
+BARE = 0.285  # of the floor
 IN_VAIN = 4  # so many tries, and a room is left as it is
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 BINS = {  # receptacle -> width, depth, height, m, and the uses of rooms that it belongs to, the best first
@@ -206,20 +206,28 @@ class Home:
     def _usual(self, space: Space, again: int = 0) -> None:
         use = self.uses[space.room.key]
         rng = stream(self.seed, "usual", space.room.key, *again * ["again"])
-        share = float(rng.uniform(*SHARES.get(use, (0.3, 0.38)))) + 0.08 * again
+        share = float(rng.uniform(*SHARES.get(use, (0.3, 0.38)))) + 0.1 * again
+        if again and use == "living_room" and space.share < share:
+            self.put(space, "dining", number=100)
         in_vain = 0
         first, *others = USUAL.get(use, (((), 0.0),))
         wishes = [first, *(others[i] for _ in range(ROUNDS) for i in rng.permutation(len(others)))]
         for number, (kinds, chance) in enumerate(wishes, 100 * again):
             order = [kinds[i] for i in rng.permutation(len(kinds))][:IN_VAIN]
-            if rng.random() < chance and (space.share < share or number == 0) and in_vain < IN_VAIN:
-                in_vain += not self._one_more(space, order, number)
+            if (
+                rng.random() < chance
+                and (space.share < share or number == 0)
+                and in_vain < IN_VAIN * (1 + again)
+            ):
+                in_vain += not self._one_more(space, order, number, again)
 
-    def _one_more(self, space: Space, kinds: Sequence[str], number: int) -> bool:
-        """The first of some kinds that has a place and is not yet there often enough."""
+    def _one_more(self, space: Space, kinds: Sequence[str], number: int, more: int) -> bool:
+        """The first of some kinds that has a place and is not yet there often enough; `more` than usual may be."""
         there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
         for kind in kinds:
-            if there.count(kind) < OFTEN.get(kind, 1) and self.put(space, kind, smallest=1, number=number):
+            if there.count(kind) < OFTEN.get(kind, 1) + more and self.put(
+                space, kind, smallest=1, number=number
+            ):
                 return True
         return False
 
