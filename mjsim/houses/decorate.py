@@ -7,7 +7,7 @@ import numpy as np
 from mjsim.houses.chance import stream
 from mjsim.houses.furniture.catalogue import KINDS
 from mjsim.houses.furniture.look import Look
-from mjsim.houses.furniture.piece import Piece, moved
+from mjsim.houses.furniture.piece import Piece, Spot, moved
 from mjsim.houses.space import BLINDS, WALL_GAP, Place, Space
 from mjsim.houses.values import BACK, SIDES, FloorPlan, Side, Window
 
@@ -38,6 +38,12 @@ def decorate(
     spaces: Sequence[Space], uses: Mapping[str, str], plan: FloorPlan, look: Look, seed: int
 ) -> None:
     """Add what is not furniture to all rooms; it takes no place from anybody but a radiator."""
+    for door in plan.doors:
+        if door.is_front:
+            space = next(s for s in spaces if s.room.key == door.rooms[0])
+            mat = KINDS["door_mat"].make(stream(seed, "door_mat"), look)
+            x, y = space.room.floor.along(door.side, door.center, door.center, 0.15, 0.15).center
+            space.stood.append((mat, Place(x, y, BACK[door.side], door.side, door.center)))
     for space in spaces:
         key, use = space.room.key, uses[space.room.key]
         for window in plan.windows_of(key):
@@ -45,12 +51,6 @@ def decorate(
         _lamps(space, look, stream(seed, "lamp", key))
         _rug(space, use, look, stream(seed, "rug", key))
         _walls(space, use, look, stream(seed, "wall", key))
-    for door in plan.doors:
-        if door.is_front:
-            space = next(s for s in spaces if s.room.key == door.rooms[0])
-            mat = KINDS["door_mat"].make(stream(seed, "door_mat"), look)
-            x, y = space.room.floor.along(door.side, door.center, door.center, 0.15, 0.15).center
-            space.stood.append((mat, Place(x, y, BACK[door.side], door.side, door.center)))
 
 
 def _at_wall(space: Space, side: Side, along: float) -> Place:
@@ -124,6 +124,7 @@ def _rug(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
         return
     kinds = _RUGS[use]
     kind = kinds[int(rng.integers(len(kinds)))]
+    taken = [*space.solids, *(_spot(piece, at) for piece, at in space.stood if piece.kind == "door_mat")]
     for smaller in (0, 1):
         rug = KINDS[kind].make(rng, look, smaller=smaller)
         if kind == "bath_mat":
@@ -132,12 +133,16 @@ def _rug(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
         else:
             places = _rug_places(space, rug)
         for place in places:
-            spot = moved((-rug.size[0] / 2, 0, rug.size[0] / 2, rug.size[1]), place.x, place.y, place.yaw)
+            spot = _spot(rug, place)
             if not any(
-                spot[0] < o[2] and o[0] < spot[2] and spot[1] < o[3] and o[1] < spot[3] for o in space.solids
+                spot[0] < o[2] and o[0] < spot[2] and spot[1] < o[3] and o[1] < spot[3] for o in taken
             ):
                 space.stood.append((rug, place))
                 return
+
+
+def _spot(piece: Piece, place: Place) -> Spot:
+    return moved((-piece.size[0] / 2, 0, piece.size[0] / 2, piece.size[1]), place.x, place.y, place.yaw)
 
 
 def _before(piece: Piece, place: Place) -> tuple[float, float]:

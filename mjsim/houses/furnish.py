@@ -13,7 +13,7 @@ from mjsim.houses.furniture.catalogue import KINDS
 from mjsim.houses.furniture.look import Look, draw_look
 from mjsim.houses.furniture.piece import Mount as Holder
 from mjsim.houses.furniture.piece import Piece, flattened, moved
-from mjsim.houses.space import Place, Space
+from mjsim.houses.space import UNUSED, Place, Space
 from mjsim.houses.usual import LITTLE, MUSTS, OFTEN, ROUNDS, SHARES, USUAL
 from mjsim.houses.values import FloorPlan, Furnishing, Mount, Palette, Placement, Rectangle, Side
 
@@ -225,9 +225,8 @@ class Home:
         """The first of some kinds that has a place and is not yet there often enough; `more` than usual may be."""
         there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
         for kind in kinds:
-            if there.count(kind) < OFTEN.get(kind, 1) + more and self.put(
-                space, kind, smallest=1, number=number
-            ):
+            often = OFTEN.get(kind, 1) + (kind not in UNUSED) * more
+            if there.count(kind) < often and self.put(space, kind, smallest=1, number=number):
                 return True
         return False
 
