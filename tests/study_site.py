@@ -81,7 +81,7 @@ class Site:
 
 
 @contextmanager
-def served(folder, settings="", researchers=ROLES):
+def served(folder, settings="", researchers=ROLES, workers=20):
     """A study with `settings` added to its file, and researchers of these names and roles."""
     (folder / "study.toml").write_text(CELLS + settings)
     (folder / "film.mp4").write_bytes(b"a film")
@@ -99,7 +99,7 @@ def served(folder, settings="", researchers=ROLES):
         visits, rng = Visits(folder / "visits"), np.random.default_rng(0)
         procedure = Procedure(site.study, phases_of_study(site.study), site.store, visits, rng)
         proxies = (ip_network("127.0.0.1/32"),)
-        serving = Serving(b"secret", folder / "film.mp4", proxies, metrics)
+        serving = Serving(b"secret", folder / "film.mp4", proxies, metrics, workers=workers)
         server = StudyServer(procedure, recruiter(site.study.settings.recruitment), site.pool, serving)
         site.people = server.app(HOST)
         watched = Watched(site.study, site.store, server.sessions, metrics)

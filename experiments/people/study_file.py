@@ -85,9 +85,8 @@ class Recruitment(_Table, frozen=True):
 
 
 class Limits(_Table, frozen=True):
-    """What ends a participation, and how many play at a time."""
+    """What ends a participation."""
 
-    sessions: Count = 20  # trials at a time; others wait
     idle: Seconds = 1800.0  # without a sign of the person, after which a trial gives its place away
     abandoned_after: Seconds = 1800.0  # without a sign of the person, after which the assignment is released
     timed_out_after: Seconds = 14400.0  # without a sign of the person, after which the participation ends

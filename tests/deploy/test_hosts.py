@@ -75,6 +75,8 @@ def hosts(tmp_path, certificate):
         url,
         "--trusted-proxy",
         "127.0.0.1",
+        "--workers",
+        "10",
         "--database",
         f"sqlite:///{tmp_path}/all.db",
     ]

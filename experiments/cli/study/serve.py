@@ -54,6 +54,12 @@ def add_parser(commands: Any) -> None:
     server = parser.add_argument_group("server")
     add_server_options(server)
     server.add_argument(
+        "--workers",
+        type=number(1, 10_000),
+        metavar="N",
+        help="trials at a time, each in a process; others wait (default: as many as the machine holds)",
+    )
+    server.add_argument(
         "--host-name", metavar="NAME", help="of this host, where several share a database (docs/deploy.md)"
     )
     group = parser.add_argument_group("researcher's page, health and metrics")
@@ -126,7 +132,14 @@ async def _serve(
     procedure = Procedure(study, phases_of_study(study), store, visits, np.random.default_rng())
     metrics = Metrics()
     store.on_write(metrics.wrote)
-    serving = Serving(_secret(arguments.out), film, arguments.trusted_proxy, metrics, arguments.host_name)
+    serving = Serving(
+        _secret(arguments.out),
+        film,
+        arguments.trusted_proxy,
+        metrics,
+        arguments.host_name,
+        arguments.workers,
+    )
     platform = recruiter(study.settings.recruitment)
     if study.rehearsal:
         platform.platform = REHEARSAL

@@ -62,7 +62,7 @@ async def dry_run(
     store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
     visits, rng = Visits(folder / VISITS), np.random.default_rng(0)
     procedure = Procedure(study, phases_of_study(study), store, visits, rng)
-    app = StudyServer(procedure, recruiter, pool, Serving(b"dry run")).app("127.0.0.1")
+    app = StudyServer(procedure, recruiter, pool, Serving(b"dry run", workers=1)).app("127.0.0.1")
     async with serving(app) as base:
         headers = {"Origin": base}
         async with httpx.AsyncClient(base_url=base, headers=headers, timeout=60.0) as client:

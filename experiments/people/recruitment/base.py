@@ -56,11 +56,13 @@ class Recruiter(Protocol):
     Attributes:
         platform: Its name in the study file.
         parameters: Names of what its links carry, which the first page keeps.
+        has_time_limit: Whether the platform ends a participation that takes too long.
         embedded_by: Sites whose pages show the study in a frame, and to which its last form may be sent.
     """
 
     platform: str
     parameters: tuple[str, ...]
+    has_time_limit: bool
     embedded_by: tuple[str, ...]
 
     def arrive(self, query: Mapping[str, str]) -> Arrival | Preview | Refusal:

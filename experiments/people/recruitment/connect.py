@@ -28,6 +28,7 @@ class Connect:
 
     platform = "connect"
     parameters: tuple[str, ...] = (PERSON, ASSIGNMENT, PROJECT)
+    has_time_limit = True
     embedded_by: tuple[str, ...] = ()
 
     def __init__(self, settings: Recruitment) -> None:

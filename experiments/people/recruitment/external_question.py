@@ -32,6 +32,7 @@ class ExternalQuestion:
 
     platform = "external-question"
     parameters: tuple[str, ...] = (ASSIGNMENT, TASK, PERSON, SITE)
+    has_time_limit = True
 
     def __init__(self, settings: Recruitment) -> None:
         self.embedded_by, self._task = settings.sites, settings.study_id

@@ -14,6 +14,7 @@ class OpenLink:
     """
 
     parameters: tuple[str, ...] = ()
+    has_time_limit = False
     embedded_by: tuple[str, ...] = ()
 
     def __init__(self, platform: str = "link", code: str = "") -> None:

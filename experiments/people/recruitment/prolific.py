@@ -25,6 +25,7 @@ class Prolific:
 
     platform = "prolific"
     parameters: tuple[str, ...] = (PERSON, STUDY, SUBMISSION)
+    has_time_limit = True
     embedded_by: tuple[str, ...] = ()
 
     def __init__(self, settings: Recruitment) -> None:

@@ -24,6 +24,7 @@ AWAY = 600.0  # s of the study's time that somebody who returns is away, at most
 DELAY = 0.2  # s that the first messages of a bad connection take
 CUTS = 3  # of a bad connection in a trial
 TRIES = 20  # connections to a trial, or sendings of a form, before somebody gives up
+QUEUED = 'http-equiv="refresh"'  # of the page of somebody who waits for a place
 PAUSE = 0.5  # s between two of them
 
 
@@ -92,6 +93,9 @@ class Person:
         planned, tries, before = self._planned, 0, ""
         while tries < TRIES:
             page = await self._get(self.rehearsed.link)
+            if QUEUED in page.text:
+                await asyncio.sleep(PAUSE)
+                continue
             found = SHOWN.search(page.text)
             if found is None:
                 return self._ended(page)

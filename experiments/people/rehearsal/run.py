@@ -21,6 +21,7 @@ from experiments.people.study_file import Study
 from mjsim.files import write_text_atomically
 
 SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
+WORKERS = "20"  # trials at a time; in a hurry, they need not be on time
 END_TIMEOUT = 60.0  # s that the server has to end
 HTTP_TIMEOUT = 120.0  # s
 KEEP_ALIVE = 2.0  # s, less than the server keeps a connection
@@ -94,7 +95,13 @@ async def _server(study: Study, settings: Settings, out: Path, film: Path | None
     """The study's server as a process of its own; its URL."""
     command = [sys.executable, "-m", "experiments.cli.main", "study", "serve", str(study.path)]
     command += ["--out", str(out / SERVED), "--rehearsal", str(settings.factor), "--port", "0", "--no-open"]
-    command += ["--trusted-proxy", "127.0.0.1", *(["--film", str(film)] if film else [])]
+    command += [
+        "--trusted-proxy",
+        "127.0.0.1",
+        "--workers",
+        WORKERS,
+        *(["--film", str(film)] if film else []),
+    ]
     with (out / SERVER_LOG).open("ab") as log:
         process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE, stderr=log)
         try:

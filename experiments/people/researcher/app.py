@@ -129,7 +129,9 @@ class ResearcherServer:
                 state = (await self._store.study()).state
         except (StoreError, TimeoutError):
             return JSONResponse({"database": "down"}, 503)
-        return JSONResponse({"database": "up", "study": state})
+        limit = self._watched.sessions.limit
+        sessions = {"capacity": limit.count, "in_use": len(limit.held), "waiting": limit.waiting}
+        return JSONResponse({"database": "up", "study": state, "sessions": sessions})
 
     async def _metrics(self, request: Request) -> Response:  # noqa: ARG002
         text = self._watched.metrics.text(await self._store.counts(), self._watched.sessions)

@@ -40,6 +40,8 @@ class Metrics(Meter):
         self._sessions = Gauge(
             "mjsim_sessions", "Sessions under way here, by phase.", ["phase"], registry=registry
         )
+        self._capacity = Gauge("mjsim_sessions_capacity", "Sessions that may run here.", registry=registry)
+        self._held = Gauge("mjsim_sessions_held", "Sessions that have a place here.", registry=registry)
         self._waiting = Gauge(
             "mjsim_sessions_waiting", "Sessions that wait for a place here.", registry=registry
         )
@@ -93,7 +95,9 @@ class Metrics(Meter):
                 self._places.labels(str(cell), state).set(getattr(count, state))
         for session in sessions.under_way.values():
             self._sessions.labels(session.state.phase).inc()
-        self._waiting.set(sessions.waiting)
+        self._capacity.set(sessions.limit.count)
+        self._held.set(len(sessions.limit.held))
+        self._waiting.set(sessions.limit.waiting)
         return generate_latest(self._registry)
 
 

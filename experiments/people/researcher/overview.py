@@ -98,7 +98,7 @@ async def overview(study: Study, store: Store, sessions: Sessions) -> Overview:
         _frames(checked),
         _frames(playing),
         await _payments(store),
-        sessions.waiting,
+        sessions.limit.waiting,
     )
 
 

@@ -52,6 +52,7 @@ class Serving:
         proxies: Whose word about the address of a person is believed.
         meter: Is told what sessions measure.
         host: Name of this host, where several share a database; None for the only one.
+        workers: How many trials may run at a time; None for as many as the machine holds.
     """
 
     secret: bytes
@@ -59,6 +60,7 @@ class Serving:
     proxies: tuple[Network, ...] = ()
     meter: Meter | None = None
     host: str | None = None
+    workers: int | None = None
 
 
 class _ElsewhereError(Exception):
@@ -78,7 +80,7 @@ class StudyServer:
         self._procedure, self._recruiter, self._serving = procedure, recruiter, serving
         self._study, self._store = procedure.study, procedure.store
         self._pool = pool
-        self._trials = Trials(procedure, pool, serving.meter)
+        self._trials = Trials(procedure, pool, serving.workers, serving.meter)
         self.sessions = self._trials.sessions
         self._pages = StudyPages(self._study, recruiter, len(procedure.phases))
         self._keys = Keys(serving.secret, self._study.settings.name)
@@ -269,7 +271,12 @@ class StudyServer:
 
     async def _played(self, request: Request, now: Now) -> Response:
         visit = await self._procedure.visit(now.person, request.path_params["token"])
-        return self._pages.message(request, "full") if visit is None else self._trials.page(request, visit)
+        if visit is None:
+            return self._pages.message(request, "full")
+        if (queued := self._trials.queued(visit)) is not None:
+            await self._store.beat(now.person.id)  # who waits is there
+            return self._pages.queue(request, now, queued)
+        return self._trials.page(request, visit)
 
     async def _out_of_order(self, request: Request, error: Exception) -> Response:
         LOG.error("%s", error)

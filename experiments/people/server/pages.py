@@ -1,5 +1,6 @@
 """The pages that people see: those of phases, the last one, and messages."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ from starlette.responses import Response
 from experiments.people.phases.base import Again
 from experiments.people.recruitment.base import Leaving, Recruiter
 from experiments.people.server.procedure import Now
+from experiments.people.server.trials import Queued
 from experiments.people.store import Person
 from experiments.people.study_file import CONSENT, Study
 from experiments.web.server.pages import page
@@ -60,6 +62,15 @@ class StudyPages:
         values = {**shown.values, "paragraphs": section.paragraphs(), "completion": section}
         back = self._recruiter.way_back("finished", identity)
         return self.show(request, shown.template, **values, back=back, finished=True)
+
+    def queue(self, request: Request, now: Now, queued: Queued) -> Response:
+        """The page of somebody who waits for a place; it loads itself again."""
+        section = self._study.texts["queue"]
+        values = {"place": str(queued.position), "wait": str(max(1, round(queued.wait / 60.0)))}
+        texts = [*section.paragraphs(), *section.paragraphs("time_limit")[: self._recruiter.has_time_limit]]
+        filled = [re.sub(r"\{(place|wait)\}", lambda found: values[found[1]], text) for text in texts]
+        around = {**self._around(now), "section": section, "paragraphs": filled}
+        return self.show(request, "queue", **around, refresh=round(queued.refresh))
 
     def _around(self, now: Now) -> dict[str, Any]:
         """What the pages of all phases have."""

@@ -4,6 +4,7 @@ import asyncio
 import logging
 from collections import Counter
 from contextlib import suppress
+from dataclasses import dataclass
 
 from starlette.requests import Request
 from starlette.responses import Response
@@ -13,6 +14,7 @@ from experiments.errors import StoreError
 from experiments.people.server.procedure import Procedure
 from experiments.people.store import Person
 from experiments.web.server.browser_socket import BrowserSocket
+from experiments.web.server.capacity import Capacity, usable_cores
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.meter import Meter
 from experiments.web.server.pages import page
@@ -25,6 +27,23 @@ BEAT_PERIOD = 60.0  # s between two notes that somebody is still there
 SOCKETS_OF_A_PERSON = 2  # open at a time
 REAL_TIME_EVERY = 20  # people of a rehearsal of whom one plays in real time
 NEVER = 1e9  # s; as good as for ever
+REFRESH = 10.0, 30.0  # s after which a page in the queue asks again, at least and at most
+PATIENCE = 2.5  # times as long others wait for it
+
+
+@dataclass(frozen=True)
+class Queued:
+    """Somebody who waits for a place.
+
+    Attributes:
+        position: 1 for who is next.
+        wait: How long that is expected to take, s.
+        refresh: After which the page is to ask again, s.
+    """
+
+    position: int
+    wait: float
+    refresh: float
 
 
 class Trials:
@@ -33,19 +52,33 @@ class Trials:
     Args:
         procedure: Of the study.
         pool: Makes workers.
+        workers: How many trials may run at a time; None for as many as the machine holds.
         meter: Is told what sessions measure.
 
     Attributes:
         sessions: Those under way.
     """
 
-    def __init__(self, procedure: Procedure, pool: WorkerPool, meter: Meter | None) -> None:
+    def __init__(
+        self, procedure: Procedure, pool: WorkerPool, workers: int | None, meter: Meter | None
+    ) -> None:
         self._study, self._store = procedure.study, procedure.store
         settings = self._study.settings
         self._minimum = {name: 0.0 if name in settings.optional else NEVER for name in PLAYED}
-        limit = SessionLimit(settings.limits.sessions)
-        self.sessions = Sessions(pool, limit, settings.limits.idle, self._minimum, meter)
+        capacity = Capacity(usable_cores()) if workers is None else None
+        self._limit = SessionLimit(workers or (capacity.measure({}, ()) if capacity else 1))
+        self.sessions = Sessions(pool, self._limit, settings.limits.idle, self._minimum, meter, capacity)
+        self._usual = 60.0 * settings.minutes  # of the whole study, until trials have ended
         self._sockets: Counter[int] = Counter()  # by person
+
+    def queued(self, visit: Visit) -> Queued | None:
+        """Where a visit is in the queue; None if its trial may run."""
+        wait = self._limit.expected_wait(self._limit.waiting + 1, self._usual)
+        refresh = min(max(REFRESH[0], wait / 10.0), REFRESH[1])
+        position = self._limit.ask(visit.name, PATIENCE * refresh)
+        if position is None:
+            return None
+        return Queued(position, self._limit.expected_wait(position, self._usual), refresh)
 
     def page(self, request: Request, visit: Visit) -> Response:
         """The page of the trial that is next or under way."""

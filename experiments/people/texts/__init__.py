@@ -14,7 +14,7 @@ from mjsim.files import read_bytes
 FOLDER = Path(__file__).parent
 _PLACE = re.compile(r"\{(\w+)\}")
 # Places of texts that pages fill in themselves.
-_LATER = frozenset({"step", "steps"})
+_LATER = frozenset({"step", "steps", "place", "wait"})
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

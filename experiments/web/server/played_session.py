@@ -96,6 +96,13 @@ class PlayedSession:
             maxlen=MAX_AHEAD
         )  # inputs that are not safe yet, and when
 
+    @property
+    def processor_time(self) -> float | None:
+        """Of the worker, s; None while the clock does not run."""
+        if self._worker is None or self.state.phase is not RUNNING:
+            return None
+        return self._worker.processor_time()
+
     def attach(self, browser: Browser, view: View) -> None:
         """Connect a browser; it replaces the one before."""
         if self.browser is not None:
@@ -106,7 +113,7 @@ class PlayedSession:
         self.take(view)
         if self._task is None:
             self._task = asyncio.create_task(self._run())
-        elif (position := self._limit.position(self._tell_position)) is not None:
+        elif (position := self._limit.position(self.visit.name)) is not None:
             browser.send(protocol.Queue(position))
         else:
             browser.send(self.state)
@@ -118,7 +125,7 @@ class PlayedSession:
         self.browser = None
         self.heard = time.monotonic()
         self._pause("disconnected")
-        if self._limit.position(self._tell_position) is not None:
+        if self._limit.position(self.visit.name) is not None:
             asyncio.get_running_loop().call_later(QUEUE_TIMEOUT, self._leave_queue)
 
     def take(self, message: Any) -> Error | None:
@@ -181,7 +188,7 @@ class PlayedSession:
         self._send(Pause(reason))
 
     def _leave_queue(self) -> None:
-        waits = self._limit.position(self._tell_position) is not None
+        waits = self._limit.position(self.visit.name) is not None
         if self.browser is None and waits and self._task is not None:
             self._task.cancel()
             self._task = None
@@ -204,11 +211,13 @@ class PlayedSession:
 
     async def _run(self) -> None:
         """Play what is left of the visit."""
-        await self._limit.acquire(self._tell_position)
-        self.heard = time.monotonic()  # who waits in the queue need do nothing
+        name, duration = self.visit.name, None
+        await self._limit.acquire(name, self._tell_position)
+        self.heard = began = time.monotonic()  # who waits in the queue need do nothing
         try:
             while self.visit.phase in PLAYED:
                 await self._play(self.visit.phase)
+            duration = time.monotonic() - began
         except OSError as error:
             LOG.error("session %s: %s", self.visit.name[:12], error)
             self._set(State(FAILED, FAILURE))
@@ -216,7 +225,7 @@ class PlayedSession:
             LOG.exception("session %s", self.visit.name[:12])
             self._set(State(FAILED, FAILURE))
         finally:
-            self._limit.release()
+            self._limit.release(name, duration)
             self._discard_worker()
             if self._task is asyncio.current_task():
                 self._task = None

@@ -9,6 +9,7 @@ import time
 from contextlib import suppress
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 from experiments.web.protocol import WireMessage, decode_from_worker, encode
@@ -45,6 +46,14 @@ class WorkerProcess:
     async def receive(self) -> Any:
         """The next message, or None if the worker is dead."""
         return await self._received.get()
+
+    def processor_time(self) -> float | None:
+        """Processor time of the process, s; None where it is not known."""
+        try:
+            fields = Path(f"/proc/{self._process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            return None
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def end(self) -> None:
         """End the process, and wait for that; the journal keeps what was acknowledged."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from experiments.web import protocol
+from experiments.web.server.capacity import Capacity
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.meter import Meter
 from experiments.web.server.played_session import PlayedSession
@@ -17,7 +18,10 @@ MAX_AWAY = 20.0  # s that a place is kept without a page while others wait
 
 
 class Sessions:
-    """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back."""
+    """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back.
+
+    With a `capacity`, the limit follows what the machine holds.
+    """
 
     def __init__(
         self,
@@ -26,9 +30,10 @@ class Sessions:
         idle: float,
         minimum: Mapping[str, float],
         meter: Meter | None = None,
+        capacity: Capacity | None = None,
     ) -> None:
         self._pool, self._limit, self._idle, self._minimum = pool, limit, idle, minimum
-        self._meter = meter
+        self._meter, self._capacity = meter, capacity
         self._sessions: dict[str, PlayedSession] = {}
         self._scenes: dict[str, str] = {}  # by house, of those that a worker has named
 
@@ -52,19 +57,21 @@ class Sessions:
         return self._sessions
 
     @property
-    def waiting(self) -> int:
-        """How many of them wait for a place."""
-        return self._limit.waiting
+    def limit(self) -> SessionLimit:
+        """How many there may be, and who waits."""
+        return self._limit
 
     def scene(self, settings: Mapping[str, Any]) -> str | None:
         """Folder of the files that the page of a trial will probably draw; None where that is not known."""
         return None if settings["draw"] == "server" else self._scenes.get(settings["house"])
 
     async def watch(self) -> None:
-        """Release sessions whose person is gone, for ever."""
+        """Release sessions whose person is gone, and learn how many the machine holds, for ever."""
         while True:
             await asyncio.sleep(WATCH_PERIOD)
             await self.release(self._is_idle)
+            learnt = self._capacity and self._capacity.measure(self._sessions, self._limit.held)
+            self._limit.resize(learnt or self._limit.count)
 
     async def release(self, which: Callable[[PlayedSession], bool] = lambda _: True) -> None:
         """Release the sessions that `which` chooses."""

@@ -19,6 +19,7 @@ from experiments.cli.main import main
 from experiments.errors import StoreError
 from experiments.people.researcher.access import ATTEMPTS, COOKIE, Access
 from experiments.web.protocol import Snapshot
+from experiments.web.server.capacity import usable_cores
 from experiments.web.server.visits import token_hash
 
 PHASES = 'phases = ["consent", "task", "survey", "completion"]\n'
@@ -210,7 +211,10 @@ def test_health_and_metrics_need_no_login_and_tell_numbers(site, monkeypatch):
     assert found["mjsim_sessions", "ready"] == found["mjsim_input_acknowledged_seconds_count",] == 1
     assert found["mjsim_database_write_seconds_count",] > 3
     assert found["mjsim_http_answer_seconds_count", "3xx"] == 2
-    assert site.client(researcher=True).get("/health").json() == {"database": "up", "study": "open"}
+    assert found["mjsim_sessions_capacity",] == 20 and found["mjsim_sessions_waiting",] == 0
+    sessions = {"capacity": 20, "in_use": 1, "waiting": 0}
+    health = site.client(researcher=True).get("/health").json()
+    assert health == {"database": "up", "study": "open", "sessions": sessions}
 
     async def fail(_):
         raise StoreError("gone")
@@ -277,7 +281,8 @@ def test_a_served_study_has_both_ports_logs_json_and_ends_as_a_whole(tmp_path):
     )
     url, researcher_url = (process.stdout.readline().strip() for _ in range(2))
     assert httpx.post(f"{url}begin", headers={"Origin": url.rstrip("/")}, timeout=200).status_code == 303
-    assert httpx.get(f"{researcher_url}health", timeout=60).json() == {"database": "up", "study": "open"}
+    health = httpx.get(f"{researcher_url}health", timeout=60).json()
+    assert health["database"] == "up" and health["sessions"]["capacity"] == int(0.7 * 3 * usable_cores())
     assert 'mjsim_people{status="arrived"} 1.0' in httpx.get(f"{researcher_url}metrics", timeout=60).text
     process.terminate()
     _, log = process.communicate(timeout=60)

@@ -51,7 +51,8 @@ def serving(folder, study):
         visits, rng = Visits(folder / "visits"), np.random.default_rng(0)
         procedure = Procedure(study, phases_of_study(study), store, visits, rng)
         came_from = recruiter(study.settings.recruitment)
-        return StudyServer(procedure, came_from, ScriptedPool(), Serving(b"secret", film)).app("127.0.0.1")
+        needs = Serving(b"secret", film, workers=20)
+        return StudyServer(procedure, came_from, ScriptedPool(), needs).app("127.0.0.1")
 
     with TestClient(MadeInItsLoop(make), base_url=ORIGIN, follow_redirects=False) as client:
         yield client
