@@ -1,13 +1,15 @@
 """Signals that ask a process to stop: Ctrl-C, SIGTERM (what clusters send) and SIGHUP (a terminal that is closed)."""
 
+import asyncio
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+T = TypeVar("T")
 PATIENCE = 2.0  # s that a trial has to notice a signal, before it is interrupted wherever it is
 
 
@@ -92,6 +94,33 @@ def signals_postponed() -> Iterator[PostponedSignals]:
     postponed = PostponedSignals()
     with _handled(postponed.note):
         yield postponed
+
+
+def run_until_signal(work: Coroutine[Any, Any, T]) -> T:
+    """What a coroutine gives, as `asyncio.run` does it; a signal cancels it, so that it tidies up.
+
+    Raises:
+        Stopped: A signal came.
+    """
+    came: list[int] = []
+
+    async def watched() -> T:
+        task, loop = asyncio.current_task(), asyncio.get_running_loop()
+
+        def stop(number: int, _frame: FrameType | None) -> None:
+            if task is not None and not came:  # it is tidying up after the first one
+                came.append(number)
+                loop.call_soon_threadsafe(task.cancel)
+
+        with _handled(stop):
+            return await work
+
+    try:
+        return asyncio.run(watched())
+    except asyncio.CancelledError:
+        if came:
+            raise Stopped(came[0]) from None
+        raise
 
 
 @contextmanager

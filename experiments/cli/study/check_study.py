@@ -1,7 +1,6 @@
 """`mjsim study check`: whether a study is ready for people."""
 
 import argparse
-import asyncio
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,6 +10,7 @@ from experiments.cli.options import add_command
 from experiments.cli.requirements import require_extra
 from experiments.cli.server import prepare_process
 from experiments.errors import ConfigError
+from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
     from experiments.people.readiness.dry_run import Walked
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         played = simulate(study, Path(folder), lambda name: _progress(f"simulating {name}"))
     with TemporaryDirectory() as folder:
         _progress("going through the study")
-        walked = asyncio.run(_walk(study, _recruiter(study), Path(folder), pool, arguments.out))
+        walked = run_until_signal(_walk(study, _recruiter(study), Path(folder), pool, arguments.out))
     _progress("")
     seconds = durations(study, phases, walked.words, played)
     rest, tasks = sum(seconds.values()) - seconds["task"], played.tasks.values()

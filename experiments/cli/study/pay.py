@@ -1,7 +1,6 @@
 """`mjsim study pay`: who gets what, and what was paid."""
 
 import argparse
-import asyncio
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from experiments.cli.options import add_command
 from experiments.cli.requirements import require_extra
 from experiments.cli.study.database import add_database, add_served_study, database_url
 from experiments.errors import ConfigError
+from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
     from experiments.people.recruitment.payer import Payer
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         first, second = (name.replace("_", "-") for name in wanted[:2])
         raise ConfigError(f"--{first} and --{second} cannot be used at once; leave out one of them")
     study = read_people_study(study_path(arguments.study))
-    return asyncio.run(_run(study, arguments))
+    return run_until_signal(_run(study, arguments))
 
 
 async def _run(study: "Study", arguments: argparse.Namespace) -> int:

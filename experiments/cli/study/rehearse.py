@@ -1,7 +1,6 @@
 """`mjsim study rehearse`: a whole study with simulated people, before real ones come."""
 
 import argparse
-import asyncio
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from experiments.cli.options import add_command
 from experiments.cli.requirements import require_extra
 from experiments.cli.server import number
 from experiments.errors import ConfigError
+from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
     from experiments.people.rehearsal.person import Rehearsed
@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     settings = Settings(
         study.sha256, people, arguments.seed, arguments.per_minute, arguments.dropouts, arguments.factor
     )
-    found = asyncio.run(_run(study, settings, arguments))
+    found = run_until_signal(_run(study, settings, arguments))
     for fault in found.faults[:SHOWN]:
         print(fault)
     if len(found.faults) > SHOWN:

@@ -3,10 +3,17 @@
 import asyncio
 import socket
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
 from typing import Any
 
 import uvicorn
+
+
+class _Server(uvicorn.Server):
+    """Leaves signals to the command."""
+
+    def capture_signals(self) -> AbstractContextManager[None]:  # type: ignore[override]
+        return nullcontext()
 
 
 @asynccontextmanager
@@ -17,7 +24,7 @@ async def serving(app: Any) -> AsyncIterator[str]:
             app, log_config=None, access_log=False, log_level="error", ws="websockets-sansio",
             timeout_graceful_shutdown=3,
         )  # fmt: skip
-        server = uvicorn.Server(config)
+        server = _Server(config)
         task = asyncio.create_task(server.serve(sockets=[listener]))
         try:
             while not server.started and not task.done():

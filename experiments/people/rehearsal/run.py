@@ -103,7 +103,9 @@ async def _server(study: Study, settings: Settings, out: Path, film: Path | None
         *(["--film", str(film)] if film else []),
     ]
     with (out / SERVER_LOG).open("ab") as log:
-        process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE, stderr=log)
+        process = await asyncio.create_subprocess_exec(
+            *command, stdout=asyncio.subprocess.PIPE, stderr=log, start_new_session=True
+        )  # Ctrl-C is for this process alone
         try:
             url = (await process.stdout.readline()).decode().strip() if process.stdout else ""
             if not url:

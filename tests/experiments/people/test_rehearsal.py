@@ -109,13 +109,16 @@ def test_a_small_study_is_rehearsed_continued_and_consistent(tmp_path, study, ca
     words = ["study", "rehearse", str(study), "--people", "6", "--seed", "0", "--dropouts", "0.4"]
     words += ["--per-minute", "8", "--out", str(out)]
     command = [sys.executable, "-m", "experiments.cli.main", *words]
-    first = subprocess.Popen(command, env=os.environ, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    first = subprocess.Popen(command, env=os.environ, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + PATIENCE
     while not ended(out) and first.poll() is None:
         assert time.monotonic() < until
         time.sleep(0.1)
     first.send_signal(signal.SIGTERM)
-    first.wait(PATIENCE)
+    _, said = first.communicate(timeout=PATIENCE)
+    assert first.returncode == 128 + signal.SIGTERM
+    assert said.splitlines()[-1] == "mjsim: stopped by SIGTERM; what was finished is kept"
+    assert "Traceback" not in said
     before = ended(out)
     assert main(words) == 0, (out / "rehearsal.json").read_text()
     assert Counter(ended(out)) == dict.fromkeys(range(6), 1) and ended(out)[: len(before)] == before
