@@ -147,14 +147,11 @@ def measure(
         rooms: Sizes.
         first_seed: Of the first home; the others follow.
         workers: Processes.
-        out: Folder that keeps the figures of every home; those that are there are not measured again.
+        out: Folder that keeps the figures of every home; those of the same generator are not measured again.
     """
     each = count or (QUICK if quick else COUNT)
     homes = [(size, first_seed + each * (size - ROOMS[0]) + i) for i in range(each) for size in rooms]
-    code = digest_of(
-        *(ROOT / "mjsim" / name for name in ("houses", "model", "scene_export")),
-        Path(__file__).parent / "support",
-    )
+    code = digest_of(*(ROOT / "mjsim" / name for name in ("houses", "model", "scene_export")))
     rows = {(row["rooms"], row["seed"]): row for row in _kept(out) if row["code"] == code}
     missing = [home for home in homes if home not in rows]
     out.mkdir(parents=True, exist_ok=True)
