@@ -9,7 +9,7 @@ from experiments.people.collect import person_name
 from experiments.people.store import PaymentEvent, Person, Store, TrialRow
 from experiments.people.store.ledger import ONCE
 from experiments.people.store.values import PaymentKind
-from experiments.people.study_file import Pay, Study
+from experiments.people.study_file import PLAYED, Pay, Study
 from experiments.record.phases import TASK
 from experiments.session.endings import ALL_DELIVERED
 
@@ -50,7 +50,17 @@ def due(
             if person.id in delivered:
                 found.append(_due(person, "bonus", pay.bonus_for_all, pay, "put everything away"))
         elif person.status == "screened_out":
-            found.append(_due(person, "screen_out", pay.screen_out, pay, f"screened out by {person.phase}"))
+            if person.phase not in PLAYED:
+                found.append(
+                    _due(person, "screen_out", pay.screen_out, pay, f"screened out by {person.phase}")
+                )
+                continue
+            found.append(_due(person, "screen_out", pay.screen_out, pay, "no place was left"))
+            done = phases.index(person.phase)
+            more = pay.reward * done / len(phases) - pay.screen_out
+            if pay.partial and more > 0.0:
+                why = f"no place was left after {done} of {len(phases)} phases"
+                found.append(_due(person, "bonus", more, pay, why))
         elif person.status in ("withdrawn", "timed_out") and pay.partial and person.phase in phases:
             done = phases.index(person.phase)
             if done >= phases.index(TASK):

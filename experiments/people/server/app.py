@@ -18,9 +18,10 @@ from starlette.websockets import WebSocket
 from experiments.errors import StoreError
 from experiments.people.phases.base import Again
 from experiments.people.phases.played import Played
-from experiments.people.recruitment.base import Arrival, Preview, Recruiter, Refusal
+from experiments.people.recruitment.base import Recruiter
 from experiments.people.retention import forget_daily
 from experiments.people.server.absence import end_absent
+from experiments.people.server.arrivals import Arrivals
 from experiments.people.server.host import HostOfVisits
 from experiments.people.server.keys import Keys
 from experiments.people.server.pages import StudyPages
@@ -28,16 +29,15 @@ from experiments.people.server.procedure import Now, Procedure
 from experiments.people.server.trials import Trials
 from experiments.people.store import Person
 from experiments.web.server.form import sent_form
-from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
+from experiments.web.server.guards import Guards, Network, allowed_hosts
 from experiments.web.server.meter import Meter
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.scene_files import scene_route
 from experiments.web.server.static_files import static_routes
-from experiments.web.server.visits import TOKEN, new_token, token_hash
+from experiments.web.server.visits import TOKEN, token_hash
 from mjsim.scene_export.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
-NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
 MAX_FORM = 64 * 1024  # bytes
 
@@ -83,8 +83,8 @@ class StudyServer:
         self._trials = Trials(procedure, pool, serving.workers, serving.meter)
         self.sessions = self._trials.sessions
         self._pages = StudyPages(self._study, recruiter, len(procedure.phases))
-        self._keys = Keys(serving.secret, self._study.settings.name)
-        self._new = Rate(*NEW_PEOPLE)
+        keys = Keys(serving.secret, self._study.settings.name)
+        self._arrivals = Arrivals(procedure, recruiter, self._pages, keys)
         self._host = (
             None if serving.host is None else HostOfVisits(serving.host, self._store, procedure.visits)
         )
@@ -94,8 +94,8 @@ class StudyServer:
         """The ASGI application that listens at `host`; `public` is the URL under which a proxy makes it public."""
         return Starlette(
             routes=[
-                Route("/", self._welcome),
-                Route("/begin", self._begin, methods=["POST"]),
+                Route("/", self._arrivals.welcome),
+                Route("/begin", self._arrivals.begin, methods=["POST"]),
                 Route("/play/{token}", self._show),
                 Route("/play/{token}", self._submit, methods=["POST"]),
                 Route("/play/{token}/answers", self._save, methods=["POST"]),
@@ -149,51 +149,6 @@ class StudyServer:
                 with suppress(StoreError):  # it is silent soon
                     await self._host.leave()
             await self._store.close()
-
-    async def _welcome(self, request: Request) -> Response:
-        came = self._recruiter.arrive(request.query_params)
-        if isinstance(came, Refusal):
-            LOG.warning("a link was refused: %s", came.reason)
-            return self._pages.message(request, "unknown", 400)
-        if isinstance(came, Arrival) and came.key is not None:
-            token = self._keys.token(came.key)
-            if await self._store.find(token_hash(token)) is not None:
-                return await self._arrive(came, token)
-        if (closed := await self._closed()) is not None:
-            return self._pages.message(request, closed)
-        given = {name: request.query_params.get(name, "") for name in self._recruiter.parameters}
-        return self._pages.show(
-            request,
-            "welcome",
-            section=self._study.texts["welcome"],
-            parameters=given,
-            remembers=self._recruiter.platform == "link",
-            forgets=self._recruiter.platform == "lab",
-            preview=isinstance(came, Preview),
-        )
-
-    async def _begin(self, request: Request) -> Response:
-        if not self._new.allows(request.client.host if request.client else ""):
-            return self._pages.message(request, "paused", 429)
-        came = self._recruiter.arrive(
-            {name: str(value) for name, value in (await sent_form(request)).items()}
-        )
-        if not isinstance(came, Arrival):
-            return self._pages.message(request, "unknown", 400)
-        token = new_token() if came.key is None else self._keys.token(came.key)
-        if await self._store.find(token_hash(token)) is None and (closed := await self._closed()) is not None:
-            return self._pages.message(request, closed)
-        return await self._arrive(came, token)
-
-    async def _arrive(self, came: Arrival, token: str) -> Response:
-        """Note who comes, or comes again."""
-        key = None if came.key is None else self._keys.person(came.key)
-        person = await self._store.arrive(
-            self._recruiter.platform, key, came.identity, token_hash(token), self._procedure.phases[0].name
-        )
-        if not person.returning:
-            LOG.info("person %d arrives", person.id)
-        return RedirectResponse(f"/play/{token}", 303)
 
     async def _show(self, request: Request) -> Response:
         person = await self._person(request)
@@ -272,7 +227,8 @@ class StudyServer:
     async def _played(self, request: Request, now: Now) -> Response:
         visit = await self._procedure.visit(now.person, request.path_params["token"])
         if visit is None:
-            return self._pages.message(request, "full")
+            person = await self._procedure.turn_away(now.person)
+            return self._pages.left(request, person)
         if (queued := self._trials.queued(visit)) is not None:
             await self._store.beat(now.person.id)  # who waits is there
             return self._pages.queue(request, now, queued)
@@ -284,11 +240,6 @@ class StudyServer:
 
     async def _unknown(self, request: Request, _: Exception) -> Response:
         return self._pages.message(request, "unknown", 404)
-
-    async def _closed(self) -> str | None:
-        """Why nobody new may come: the name of a text; None if people may."""
-        state = (await self._store.study()).state
-        return {"open": None, "paused": "paused"}.get(state, "full")
 
     async def _elsewhere(self, request: Request, _: Exception) -> Response:
         """With 404 a proxy asks the next host; where there is none, the person reads this."""

@@ -12,7 +12,7 @@ from experiments.people.recruitment.base import Leaving, Recruiter
 from experiments.people.server.procedure import Now
 from experiments.people.server.trials import Queued
 from experiments.people.store import Person
-from experiments.people.study_file import CONSENT, Study
+from experiments.people.study_file import CONSENT, PLAYED, Study
 from experiments.web.server.pages import page
 
 
@@ -42,6 +42,19 @@ class StudyPages:
         heading = {"title": words[f"{name}_title"]}
         return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
 
+    def closed(self, request: Request, name: str) -> Response:
+        """The page of somebody who may not begin, by the name of its text."""
+        words, platform = self._study.texts["welcome"], self._recruiter.platform
+        return self.show(
+            request,
+            "closed",
+            section={"title": words[f"{name}_title"]},
+            paragraphs=[words[name]],
+            completion=self._study.texts["completion"],
+            back=self._recruiter.way_back("withdrawn", {}),
+            remembers=platform == "link",
+        )
+
     def phase(
         self, request: Request, now: Now, identity: Mapping[str, str], refused: Again | None = None
     ) -> Response:
@@ -54,7 +67,7 @@ class StudyPages:
             refused: What was wrong with what was sent.
         """
         if now.phase is None:
-            return self._left(request, now.person)
+            return self.left(request, now.person)
         shown = now.phase.page(now.visitor, refused)
         if now.number < self._steps:
             return self.show(request, shown.template, **{**self._around(now), **shown.values})
@@ -88,14 +101,20 @@ class StudyPages:
             "story_title": self._study.texts["story"]["title"],
         }
 
-    def _left(self, request: Request, person: Person) -> Response:
+    def left(self, request: Request, person: Person) -> Response:
         """The last page of somebody who did not finish."""
         names: Mapping[str, tuple[str, str, Leaving]] = {
             "no_consent": ("consent", "declined", "no_consent"),
             "withdrawn": ("withdrawal", "left", "withdrawn"),
             "screened_out": (person.phase, "failed", "screened_out"),
         }
+        if person.status == "screened_out" and person.phase in PLAYED:
+            return self._last(request, "welcome", "no_place", "screened_out")
         section, text, how = names.get(person.status, ("welcome", "timed_out", "timed_out"))
+        return self._last(request, section, text, how)
+
+    def _last(self, request: Request, section: str, text: str, how: Leaving) -> Response:
+        """A last page, by the section and the name of its text."""
         words = self._study.texts[section]
         return self.show(
             request,

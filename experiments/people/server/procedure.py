@@ -19,6 +19,7 @@ from experiments.trials.training import training_config
 from experiments.web.server.visits import Ended, Visit, Visits
 
 TRAINING_LIMIT = 24 * 3600.0  # s; as good as none
+FULL = "full"  # why a phase ended for somebody who got no place
 ATTEMPTS = "attempts"  # answer in which the attempts at a phase are counted
 
 
@@ -121,13 +122,26 @@ class Procedure:
         if delete:
             await asyncio.to_thread(self.visits.remove, person.token_hash)
 
+    async def room(self) -> int:
+        """How many places are free to whom nobody is on the way."""
+        wanted = [len(cell.trials) for cell in self.study.cells]
+        return await self.store.room(wanted, self._names[0], self._away)
+
+    async def turn_away(self, person: Person) -> Person:
+        """End the participation of somebody for whom there is no place."""
+        here = person.phase
+        await self.store.finish_phase(person.id, here, here, {}, FULL, status="screened_out")
+        return await self.store.person(person.id)
+
+    @property
+    def _away(self) -> datetime.timedelta:
+        return datetime.timedelta(seconds=self.study.settings.limits.abandoned_after)
+
     async def _assign(self, person: Person) -> Assignment | None:
-        settings, trials = self.study.settings, (cell.trials for cell in self.study.cells)
+        trials = (cell.trials for cell in self.study.cells)
         quotas = [CellQuota(len(each), [trial.house_seed for trial in each]) for each in trials]
-        away = datetime.timedelta(seconds=settings.limits.abandoned_after)
-        return await self.store.assign(
-            person.id, quotas, settings.assignment, self._rng, abandoned_after=away
-        )
+        rule = self.study.settings.assignment
+        return await self.store.assign(person.id, quotas, rule, self._rng, abandoned_after=self._away)
 
     def _trials(self, place: Assignment) -> Mapping[str, dict[str, Any]]:
         task = msgspec.structs.replace(

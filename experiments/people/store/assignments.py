@@ -72,6 +72,36 @@ class Assignments(Part):
 
         return await self._database.write(work)
 
+    async def room(
+        self, wanted: Sequence[int], first: str, abandoned_after: timedelta, now: datetime | None = None
+    ) -> int:
+        """How many places are free, less the people who are on their way to one; below 0 if they are too many.
+
+        Args:
+            wanted: What the study file wants of each cell.
+            first: The first phase; who is still in it is not yet on the way.
+            abandoned_after: Time without a sign of life after which nobody counts, as in :meth:`assign`.
+            now: The time, with its zone.
+        """
+        since = (now or utc_now()) - abandoned_after
+        mine, there = person.c.study_id == self._study_id, person.c.seen >= since
+        coming = select(func.count()).where(
+            mine, there, person.c.status == "arrived", person.c.phase != first
+        )
+        taken = (
+            select(assignment.c.cell, func.count())
+            .join(person, person.c.id == assignment.c.person_id)
+            .where(mine, assignment.c.active == 1, or_(assignment.c.state == "finished", there))
+            .group_by(assignment.c.cell)
+        )
+        async with self._database.reading() as connection:
+            changed = select(study.c.quotas).where(study.c.id == self._study_id)
+            quotas = dict((await connection.execute(changed)).scalar_one())
+            counts = await _tally(connection, taken)
+            on_the_way = (await connection.execute(coming)).scalar_one()
+        free = (quotas.get(str(cell), count) - counts.get(cell, 0) for cell, count in enumerate(wanted))
+        return int(sum(max(0, number) for number in free) - on_the_way)
+
     async def assignment(self, person_id: int) -> Assignment | None:
         """The place that a person has or had."""
         async with self._database.reading() as connection:

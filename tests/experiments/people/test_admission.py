@@ -10,6 +10,7 @@ from scripted_workers import hello
 from study_site import phase_of, served
 from websockets.sync.client import connect
 
+from experiments.people.payments import due
 from experiments.web.server import capacity
 from experiments.web.server.capacity import MOST, Capacity
 
@@ -19,14 +20,18 @@ CODES = 'completed = "C0MPLETE"\nscreened_out = "C0UT"\nno_consent = "C0NO"\n'
 
 def at_the_task(site, client, number=0):
     """Somebody who asks for the page of the task: the link."""
-    ids = {
-        "PROLIFIC_PID": f"person{number:06}",
-        "STUDY_ID": "study000001",
-        "SESSION_ID": f"session{number:06}",
-    }
-    link = site.begin(client, **ids)
-    client.post(link, data={"phase": "consent", "agree": "yes"})
+    link = site.begin(client, **ids(number))
+    agree(client, link)
     return link
+
+
+def ids(number):
+    person, session = f"person{number:06}", f"session{number:06}"
+    return {"PROLIFIC_PID": person, "STUDY_ID": "study000001", "SESSION_ID": session}
+
+
+def agree(client, link):
+    client.post(link, data={"phase": "consent", "agree": "yes"})
 
 
 def place(client, link):
@@ -94,6 +99,32 @@ def test_the_expected_wait_follows_from_trials_that_ended(crowd):
     assert phase_of(client, links[0]) is None
     assert place(client, links[1]) is None
     assert "about 1 min" in client.get(links[2]).text
+
+
+def test_where_places_fill_up_people_leave_by_the_platform_and_are_paid_by_rule(tmp_path, monkeypatch):
+    for name in ("COUNTED", "COUNTED_FULL"):
+        monkeypatch.setattr(f"experiments.people.server.arrivals.{name}", 0.0)
+    pay = "[study.pay]\nreward = 6.0\nscreen_out = 0.5\npartial = true\n"
+    recruitment = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
+    with served(tmp_path, PHASES + pay + recruitment) as site, site.client() as client:
+        site.ask(site.store.set_quota(0, 2, "test"))
+        links = [site.begin(client, **ids(number)) for number in range(3)]
+        agree(client, links[0])
+        agree(client, links[1])
+        assert "Enough people have taken part" in client.get("/", params=ids(3)).text, "two are on their way"
+        closed = client.post("/begin", data=ids(3))
+        assert "give the task back" in closed.text and "location" not in closed.headers
+        assert place(client, links[0]) is place(client, links[1]) is None
+        agree(client, links[2])
+        for _ in range(2):  # also when the page is loaded again
+            left = client.get(links[2]).text
+            assert "All places are taken" in left and "cc=C0UT" in left
+        people = site.ask(site.store.people())
+        assert [one.status for one in people] == ["assigned", "assigned", "screened_out"]
+        owed = {payment.key: payment.cents for payment in due(site.study, people, ())}
+        assert owed == {"p00003-screen_out": 50, "p00003-bonus": 150}  # a third of the reward, after a third
+        leave(client, links[0])
+        assert "Enough people" not in client.get("/", params=ids(3)).text, "there is a place again"
 
 
 def test_a_machine_lets_in_as_many_as_its_cores_hold(monkeypatch):

@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 from experiments.cli.logs import JsonLines
 from experiments.errors import StoreError
 from experiments.people.collect import collect, write_collected
-from experiments.people.server.app import NEW_PEOPLE
+from experiments.people.server.arrivals import NEW_PEOPLE
 from experiments.people.store import Store
 from experiments.web.server.static_files import static_url
 from experiments.web.server.visits import token_hash
@@ -78,7 +78,7 @@ def routes(app):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    with served(tmp_path_factory.mktemp("site"), PHASES) as site:
+    with served(tmp_path_factory.mktemp("site"), PHASES, workers=1000) as site:
         yield site
 
 
@@ -306,6 +306,24 @@ completed = "C0MPLETE"
 screened_out = "C0UT"
 no_consent = "C0NO"
 """
+
+
+def test_who_knows_the_platforms_id_of_somebody_does_not_get_their_visit(tmp_path):
+    """At every route that takes ids, in every way but with the submission's id or the link itself."""
+    with served(tmp_path, PHASES + PROLIFIC) as site, site.client() as client:
+        link = site.begin(client, **SECRETS)
+        token = link.rsplit("/", 1)[1]
+        assert client.get("/", params=SECRETS).headers["location"] == link
+        other = {**SECRETS, "SESSION_ID": "5ecretsubmission00002"}
+        takes_ids = [(method, path) for method, path in PEOPLE if path in ("/", "/begin")]
+        assert len(takes_ids) == 2
+        for method, path in takes_ids:
+            for wrong in ({}, {"token": "x" * 43}, {"token": token_hash(token)}, {"token": "é"}):
+                ids = {"params" if method == "GET" else "data": {**other, **wrong}}
+                answer = client.request(method, path, **ids)
+                assert answer.status_code == 403 and "location" not in answer.headers
+                assert token not in answer.text and "Did you begin in another browser?" in answer.text
+        assert site.begin(client, **other, token=token) == link
 
 
 @pytest.fixture

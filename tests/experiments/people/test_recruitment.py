@@ -134,15 +134,19 @@ def test_a_task_is_looked_at_before_it_is_accepted_and_given_back_and_accepted_a
         assert "This is a preview" in looking.text and "<form" not in looking.text
         assert post(client, "/begin", assignmentId="ASSIGNMENT_ID_NOT_AVAILABLE").status_code == 400
         link = begin(client, **TASK)
-        again = client.get("/", params={**TASK, "assignmentId": "4ASSIGNMENT"})
-        assert again.headers["location"] == link
+        again = {**TASK, "assignmentId": "4ASSIGNMENT"}
+        elsewhere = client.get("/", params=again)
+        assert elsewhere.status_code == 403 and "returning.js" in elsewhere.text
+        token = link.rsplit("/", 1)[1]
+        assert token not in elsewhere.text
+        assert begin(client, **again, token=token) == link, "the browser in which it began has the link"
         with sqlite3.connect(tmp_path / "study.db") as database:
             assert "4ASSIGNMENT" in database.execute("SELECT ids FROM identity").fetchone()[0]
             database.execute("UPDATE person SET phase = 'completion', status = 'finished'")
         database.close()
         end = client.get(link)
         assert f'action="{SITE}/mturk/externalSubmit"' in end.text and "4ASSIGNMENT" in end.text
-        client.get("/", params={**TASK, "assignmentId": "5ASSIGNMENT"})
+        begin(client, **{**TASK, "assignmentId": "5ASSIGNMENT"}, token=token)
         assert "4ASSIGNMENT" in client.get(link).text, "what was submitted is what is paid"
 
 

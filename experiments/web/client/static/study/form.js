@@ -2,7 +2,11 @@
 
 import "../wait.js";
 
+import { rememberVisit } from "../visit.js";
+
 const PAUSE = 500; // ms after the last key before a text is saved
+
+rememberVisit();
 
 const form = document.querySelector("form");
 const address = form?.dataset["save"];
