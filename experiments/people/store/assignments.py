@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Select, func, insert, or_, select, update
+from sqlalchemy import Select, bindparam, func, insert, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
@@ -17,6 +17,20 @@ from experiments.people.store.tables import assignment, person, study
 from experiments.people.store.values import ACTIVE, Assignment, CellCount, CellQuota, Counts, Rule, utc_now
 
 SEEDS = 2**53  # exact as numbers of JavaScript as well
+
+# Made once, as that takes as long as running them.
+_ACTIVE = update(person).where(
+    person.c.id == bindparam("person"),
+    person.c.study_id == bindparam("study"),
+    person.c.status.in_(ACTIVE),
+)
+_FRESH = or_(assignment.c.state == "finished", person.c.seen >= bindparam("since"))
+_HOLDERS = (
+    select(assignment.c.cell, assignment.c.place, assignment.c.person_id, _FRESH.label("fresh"))
+    .join(person, person.c.id == assignment.c.person_id)
+    .where(assignment.c.study_id == bindparam("study"), assignment.c.active == 1)
+    .order_by(person.c.seen)
+)
 
 
 class Assignments(Part):
@@ -62,11 +76,11 @@ class Assignments(Part):
                     return await place_of(connection, person_id)
             holders = await self._holders(connection, now - abandoned_after)
             wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
-            fresh = Counter(holder.cell for holder in holders if holder.fresh)
+            fresh = Counter(cell for cell, _, _, fresh in holders if fresh)
             cell = choose([fresh[index] for index in range(len(cells))], wanted, rule, rng)
             if cell is None:
                 return None
-            place = await _free_place(connection, [one for one in holders if one.cell == cell], wanted[cell])
+            place = await _free_place(connection, [one for one in holders if one[0] == cell], wanted[cell])
             await self._give(connection, person_id, (cell, place), cells, rng, now, new=before is None)
             return await place_of(connection, person_id)
 
@@ -147,11 +161,8 @@ class Assignments(Part):
         return Counts(statuses, phases, {cell: CellCount(**states) for cell, states in sorted(cells.items())})
 
     async def _check_active(self, connection: AsyncConnection, person_id: int, now: datetime) -> None:
-        active = await connection.execute(
-            update(person)
-            .where(person.c.id == person_id, person.c.study_id == self._study_id, person.c.status.in_(ACTIVE))
-            .values(seen=now)
-        )
+        mine = {"person": person_id, "study": self._study_id}
+        active = await connection.execute(_ACTIVE, {**mine, "seen": now})
         if not active.rowcount:
             raise StoreError(
                 f"Person {person_id} has ended the participation, or does not exist: no place is given."
@@ -162,14 +173,7 @@ class Assignments(Part):
 
         It is one query, as signs of life may come meanwhile; those who have been away for longest come first.
         """
-        fresh = or_(assignment.c.state == "finished", person.c.seen >= since)
-        query = (
-            select(assignment.c.cell, assignment.c.place, assignment.c.person_id, fresh.label("fresh"))
-            .join(person, person.c.id == assignment.c.person_id)
-            .where(assignment.c.study_id == self._study_id, assignment.c.active == 1)
-            .order_by(person.c.seen)
-        )
-        return (await connection.execute(query)).all()
+        return (await connection.execute(_HOLDERS, {"study": self._study_id, "since": since})).all()
 
     async def _give(
         self,
@@ -191,11 +195,8 @@ class Assignments(Part):
         }
         if new:
             own = {name: int(rng.integers(SEEDS)) for name in ("person_seed", "order_seed")}
-            await connection.execute(
-                insert(assignment).values(
-                    person_id=person_id, study_id=self._study_id, created=now, **own, **values
-                )
-            )
+            mine = {"person_id": person_id, "study_id": self._study_id, "created": now}
+            await connection.execute(insert(assignment), {**mine, **own, **values})
         else:
             await connection.execute(
                 update(assignment).where(assignment.c.person_id == person_id).values(**values)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, insert, select, update
+from sqlalchemy import ColumnElement, bindparam, insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
@@ -24,6 +24,10 @@ _FIELDS = (
     person.c.seen,
     person.c.delete_wanted,
     person.c.host,
+)
+# Made once, as that takes as long as running it.
+_FIND = select(*_FIELDS).where(
+    person.c.study_id == bindparam("study"), person.c.token_hash == bindparam("token")
 )
 
 
@@ -63,37 +67,39 @@ class People(Part):
                     mine = ids.c.person_id == found.id
                     await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
                 return found
-            made = await connection.execute(
-                insert(person).values(
-                    study_id=self._study_id,
-                    token_hash=token_hash,
-                    platform=platform,
-                    platform_key=key,
-                    status="arrived",
-                    phase=phase,
-                    created=now,
-                    seen=now,
-                    delete_wanted=False,
-                )
-            )
-            number = new_id(made)
-            await connection.execute(insert(ids).values(person_id=number, ids=dict(identity)))
+            values = {
+                "study_id": self._study_id,
+                "token_hash": token_hash,
+                "platform": platform,
+                "platform_key": key,
+                "status": "arrived",
+                "phase": phase,
+                "created": now,
+                "seen": now,
+                "delete_wanted": False,
+            }
+            number = new_id(await connection.execute(insert(person), values))
+            await connection.execute(insert(ids), {"person_id": number, "ids": dict(identity)})
             return Person(number, token_hash, platform, "arrived", phase, now, now, False)
 
         return await self._database.write(work)
 
     async def find(self, token_hash: str) -> Person | None:
         """The person whom a link belongs to."""
-        return await self._one(person.c.token_hash == token_hash)
+        async with self._database.reading() as connection:
+            found = await connection.execute(_FIND, {"study": self._study_id, "token": token_hash})
+            row = found.first()
+            return None if row is None else _person(row)
 
     async def person(self, person_id: int) -> Person:
         """A person by number; a StoreError if there is none."""
-        found = await self._one(person.c.id == person_id)
-        if found is None:
+        async with self._database.reading() as connection:
+            row = (await connection.execute(self._select(person.c.id == person_id))).first()
+        if row is None:
             raise StoreError(
                 f"There is no person {person_id} in this study; `mjsim study` shows the numbers."
             )
-        return found
+        return _person(row)
 
     async def people(self, status: Status | None = None) -> tuple[Person, ...]:
         """Everybody, or those of one status, in order of arrival."""
@@ -116,11 +122,6 @@ class People(Part):
             await connection.execute(update(person).where(person.c.id == person_id, late).values(seen=now))
 
         await self._database.write(work)
-
-    async def _one(self, which: ColumnElement[bool]) -> Person | None:
-        async with self._database.reading() as connection:
-            row = (await connection.execute(self._select(which))).first()
-            return None if row is None else _person(row)
 
     def _select(self, *which: ColumnElement[bool]) -> Any:
         return select(*_FIELDS).where(person.c.study_id == self._study_id, *which)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, insert, select, update
+from sqlalchemy import ColumnElement, Select, Table, bindparam, insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store.endings import end
@@ -12,6 +12,31 @@ from experiments.people.store.part import Part, lock_study
 from experiments.people.store.tables import answer, person, trial
 from experiments.people.store.tables import phase as phases
 from experiments.people.store.values import ACTIVE, Answer, PhaseRow, Status, TrialRow, utc_now
+
+# Made once, as that takes as long as running them.
+_PHASE = select(*[column for column in phases.c if column.name != "id"]).where(
+    phases.c.person_id == bindparam("person"), phases.c.name == bindparam("phase")
+)
+_IN_PHASE = update(person).where(
+    person.c.id == bindparam("person"), person.c.phase == bindparam("from"), person.c.status.in_(ACTIVE)
+)
+_END = update(phases).where(phases.c.person_id == bindparam("person"), phases.c.name == bindparam("which"))
+_ITEMS = select(answer.c.item).where(
+    answer.c.person_id == bindparam("person"), answer.c.phase == bindparam("which")
+)
+
+
+def _rows_of(table: Table) -> Select[Any]:
+    return (
+        select(*[column for column in table.c if column.name != "id"])
+        .join(person, person.c.id == table.c.person_id)
+        .where(person.c.study_id == bindparam("study"))
+        .order_by(table.c.person_id, table.c.id)
+    )
+
+
+_ROWS = {table: _rows_of(table) for table in (phases, answer, trial)}
+_ROWS_OF_ONE = {table: rows.where(table.c.person_id == bindparam("person")) for table, rows in _ROWS.items()}
 
 
 class Phases(Part):
@@ -24,7 +49,8 @@ class Phases(Part):
         async def work(connection: AsyncConnection) -> PhaseRow:
             row = await _phase(connection, person_id, name)
             if row is None:
-                await connection.execute(insert(phases).values(person_id=person_id, name=name, shown=now))
+                new = {"person_id": person_id, "name": name, "shown": now}
+                await connection.execute(insert(phases), new)
                 return PhaseRow(person_id, name, now, None, None, None, None)
             return row
 
@@ -65,9 +91,7 @@ class Phases(Part):
             if status is not None:
                 await lock_study(connection, self._study_id)
             moved = await connection.execute(
-                update(person)
-                .where(person.c.id == person_id, person.c.phase == name, person.c.status.in_(ACTIVE))
-                .values(phase=next_name, seen=now)
+                _IN_PHASE, {"person": person_id, "from": name, "phase": next_name, "seen": now}
             )
             if not moved.rowcount:
                 return False
@@ -90,11 +114,7 @@ class Phases(Part):
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> bool:
-            current = await connection.execute(
-                update(person)
-                .where(person.c.id == person_id, person.c.phase == phase, person.c.status.in_(ACTIVE))
-                .values(seen=now)
-            )
+            current = await connection.execute(_IN_PHASE, {"person": person_id, "from": phase, "seen": now})
             if not current.rowcount:
                 return False
             await _save(connection, person_id, phase, values, now)
@@ -135,24 +155,15 @@ class Phases(Part):
         """Trials of a person, or of everybody."""
         return tuple(TrialRow(*row) for row in await self._rows(trial, person_id))
 
-    async def _rows(self, table: Any, person_id: int | None, *which: ColumnElement[bool]) -> Any:
-        columns = [column for column in table.c if column.name != "id"]
-        query = (
-            select(*columns)
-            .join(person, person.c.id == table.c.person_id)
-            .where(person.c.study_id == self._study_id, *which)
-            .order_by(table.c.person_id, table.c.id)
-        )
-        if person_id is not None:
-            query = query.where(table.c.person_id == person_id)
+    async def _rows(self, table: Table, person_id: int | None, *which: ColumnElement[bool]) -> Any:
+        query = _ROWS[table] if person_id is None else _ROWS_OF_ONE[table]
+        values = {"study": self._study_id} | ({} if person_id is None else {"person": person_id})
         async with self._database.reading() as connection:
-            return (await connection.execute(query)).all()
+            return (await connection.execute(query.where(*which) if which else query, values)).all()
 
 
 async def _phase(connection: AsyncConnection, person_id: int, name: str) -> PhaseRow | None:
-    columns = [column for column in phases.c if column.name != "id"]
-    query = select(*columns).where(phases.c.person_id == person_id, phases.c.name == name)
-    row = (await connection.execute(query)).first()
+    row = (await connection.execute(_PHASE, {"person": person_id, "phase": name})).first()
     return None if row is None else PhaseRow(*row)
 
 
@@ -163,12 +174,10 @@ async def _end_phase(
     if how["duration_s"] is None:
         how["duration_s"] = max(0.0, (now - row.shown).total_seconds()) if row else 0.0
     if row is None:  # it was never shown, such as a phase that is skipped
-        await connection.execute(
-            insert(phases).values(person_id=person_id, name=name, shown=now, ended=now, **how)
-        )
+        new = {"person_id": person_id, "name": name, "shown": now, "ended": now, **how}
+        await connection.execute(insert(phases), new)
         return
-    mine = (phases.c.person_id == person_id, phases.c.name == name)
-    await connection.execute(update(phases).where(*mine).values(ended=now, **how))
+    await connection.execute(_END, {"person": person_id, "which": name, "ended": now, **how})
 
 
 async def _save(
@@ -182,7 +191,7 @@ async def _save(
 ) -> None:
     """Insert or replace; with `final`, make all answers of the phase final. The person's row must be locked."""
     mine = (answer.c.person_id == person_id, answer.c.phase == phase)
-    known = set((await connection.execute(select(answer.c.item).where(*mine))).scalars())
+    known = set((await connection.execute(_ITEMS, {"person": person_id, "which": phase})).scalars())
     for item in known & set(values):
         await connection.execute(
             update(answer)

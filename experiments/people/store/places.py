@@ -1,17 +1,18 @@
 """A place: who has it, taking it and giving it away. The study must be locked."""
 
-from sqlalchemy import select, update
+from sqlalchemy import bindparam, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store.tables import assignment
 from experiments.people.store.values import Assignment, PlaceState
 
 FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
+_PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
 
 
 async def place_of(connection: AsyncConnection, person_id: int) -> Assignment | None:
     """The place that a person has or had."""
-    row = (await connection.execute(select(*FIELDS).where(assignment.c.person_id == person_id))).first()
+    row = (await connection.execute(_PLACE, {"person": person_id})).first()
     return None if row is None else Assignment(*row)
 
 
