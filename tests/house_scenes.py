@@ -163,3 +163,74 @@ def _box_model(
 
 def _text(values: tuple[float, ...]) -> str:
     return " ".join(f"{value:g}" for value in np.asarray(values, float))
+
+
+def write_procthor(path: Path, **changes: object) -> Path:
+    """A house as ProcTHOR writes it: a kitchen open to an L-shaped living room, a bedroom and a bathroom."""
+    plans = {
+        "Kitchen": [(0, 0), (0, 4), (4, 4), (4, 0)],
+        "LivingRoom": [(4, 0), (4, 4), (0, 4), (0, 6), (5, 6), (9, 6), (9, 0)],
+        "Bedroom": [(0, 6), (0, 10), (5, 10), (5, 6)],
+        "Bathroom": [(5, 6), (5, 10), (9, 10), (9, 6)],
+    }
+    rooms, walls = [], []
+    for number, (kind, outline) in enumerate(plans.items(), 1):
+        floor = [{"x": x, "y": 0, "z": z} for x, z in outline]
+        rooms.append({"id": f"room|{number}", "roomType": kind, "floorPolygon": floor, "children": []})
+        for start, end in zip(outline, outline[1:] + outline[:1], strict=True):
+            low = [{"x": x, "y": 0, "z": z} for x, z in (start, end)]
+            name = f"wall|{number}|{start[0]}|{start[1]}|{end[0]}|{end[1]}"
+            walls.append(
+                {
+                    "id": name,
+                    "roomId": f"room|{number}",
+                    "polygon": [*low, *({**p, "y": 2.7} for p in low[::-1])],
+                }
+            )
+    for wall in walls:  # nothing between kitchen and living room on the east, a doorway on the north
+        if wall["id"] in ("wall|1|4|4|4|0", "wall|2|4|0|4|4"):
+            wall["empty"] = True
+
+    def opening(name, wall, rooms, low, high, **more):
+        corners = [
+            {"x": low, "y": more.pop("sill", 0), "z": 0},
+            {"x": high, "y": more.pop("top", 2.1), "z": 0},
+        ]
+        return {
+            "id": name,
+            "wall0": wall,
+            "room0": rooms[0],
+            "room1": rooms[1],
+            "holePolygon": corners,
+            **more,
+        }
+
+    def thing(name, x, z, height, turn=0, children=(), **more):
+        place, turned = {"x": x, "y": height / 2, "z": z}, {"x": 0, "y": turn, "z": 0}
+        return {"id": name, "assetId": name.split("|")[0] + "_1", "position": place, "rotation": turned,
+                "kinematic": True, "children": list(children), **more}  # fmt: skip
+
+    house = {
+        "rooms": rooms,
+        "walls": walls,
+        "doors": [
+            opening("door|2|3", "wall|3|5|6|0|6", ("room|3", "room|2"), 3.2, 4.2, openable=True, openness=1),
+            opening("door|2|4", "wall|4|9|6|5|6", ("room|4", "room|2"), 0.5, 1.5, openable=True, openness=0),
+            opening("door|2|1", "wall|2|9|6|9|0", ("room|2", "room|2"), 2.0, 3.0, openable=False, openness=0),
+        ],
+        "windows": [opening("window|1|0", "wall|1|0|0|0|4", ("room|1", "room|1"), 1.0, 2.5, sill=0.9)],
+        "objects": [
+            thing("Bed|3|0", 1.0, 8.9, 0.9, 180),
+            thing("Dresser|3|1", 4.4, 8.5, 1.0, 270, [
+                thing("Vase|3|2", 4.4, 8.5, 2.2, kinematic=False)]),
+            thing("Toilet|4|0", 8.4, 9.0, 0.9, 270),
+            thing("Fridge|1|0", 0.5, 0.5, 1.8, 0),
+            thing("Sofa|2|0", 6.5, 0.55, 0.9, 0),
+            thing("GarbageCan|1|1", 0.4, 3.5, 0.55, 90),
+            thing("Chair|2|3", 6.0, 3.0, 0.9, 30, kinematic=False),
+        ],
+        "proceduralParameters": {"ceilingMaterial": {"name": "ps_mat"}, "lights": []},
+        "metadata": {"schema": "1.0.0"},
+    }  # fmt: skip
+    path.write_text(json.dumps({**house, **changes}))
+    return path

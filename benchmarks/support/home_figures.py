@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
-from mjsim.houses.generated import CATALOGUE, RECIPE, generate, house_files
+from mjsim.houses.generated import CATALOGUE, generate, house_files
 from mjsim.houses.programme import NEEDS
-from mjsim.houses.recipe import read_recipe
+from mjsim.houses.recipe import RECIPE, read_recipe
 from mjsim.houses.values import WALL, Door, FloorPlan, Window
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue

@@ -1,4 +1,4 @@
-"""`mjsim house`: write a disorganized house as MJCF or glTF, or generate a house."""
+"""`mjsim house`: write a disorganized house as MJCF or glTF, generate a house, or export one."""
 
 import argparse
 from pathlib import Path
@@ -9,7 +9,8 @@ from experiments.errors import ConfigError
 from mjsim.episode import POINTS
 
 MJCF, GLTF = ".xml", ".glb"
-GENERATE = "generate"
+GENERATE, EXPORT = "generate", "export"
+HABITAT, PROCTHOR = "habitat", "procthor"
 
 DESCRIPTION = """\
 Sample a disorganized house and write it, with the episode as JSON beside it, in the format that the ending of --out
@@ -20,13 +21,17 @@ names:
   .glb  what one sees of it as one file of binary glTF 2.0, for Blender, three.js and others (docs/scene-files.md)
 
 With `generate`: make the house of the seed --seed as the folder --out, with MJCF, textures, catalogue.toml, recipe, a
-floor plan and a picture of each room. It is the one that --house generated:SEED?rooms=N names (docs/houses.md)."""
+floor plan and a picture of each room. It is the one that --house generated:SEED?rooms=N names (docs/houses.md).
+
+With `export`: write the house --house for another simulator. --format habitat makes a scene dataset in the folder
+--out, with --episodes episodes of rearrangement from --seed on; --format procthor makes a file of the floor plan.
+`mjsim import house` reads both back (docs/houses.md)."""
 
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     parser = add_command(commands, "house", run, description=DESCRIPTION)
-    parser.add_argument("what", nargs="?", choices=[GENERATE], help="make a new house instead")
+    parser.add_argument("what", nargs="?", choices=[GENERATE, EXPORT], help="make a new house, or export one")
     parser.add_argument(
         "--objects", type=int, default=12, metavar="N", help="misplaced objects, 1 to --points"
     )
@@ -38,13 +43,19 @@ def add_parser(commands: Any) -> None:
         type=Path,
         required=True,
         metavar="PATH",
-        help="file to write, which ends in .xml or .glb; of generate, a folder",
+        help="file to write, which ends in .xml or .glb; of generate and --format habitat, a folder",
     )
     parser.add_argument(
         "--rooms",
         type=int,
         metavar="N",
         help="rooms of the house to generate, 1 to 10 (default: as the seed says)",
+    )
+    parser.add_argument(
+        "--format", choices=[HABITAT, PROCTHOR], default=HABITAT, help="of export (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--episodes", type=int, default=1, metavar="N", help="of export (default: %(default)s)"
     )
     parser.add_argument("--no-pictures", action="store_true", help="generate without pictures")
     add_force(parser)
@@ -58,6 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.what == GENERATE:
         return _generate(arguments)
+    if arguments.what == EXPORT:
+        return _export(arguments)
     if arguments.out.suffix not in (MJCF, GLTF):
         raise ConfigError(
             f"cannot export to {arguments.out}: name a file that ends in {MJCF} (MJCF, for MuJoCo) or {GLTF} (glTF)"
@@ -96,6 +109,49 @@ def _generate(arguments: argparse.Namespace) -> int:
         else:
             folder.rename(out)
     print(f"{out} ({house.catalogue.name}: {len(house.rooms.labels)} rooms, {house.rooms.area:.0f} m2)")
+    return 0
+
+
+def _export(arguments: argparse.Namespace) -> int:
+    """Write a house for another simulator: whole or not at all."""
+    import json
+
+    from experiments.house import House
+    from experiments.record.run_directory import check_file
+    from mjsim.exporting.procthor import procthor_house
+    from mjsim.files import exchange, work_folder, write_text_atomically
+    from mjsim.houses.recipe import floor_plan_of
+    from mjsim.importing import require_extra
+    from mjsim.model.catalogue import Catalogue
+
+    out: Path = arguments.out
+    if arguments.format == PROCTHOR:
+        check_file(out, replace=arguments.force)
+        plan = floor_plan_of(Catalogue.load(arguments.house).house_path)
+        write_text_atomically(out, json.dumps(procthor_house(plan), indent=1) + "\n")
+        print(f"{out} ({len(plan.rooms)} rooms, {len(plan.doors)} doors, {len(plan.windows)} windows)")
+        return 0
+    require_extra()  # then trimesh is loaded
+    from mjsim.exporting.habitat import export_habitat
+
+    if arguments.episodes < 0:
+        raise ConfigError(f"{arguments.episodes} episodes cannot be sampled; give 0 or more")
+    if out.exists() and not (arguments.force and list(out.glob("*.scene_dataset_config.json"))):
+        raise ConfigError(f"{out} exists; name a new folder, or replace an exported house with --force")
+    house = House.load(arguments.house)
+    seeds = range(arguments.seed, arguments.seed + arguments.episodes)
+    episodes = [
+        house.sample_episode(objects=arguments.objects, seed=seed, points=arguments.points) for seed in seeds
+    ]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with work_folder(out.parent) as folder:
+        name = export_habitat(house.catalogue, episodes, folder)
+        folder.chmod(0o755)
+        if out.exists():
+            exchange(folder, out)
+        else:
+            folder.rename(out)
+    print(f"{out / 'scenes' / name}.scene_instance.json ({len(episodes)} episodes)")
     return 0
 
 

@@ -69,7 +69,7 @@ def write_files(
         y=round((y0 + y1) / 2, 3),
         extent=round(max(x1 - x0, y1 - y0) * 0.62, 3),
         default=ET.tostring(style[0], encoding="unicode").strip(),
-        assets="\n".join(_assets(world, surfaces(seed, plan), own.values(), models)),
+        assets="\n".join(used_materials(world, surfaces(seed, plan), own.values(), models)),
         world=world,
     )
     files = {
@@ -99,7 +99,7 @@ def _furniture(furnishing: Furnishing) -> Iterable[str]:
         )
 
 
-def _assets(world: str, own: list[str], brought: Iterable[Asset], models: Path) -> list[str]:
+def used_materials(world: str, own: list[str], brought: Iterable[Asset], models: Path) -> list[str]:
     """The materials that are used, with their textures; those of the apartment only where nothing has their name."""
     known: dict[tuple[str, str], ET.Element] = {}
     for text in own:

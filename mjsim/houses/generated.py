@@ -15,13 +15,13 @@ from mjsim.houses.furnish import furnish
 from mjsim.houses.openings import open_up
 from mjsim.houses.palette import draw_palette
 from mjsim.houses.plan import draw_rooms
-from mjsim.houses.recipe import VERSION, Recipe, parse_name, read_recipe
+from mjsim.houses.recipe import RECIPE, VERSION, Recipe, parse_name, read_recipe
 from mjsim.houses.values import FloorPlan, Furnishing
 from mjsim.kernels import cache_base
 from mjsim.sources import ROOT, digest_of
 
 ATTEMPTS = 40  # plans
-CATALOGUE, RECIPE = "catalogue.toml", "recipe.json"
+CATALOGUE = "catalogue.toml"
 # Bins that every home has, and those that larger homes have besides.
 _BINS = ("dish_bin", "laundry_hamper")
 _MORE_BINS = ("bookshelf", "recycling_bin", "toy_box", "office_box")

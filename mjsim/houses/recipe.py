@@ -14,6 +14,7 @@ from mjsim.houses.chance import stream
 from mjsim.houses.values import ROOMS, FloorPlan
 
 PREFIX = "generated:"
+RECIPE = "recipe.json"
 VERSION = 1  # of the generator: raised by whatever changes a house of a seed
 MAX_SEED = 2**63 - 1
 MAX_HOUSES = 100_000  # of a range
@@ -67,6 +68,14 @@ def read_recipe(path: Path) -> Recipe:
         raise HouseError(
             f"{path} is no recipe of a house: {error}; give one of mjsim house generate"
         ) from error
+
+
+def floor_plan_of(model: Path) -> FloorPlan:
+    """The floor plan of a house by its MJCF file; `HouseError` where no recipe lies beside it."""
+    path = model.parent / RECIPE
+    if not path.is_file():
+        raise HouseError(f"{model} has no floor plan beside it; only generated houses have one ({PREFIX}7)")
+    return read_recipe(path).plan
 
 
 def is_generated(house: str) -> bool:

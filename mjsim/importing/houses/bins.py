@@ -10,6 +10,7 @@ from scipy.ndimage import label
 from mjsim.errors import AssetError
 from mjsim.importing.houses.plan import BODY, CELL, Mask, Plan, clearance
 from mjsim.importing.houses.rooms import Rooms
+from mjsim.importing.houses.values import Bin
 from mjsim.importing.surface import Floats
 from mjsim.model.catalogue import Catalogue, Receptacle
 from mjsim.model.validation.compiled import Compiled, compile_model
@@ -32,17 +33,6 @@ _HOMES = {
 }
 # Turns about z and the way that the back then points.
 _TURNS = ((0.0, (0, 1)), (math.pi, (0, -1)), (math.pi / 2, (-1, 0)), (-math.pi / 2, (1, 0)))
-
-
-@dataclass(frozen=True)
-class Bin:
-    """A receptacle in its place."""
-
-    key: str
-    room: str  # room key
-    x: float  # m, middle of its base
-    y: float
-    yaw: float  # rad
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,10 @@
 """Scenes of one mesh file (glTF, GLB, OBJ, ...), and Habitat's scene_instance.json that composes several."""
 
 import json
+import math
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +14,22 @@ from trimesh.transformations import quaternion_matrix, scale_matrix
 from mjsim.errors import AssetError
 from mjsim.files import read_json, read_text
 from mjsim.importing.houses.meshes import GLTF, Y_TO_Z, read_parts
-from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene, left_out
+from mjsim.importing.houses.rooms import boxes_of
+from mjsim.importing.houses.values import (
+    Bin,
+    HouseOptions,
+    Missing,
+    NamedRoom,
+    Piece,
+    SourceScene,
+    left_out,
+)
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import UNITS, ImportDecision
 
 INSTANCE = ".scene_instance.json"
+SEMANTICS = ".semantic_config.json"
+RECEPTACLE = "mjsim_receptacle"  # of a template's user_defined: the key of a bin of ours
 _SIDE = (3.0, 60.0)  # m, longest sides that houses have
 _MESHES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".dae")
 
@@ -61,7 +75,9 @@ def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
         notes.append(left_out(f"{len(found)} articulated objects", "URDF is not read"))
     if not pieces:
         raise AssetError(f"{path} has no mesh that is there; add its stages and objects")
-    return SourceScene(tuple(pieces), "Habitat scene", tuple(notes))
+    named = str(scene.get("semantic_scene_instance") or path.name.removesuffix(INSTANCE))
+    rooms = reader.rooms(named.rpartition("/")[2])
+    return SourceScene(tuple(pieces), "Habitat scene", tuple(notes), rooms, tuple(reader.bins))
 
 
 def _stage_up(path: Path) -> str | None:
@@ -80,10 +96,35 @@ class _Habitat:
     def __init__(self, path: Path, missing: Missing) -> None:
         self._path = path
         self._missing = missing
+        self.bins: list[Bin] = []
         root = path.resolve().parent.parent
         self._files = {
             p.name: p for p in sorted(root.rglob("*")) if p.name.endswith(("_config.json", *_MESHES))
         }
+
+    def rooms(self, name: str) -> tuple[NamedRoom, ...]:
+        """Rooms of the regions of a semantic_config.json; none where there is no such file."""
+        found: dict[str, NamedRoom] = {}
+        if (file := self._files.get(name + SEMANTICS)) is None:
+            return ()
+        for region in _read(file).get("region_annotations") or []:
+            text = str(region.get("name", "room")).partition(":")[0]
+            key = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_") or "room"
+            loop = np.array([_numbers(point, 3, file) for point in region.get("poly_loop", [])]).reshape(
+                -1, 3
+            )
+            try:
+                boxes = boxes_of(np.column_stack((loop[:, 0], -loop[:, 2])))
+            except ValueError as error:
+                raise AssetError(f"{file}: the region {text!r} {error}; correct its poly_loop") from error
+            if key in found:
+                found[key] = replace(found[key], boxes=(*found[key].boxes, *boxes))
+                continue
+            label = str(region.get("label") or text)
+            label = label[:1].upper() + label[1:]
+            same = sum(room.label.rstrip(" 0123456789") == label for room in found.values())
+            found[key] = NamedRoom(key, f"{label} {same + 1}" if same else label, boxes)
+        return tuple(found.values())
 
     def instance(self, item: dict[str, Any], kind: str) -> Iterator[Piece]:
         """Pieces of a stage or an object where it stands, z up."""
@@ -91,10 +132,8 @@ class _Habitat:
         config_file = self._files.get(f"{name}.{kind}_config.json")
         config = _read(config_file) if config_file else {}
         asset = str(config.get("render_asset", f"{name}.glb"))
-        mesh = (config_file or self._path).parent / asset
-        if not mesh.is_file():
-            mesh = self._files.get(Path(asset).name, mesh)
-        if not mesh.is_file():
+        mesh = self._mesh(config_file, asset)
+        if mesh is None:
             if not self._missing.skip:
                 raise AssetError(
                     f"{self._path} names the {kind} {name!r}, whose mesh {asset} is not there; add it, or leave out "
@@ -106,17 +145,34 @@ class _Habitat:
         if (rotation := item.get("rotation")) is not None:
             frame = quaternion_matrix(_numbers(rotation, 4, self._path))
         frame[:3, 3] = _numbers(item.get("translation", [0, 0, 0]), 3, self._path)
-        scale = _numbers(config.get("scale", [1, 1, 1]), 3, mesh)
+        scale = _numbers(config.get("scale", [1, 1, 1]), 3, config_file or self._path)
         scale = scale * float(item.get("uniform_scale", 1.0))
         upright = np.eye(4)
         if _is_z_up(config):  # z is up in the mesh; Habitat turns it so that y is
             upright = np.linalg.inv(Y_TO_Z)
         own: Floats = Y_TO_Z @ frame @ np.diag([*scale, 1.0]) @ upright @ np.linalg.inv(Y_TO_Z)
-        if mesh.suffix.lower() not in GLTF:
-            own = own @ Y_TO_Z
+        marks = config.get("user_defined")
+        mark = marks.get(RECEPTACLE) if isinstance(marks, dict) else None
+        if isinstance(mark, dict):
+            (x, y, z), yaw = own[:3, 3].tolist(), math.atan2(own[1, 0], own[0, 0])
+            key, room, place = (str(mark.get(of)) for of in ("key", "room", "place"))
+            self.bins.append(Bin(key, room, x, y, yaw, z, place))
+            return
         loose = kind == "object" and str(item.get("motion_type", "dynamic")).lower() == "dynamic"
-        for part, surface in read_parts(mesh, own):
-            yield Piece(part if kind == "stage" else name, surface, loose=loose)
+        collision = self._mesh(config_file, str(config.get("collision_asset", "")))
+        for file, seen in ((mesh, True), (collision, False)):
+            if file is None:
+                continue
+            whole = own if file.suffix.lower() in GLTF else own @ Y_TO_Z
+            for part, surface in read_parts(file, whole):
+                solid = not seen or collision is None
+                yield Piece(part if kind == "stage" else name, surface, seen, solid, loose)
+
+    def _mesh(self, config: Path | None, asset: str) -> Path | None:
+        """The file of an asset, beside its template or elsewhere in the data set; None where it is not there."""
+        mesh = (config or self._path).parent / asset
+        found = mesh if mesh.is_file() else self._files.get(Path(asset).name)
+        return found if found and found.name.endswith(_MESHES) else None
 
 
 def _read(path: Path) -> dict[str, Any]:

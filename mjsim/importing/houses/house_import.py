@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
@@ -18,11 +18,13 @@ from mjsim.importing.houses.meshes import SUFFIXES as MESHES
 from mjsim.importing.houses.mjcf import SUFFIXES as MJCF
 from mjsim.importing.houses.mjcf import read_mjcf
 from mjsim.importing.houses.plan import Plan, make_plan
+from mjsim.importing.houses.procthor import SUFFIXES as PROCTHOR
+from mjsim.importing.houses.procthor import read_procthor
 from mjsim.importing.houses.rooms import find_rooms, read_rooms, words_of
 from mjsim.importing.houses.sdf import SUFFIXES as SDF
 from mjsim.importing.houses.sdf import read_sdf
 from mjsim.importing.houses.solids import LOW, Solids, make_solids
-from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, moved
+from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, left_out, moved
 from mjsim.importing.houses.writer import ImportedHouse, write_house
 from mjsim.importing.model_writer import write_png
 from mjsim.importing.surface import Floats
@@ -101,6 +103,7 @@ _READERS: tuple[tuple[tuple[str, ...], Callable[[Path, HouseOptions], SourceScen
     (MJCF, read_mjcf),
     (MESHES, read_mesh_scene),
     ((INSTANCE,), read_habitat),
+    (PROCTHOR, read_procthor),
 )
 
 
@@ -131,17 +134,22 @@ def _converted(
     drawn = [piece for piece in pieces if piece.name not in opened]
     given = read_rooms(options.rooms) if options.rooms is not None else scene.rooms
     rooms = find_rooms(plan, given, drawn)
-    bins = place_bins(plan, rooms, Catalogue.load())
+    catalogue = Catalogue.load()
+    given_bins = tuple(replace(b, z=b.z - level) for b in scene.bins)
+    kept_bins = all(b.key in catalogue.receptacles and b.room in dict(rooms.names) for b in given_bins)
+    bins = given_bins if given_bins and kept_bins else place_bins(plan, rooms, catalogue)
+    if lost := [room.label for room in given if room.key not in dict(rooms.names)]:
+        decisions.append(left_out(", ".join(lost), "nobody gets there, or nobody fits in"))
     looks = make_looks(drawn, partial(plan.on, rooms.floor))
     seen = float((plan.floor & rooms.floor).sum() / rooms.floor.sum())
     name = label or source.name.split(".")[0].replace("_", " ").strip().capitalize()
     house = ImportedHouse(name, source.name, solids.solids, looks, plan, rooms, bins, seen >= _FLOOR_SEEN)
     triangles = sum(len(mesh.look.faces) for mesh in looks)
     pictures = len({id(mesh.look.picture) for mesh in looks if mesh.look.picture is not None})
+    if doors:
+        choice = f"{len(opened)} open" if opened else "as they are"
+        decisions.append(ImportDecision("doors", choice, ", ".join(sorted(opened)[:6])))
     decisions += [
-        ImportDecision(
-            "doors", f"{len(opened)} open" if opened else "as they are", ", ".join(sorted(opened)[:6])
-        ),
         ImportDecision(
             "collision",
             f"{_counted(len(solids.solids), 'convex geom')}",
@@ -154,7 +162,9 @@ def _converted(
         ),
         ImportDecision("rooms", ", ".join(text for _, text in rooms.names), rooms.reason),
         ImportDecision(
-            "bins", ", ".join(f"{b.key} in {b.room}" for b in bins), "against walls, ways stay open"
+            "bins",
+            ", ".join(f"{b.key} in {b.room}" for b in bins),
+            "of the source" if bins is given_bins else "against walls, ways stay open",
         ),
         ImportDecision("look", _counted(triangles, "triangle"), f"{len(looks)} meshes, {pictures} pictures"),
         ImportDecision(

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import msgspec
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label, maximum_filter
 
@@ -24,6 +25,7 @@ _HALL = 45.0  # m^2, floor of a room that is rather parted at wider openings
 _HALL_PART = 5.0  # m^2, at least, of each part
 _MIN_AREA = 1.5  # m^2 of floor; smaller ones belong to their neighbours
 _MIN_WALK = 0.5  # m^2 that can be walked on
+_STEP = 0.1  # m, of the rectangles of a polygon with slanted sides
 _COARSE = 2  # cells along the side of the grid of a room's rectangles
 _LARGE = 0.5  # m; smaller things say nothing about the use of a room
 # Names of furniture say what a room is; the first that fits counts.
@@ -104,6 +106,22 @@ def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
             "boxes = [[xmin, ymin, xmax, ymax], ...]"
         )
     return tuple(NamedRoom(key, room.label, tuple(room.boxes)) for key, room in rooms.items())
+
+
+def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
+    """Rectangles, m, that cover a polygon (k, 2); one with slanted sides in steps of 0.1 m. `ValueError` for none."""
+    polygon = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
+    if not polygon.is_valid or polygon.area < _STEP**2:
+        raise ValueError("has no floor")
+    sides = np.abs(np.diff(outline, axis=0, append=outline[:1]))
+    slanted = sides.min(axis=1).max() > 0.01
+    cuts = [
+        np.arange(v.min(), v.max() + _STEP, _STEP) if slanted else np.unique(v.round(3)) for v in outline.T
+    ]
+    middles = np.meshgrid(*((cut[1:] + cut[:-1]) / 2 for cut in cuts), indexing="ij")
+    x, y = (cut.tolist() for cut in cuts)
+    mask = shapely.contains_xy(polygon, *middles)
+    return tuple((x[a], y[c], x[b], y[d]) for a, b, c, d in merged_rectangles(mask))
 
 
 def find_rooms(plan: Plan, given: Sequence[NamedRoom], pieces: Sequence[Piece]) -> Rooms:

@@ -29,6 +29,19 @@ class NamedRoom:
     boxes: tuple[tuple[float, float, float, float], ...]  # xmin, ymin, xmax, ymax of rectangles, m
 
 
+@dataclass(frozen=True)
+class Bin:
+    """A receptacle in its place."""
+
+    key: str
+    room: str  # room key
+    x: float  # m, middle of its base
+    y: float
+    yaw: float  # rad
+    z: float = 0.0
+    place: str = "against the wall"  # as people read it
+
+
 @dataclass(frozen=True, eq=False)
 class SourceScene:
     """A scene as it was read."""
@@ -37,6 +50,7 @@ class SourceScene:
     kind: str  # of the source, such as `SDF world`
     notes: tuple[ImportDecision, ...] = ()  # what was decided on the way
     rooms: tuple[NamedRoom, ...] = ()  # where the source names them
+    bins: tuple[Bin, ...] = ()  # where the source was a house of ours
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import trimesh
 
-from mjsim.importing.houses.bins import Bin
 from mjsim.importing.houses.look import DrawnMesh, picture_key
 from mjsim.importing.houses.plan import Plan
 from mjsim.importing.houses.rooms import Rooms
 from mjsim.importing.houses.solids import Solid
+from mjsim.importing.houses.values import Bin
 from mjsim.importing.model_writer import look_lines, write_png
 from mjsim.importing.surface import Floats
 from mjsim.model.assets import models_root
@@ -145,7 +145,8 @@ def _sites(house: ImportedHouse) -> Iterator[str]:
         (x, y), (a, b) = (low + high) / 2, (high - low) / 2
         yield f'<site name="room:{key}:{counts[key]}" pos="{x:.4f} {y:.4f} 1" size="{a:.4f} {b:.4f} 1"/>'
     for place in house.bins:
-        yield f'<site name="mount:{place.key}" pos="{place.x:.4f} {place.y:.4f} 0" euler="0 0 {place.yaw:.6f}"/>'
+        at = f"{place.x:.4f} {place.y:.4f} {place.z:.4f}"
+        yield f'<site name="mount:{place.key}" pos="{at}" euler="0 0 {place.yaw:.6f}"/>'
 
 
 def _box(name: str, low: Floats, high: Floats) -> str:
@@ -154,8 +155,8 @@ def _box(name: str, low: Floats, high: Floats) -> str:
 
 def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
     """Lines of catalogue.toml: what of the other catalogue belongs into the bins."""
-    room_of = {place.key: place.room for place in house.bins}
-    categories = [c for c in catalogue.categories.values() if c.receptacle in room_of]
+    bins = {place.key: place for place in house.bins}
+    categories = [c for c in catalogue.categories.values() if c.receptacle in bins]
     objects = [key for category in categories for key in category.objects]
     tables: list[tuple[str, dict[str, object]]] = [
         ("house", {"label": house.label, "model": MODEL}),
@@ -165,12 +166,12 @@ def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
         (f"categories.{c.key}", {"label": c.label, "receptacle": c.receptacle, "objects": list(c.objects)})
         for c in categories
     ]
-    for key, room in room_of.items():
+    for key, found in bins.items():
         known = catalogue.receptacles[key]
         entry: dict[str, object] = {
             "label": known.label,
-            "place": "against the wall",
-            "room": room,
+            "place": found.place,
+            "room": found.room,
             "model": _relative(known.path),
         }
         tables.append((f"receptacles.{key}", entry))

@@ -1,0 +1,145 @@
+"""The plan of a house as ProcTHOR's house JSON: rooms, walls, doors and windows, without furniture.
+
+Walls have no thickness there: they stand in the middle of ours. Names of assets are those of ProcTHOR whose size is
+nearest.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+from mjsim.houses.openings import portions
+from mjsim.houses.values import HEIGHT, SIDES, WALL, Door, FloorPlan, Room, Side, Window, opposite
+
+NAMES = (
+    "mjsim_rooms"  # of the metadata: room id -> [key, label], which ProcTHOR's four types of rooms cannot say
+)
+_TYPES = {"kitchen": "Kitchen", "bathroom": "Bathroom", "shower_room": "Bathroom", "bedroom": "Bedroom"}
+_DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2  # m, from which it is a passage
+_WINDOWS = {  # width, m
+    0.92: "Window_Fixed_36x48",
+    1.22: "Window_Slider_48x48",
+    1.53: "Window_Slider_60x48",
+    2.44: "Window_Fixed_96x48",
+}
+
+
+def procthor_house(plan: FloorPlan) -> dict[str, Any]:
+    """A floor plan as a house of ProcTHOR, ready for JSON."""
+    ids = {room.key: f"room|{number}" for number, room in enumerate(plan.rooms, 2)}
+    walls = [wall for room in plan.rooms for wall in _walls(plan, room, ids)]
+    return {
+        "rooms": [_room(room, ids[room.key]) for room in plan.rooms],
+        "walls": walls,
+        "doors": [_door(plan, door, ids, number) for number, door in enumerate(plan.doors)],
+        "windows": [_window(plan, window, ids, number) for number, window in enumerate(plan.windows)],
+        "objects": [],
+        "proceduralParameters": {
+            "ceilingMaterial": {"name": "PureWhite"},
+            "floorColliderThickness": 1.0,
+            "lights": [],
+            "receptacleHeight": 0.7,
+            "reflections": [],
+            "skyboxId": "SkyMountain",
+        },
+        "metadata": {
+            "schema": "1.0.0",
+            NAMES: {ids[room.key]: [room.key, room.label] for room in plan.rooms},
+        },
+    }
+
+
+def _room(room: Room, name: str) -> dict[str, Any]:
+    cell = room.floor.grown(WALL / 2)
+    corners = ((cell.x0, cell.y0), (cell.x0, cell.y1), (cell.x1, cell.y1), (cell.x1, cell.y0))
+    return {
+        "id": name,
+        "roomType": _TYPES.get(room.use, "LivingRoom"),
+        "floorMaterial": {"name": "WoodFloorsCross"},
+        "floorPolygon": [_point(x, 0.0, y) for x, y in corners],
+        "ceilings": [],
+        "children": [],
+    }
+
+
+def _walls(plan: FloorPlan, room: Room, ids: dict[str, str]) -> Iterator[dict[str, Any]]:
+    """The walls of a room, and what is seen of them from outside."""
+    for side in SIDES:
+        for start, end, is_outside in portions(room, side, plan.rooms):
+            name = _wall_name(ids[room.key], room, side, start, end)
+            ends = [_on(room, side, at) for at in _ordered(side, start, end)]
+            polygon = [_point(x, z, y) for z in (0.0, HEIGHT) for x, y in ends]
+            material = {"name": "Walldrywall4Tiled"}
+            yield {"id": name, "roomId": ids[room.key], "polygon": polygon, "material": material}
+            if is_outside:
+                outer = "wall|exterior|" + name.split("|", 2)[2]
+                yield {"id": outer, "roomId": "exterior", "polygon": polygon[::-1], "material": material}
+
+
+def _ordered(side: Side, start: float, end: float) -> tuple[float, float]:
+    """The ends of a wall in the order in which the outline of the floor passes them: clockwise from above."""
+    return (start, end) if side in ("west", "north") else (end, start)
+
+
+def _on(room: Room, side: Side, at: float) -> tuple[float, float]:
+    """A point of the middle of a wall."""
+    x, y = room.floor.along(side, at, at, -WALL / 2, -WALL / 2).center
+    return round(x, 4), round(y, 4)
+
+
+def _wall_name(room: str, at: Room, side: Side, start: float, end: float) -> str:
+    (x0, y0), (x1, y1) = _on(at, side, start), _on(at, side, end)
+    return f"wall|{room.split('|')[1]}|{x0:.2f}|{y0:.2f}|{x1:.2f}|{y1:.2f}"
+
+
+def _hole(
+    plan: FloorPlan, room: str, side: Side, opening: Door | Window, ids: dict[str, str]
+) -> tuple[str, dict[str, Any]]:
+    """The wall of a room that an opening is in, and its hole along it."""
+    of = plan.room(room)
+    start, end, _ = min(
+        portions(of, side, plan.rooms), key=lambda one: max(one[0] - opening.center, opening.center - one[1])
+    )
+    middle = abs(opening.center - _ordered(side, start, end)[0])
+    bottom, top = (opening.sill, opening.top) if isinstance(opening, Window) else (0.0, opening.height)
+    corners = [
+        _point(middle - opening.width / 2, bottom, 0.0),
+        _point(middle + opening.width / 2, top, 0.0),
+    ]
+    name = _wall_name(ids[room], of, side, start, end)
+    return name, {"holePolygon": corners, "assetPosition": _point(middle, (bottom + top) / 2, 0.0)}
+
+
+def _door(plan: FloorPlan, door: Door, ids: dict[str, str], number: int) -> dict[str, Any]:
+    first, last = door.rooms[0], door.rooms[-1]
+    wall0, hole = _hole(plan, first, door.side, door, ids)
+    wall1 = "wall|exterior|" + wall0.split("|", 2)[2]
+    if not door.is_front:
+        wall1, _ = _hole(plan, last, opposite(door.side), door, ids)
+    return {
+        "id": f"door|{number}",
+        "assetId": _PASSAGE if door.width > _WIDE else _DOOR,
+        "openable": not door.is_front,
+        "openness": int(not door.is_front),
+        "room0": ids[first],
+        "room1": ids[last],
+        "wall0": wall0,
+        "wall1": wall1,
+        **hole,
+    }
+
+
+def _window(plan: FloorPlan, window: Window, ids: dict[str, str], number: int) -> dict[str, Any]:
+    wall, hole = _hole(plan, window.room, window.side, window, ids)
+    return {
+        "id": f"window|{number}",
+        "assetId": _WINDOWS[min(_WINDOWS, key=lambda width: abs(width - window.width))],
+        "room0": ids[window.room],
+        "room1": ids[window.room],
+        "wall0": wall,
+        "wall1": "wall|exterior|" + wall.split("|", 2)[2],
+        **hole,
+    }
+
+
+def _point(x: float, y: float, z: float) -> dict[str, float]:
+    return {"x": round(x, 4), "y": round(y, 4), "z": round(z, 4)}

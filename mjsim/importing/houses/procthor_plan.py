@@ -1,0 +1,180 @@
+"""ProcTHOR's house JSON: rooms, walls, doors and windows, and the objects with their places.
+
+Its axes are x, y up and z, left-handed: seen from above, (x, z) are our (x, y). Walls have no thickness; ours lie on
+the middle of theirs. An object's position is the middle of its box, and at a rotation of 0 its front looks along z.
+"""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from mjsim.errors import AssetError, brief
+from mjsim.files import read_json, read_text
+from mjsim.houses.values import WALL
+from mjsim.importing.houses.rooms import boxes_of, words_of
+from mjsim.importing.houses.values import NamedRoom
+
+NAMES = "mjsim_rooms"  # of the metadata: room id -> [key, label], where the house was one of ours
+_TYPES = {"livingroom": "living_room"}  # the others are their own words
+
+
+class Vector(msgspec.Struct):
+    """A point or angles."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+class _Span(msgspec.Struct):
+    min: Vector
+    max: Vector
+
+
+class _Room(msgspec.Struct, rename="camel"):
+    id: str
+    floor_polygon: list[Vector]
+    room_type: str = "Room"
+
+
+class _Wall(msgspec.Struct, rename="camel"):
+    id: str
+    polygon: list[Vector]
+    room_id: str = ""
+    empty: bool = False
+
+
+class _Opening(msgspec.Struct, rename="camel"):
+    id: str
+    wall0: str | None = None
+    room0: str | None = None
+    room1: str | None = None
+    hole_polygon: list[Vector] = []
+    bounding_box: _Span | None = None  # of older files
+
+
+class Thing(msgspec.Struct, rename="camel"):
+    """An object with those that stand on it."""
+
+    id: str
+    position: Vector
+    asset_id: str = ""
+    rotation: Vector = msgspec.field(default_factory=Vector)
+    kinematic: bool = False
+    children: list["Thing"] = []
+
+
+class _House(msgspec.Struct):
+    rooms: list[_Room]
+    walls: list[_Wall]
+    doors: list[_Opening] = []
+    windows: list[_Opening] = []
+    objects: list[Thing] = []
+    metadata: dict[str, Any] = {}
+
+
+@dataclass(frozen=True)
+class PlanWall:
+    """A wall on the floor."""
+
+    start: tuple[float, float]  # m
+    end: tuple[float, float]
+    height: float  # m
+
+
+@dataclass(frozen=True)
+class PlanOpening:
+    """A door or window, from `start` to `end` on the floor, m."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    bottom: float
+    top: float
+    is_door: bool
+    rooms: tuple[str, ...]  # keys of those that it joins; one for a front door
+
+
+@dataclass(frozen=True)
+class ProcthorPlan:
+    """What a house's JSON says of its plan, in metres, z up."""
+
+    rooms: tuple[NamedRoom, ...]
+    walls: tuple[PlanWall, ...]
+    openings: tuple[PlanOpening, ...]
+
+
+def read_plan(path: Path) -> tuple[ProcthorPlan, tuple[Thing, ...]]:
+    """Rooms, walls and openings of a house, and its objects; `AssetError` where the file holds no such house."""
+    try:
+        house = msgspec.convert(read_json(read_text(path)), _House)
+    except (OSError, ValueError, RecursionError) as error:
+        raise AssetError(brief(f"{path} is no house of ProcTHOR: {error}; export it again")) from error
+    if not house.rooms:
+        raise AssetError(f"{path} has no rooms; give a house of ProcTHOR")
+    rooms = tuple(_rooms(house, path))
+    keys = {room.id: named.key for room, named in zip(house.rooms, rooms, strict=True)}
+    ends = {wall.id: _ends(wall, path) for wall in house.walls}
+    walls: dict[Any, PlanWall] = {}
+    for wall in house.walls:
+        start, end, height = ends[wall.id]
+        inner = "exterior" not in (wall.room_id, *wall.id.split("|"))
+        if inner and not wall.empty and math.dist(start, end) > WALL:
+            walls.setdefault(tuple(sorted((start, end))), PlanWall(start, end, height))
+    openings = [
+        _opening(one, ends, keys, of == "door", path)
+        for of, ones in (("door", house.doors), ("window", house.windows))
+        for one in ones
+    ]
+    return ProcthorPlan(rooms, tuple(walls.values()), tuple(openings)), tuple(house.objects)
+
+
+def _rooms(house: _House, path: Path) -> Iterator[NamedRoom]:
+    given = house.metadata.get(NAMES, {})
+    counts = Counter[str]()
+    for room in house.rooms:
+        words = "_".join(word.lower() for word in words_of(room.room_type)) or "room"
+        kind = _TYPES.get(words, words)
+        counts[kind] += 1
+        number = counts[kind]
+        key = f"{kind}_{number}" if number > 1 else kind
+        label = kind.replace("_", " ").capitalize() + (f" {number}" if number > 1 else "")
+        names = given.get(room.id) if isinstance(given, dict) else None
+        if isinstance(names, list) and len(names) == 2 and re.fullmatch(r"[a-z][a-z0-9_]*", str(names[0])):
+            key, label = map(str, names)
+        outline = np.array([(point.x, point.z) for point in room.floor_polygon])
+        try:
+            yield NamedRoom(key, label, boxes_of(outline))
+        except ValueError as error:
+            raise AssetError(f"{path}: the room {room.id!r} {error}; correct its floorPolygon") from error
+
+
+def _ends(wall: _Wall, path: Path) -> tuple[tuple[float, float], tuple[float, float], float]:
+    """Where a wall begins and ends on the floor, in its own order, and its height, m."""
+    heights = [point.y for point in wall.polygon]
+    low = [point for point in wall.polygon if point.y < min(heights) + 0.01]
+    if len(low) < 2:
+        raise AssetError(f"{path}: the wall {wall.id!r} has no lower edge; correct its polygon")
+    first, last = ((round(point.x, 4), round(point.z, 4)) for point in low[:2])
+    return first, last, max(heights)
+
+
+def _opening(
+    one: _Opening, ends: dict[str, Any], keys: dict[str, str], is_door: bool, path: Path
+) -> PlanOpening:
+    corners = one.hole_polygon or ([one.bounding_box.min, one.bounding_box.max] if one.bounding_box else [])
+    if one.wall0 not in ends or len(corners) < 2:
+        raise AssetError(f"{path}: {one.id!r} has no hole in a wall that is there; correct its wall0")
+    start, end, _ = ends[one.wall0]
+    along = np.subtract(end, start) / max(math.dist(start, end), 1e-6)
+    low, high = (f(point.x for point in corners) for f in (min, max))
+    first, last = ((np.array(start) + along * at).round(4).tolist() for at in (low, high))
+    bottom, top = (f(point.y for point in corners) for f in (min, max))
+    rooms = dict.fromkeys(keys[room] for room in (one.room0, one.room1) if room in keys)
+    return PlanOpening((first[0], first[1]), (last[0], last[1]), bottom, top, is_door, tuple(rooms))
