@@ -234,3 +234,39 @@ def write_procthor(path: Path, **changes: object) -> Path:
     }  # fmt: skip
     path.write_text(json.dumps({**house, **changes}))
     return path
+
+
+KITCHEN = """\
+room:
+  walls:
+    - {name: back, type: wall, size: [2, 1.5, 0.02], pos: [2, 0, 1.5]}
+    - {name: back_backing, type: wall, backing: true, size: [2, 1.5, 0.1], pos: [2, 0, 1.5]}
+    - {name: front, type: wall, wall_side: front, size: [2, 1.5, 0.02], pos: [2, -4, 1.5]}
+    - {name: left, type: wall, wall_side: left, size: [2, 1.5, 0.02], pos: [0, -2, 1.5]}
+    - {name: right, type: wall, wall_side: right, size: [2, 1.5, 0.02], pos: [4, -2, 1.5]}
+    - {name: clock, type: wall_accessory, attach_to: back, pos: [1, null, 2]}
+  floor:
+    - {name: floor, type: floor, size: [2, 2, 0.02], pos: [2, -2, 0]}
+main:
+  group_origin: [0, 0]
+  group_pos: [4, 0]
+  group_z_rot: -1.5707963
+  bottom:
+    - {name: sink, type: sink}
+    - {name: counter, type: counter, interior_obj: sink, size: [1.2, 0.65, 0.92], pos: [1, -0.325, 0.46]}
+    - {name: stove, type: stove, size: [null, 0.66, 0.92], align_to: counter, side: right, alignment: top_back}
+    - {name: oven, type: oven, size: [0.7, 0.6, 0.7]}
+    - {name: tall, type: housing_cabinet, interior_obj: oven, padding: [[0, 0.1], null, [0.5, 0.8]],
+       align_to: stove, side: right, alignment: bottom_back}
+    - {name: upper, type: hinge_cabinet, size: [counter, 0.4, null], stack_height: 1.3, stack_fixtures: [counter],
+       align_to: counter, side: top, alignment: back, offset: [0, 0, 0.6]}
+    - {name: kettle, type: electric_kettle, placement: {fixture: counter}}
+    - {name: rack, type: open_cabinet, enable: false}
+"""
+
+
+def write_robocasa(folder):
+    """A kitchen with a row of fixtures along its right wall, as RoboCasa lays them out."""
+    path = folder / "layout.yaml"
+    path.write_text(KITCHEN)
+    return path

@@ -17,10 +17,10 @@ decided is printed and kept in DIR/NAME/report.json; DIR/NAME/preview.png shows 
 
 HOUSE = """\
 Make a house of a scene of another simulator: an SDF world (Gazebo), an MJCF scene, a glTF, GLB or OBJ scene, a
-scene_instance.json of Habitat or a house JSON of ProcTHOR. Its parts become convex, its outer walls are closed, doors
-stand open, rooms are found, and bins are put against walls. Then it is checked as by `mjsim check`; every command takes
-DIR as --house. What was decided is printed and kept in DIR/report.json; DIR/preview.png shows the house from above
-(docs/import.md)."""
+scene_instance.json of Habitat, a house JSON of ProcTHOR, or a kitchen layout of RoboCasa (.yaml). Its parts become
+convex, its outer walls are closed, doors stand open, rooms are found, and bins are put against walls. Then it is
+checked as by `mjsim check`; every command takes DIR as --house. What was decided is printed and kept in
+DIR/report.json; DIR/preview.png shows the house from above (docs/import.md)."""
 
 
 def add_parser(commands: Any) -> None:
@@ -68,7 +68,7 @@ def _add_house(kinds: Any) -> None:
         "source",
         type=Path,
         metavar="SOURCE",
-        help=".world, .sdf, .xml, .glb, .gltf, .obj, .scene_instance.json or .json (ProcTHOR)",
+        help=".world, .sdf, .xml, .glb, .gltf, .obj, .scene_instance.json, .json (ProcTHOR) or .yaml (RoboCasa)",
     )
     add("--out", type=Path, required=True, metavar="DIR", help="folder of the house, new")
     add("--name", metavar="NAME", help="shown to the person (default: the name of the file)")

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 from mjsim.errors import AssetError
 
-EXTRA = ("coacd", "collada", "fast_simplification", "manifold3d", "networkx", "PIL", "trimesh")
+EXTRA = ("coacd", "collada", "fast_simplification", "manifold3d", "networkx", "PIL", "trimesh", "yaml")
 
 
 def require_extra() -> None:

@@ -1,6 +1,8 @@
 """Reading mesh files with trimesh: every node of the scene graph in its place, with its colours."""
 
 import logging
+import mmap
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -66,6 +68,11 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = SUFFIXES) -> None:
         raise AssetError(f"{path} is empty; export it again")
     if size > MAX_FILE:
         raise AssetError(f"{path} has {size / 1e6:.0f} MB; reduce it to {MAX_FILE / 1e6:.0f} MB or less")
+    if path.suffix.lower() in (".glb", ".gltf"):
+        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            needed = re.findall(rb'"extensionsRequired"\s*:\s*\[([^]]*)', data)
+        if packed := re.search(rb"\w*(draco|meshopt)\w*", b" ".join(needed)):
+            raise AssetError(f"{path} is compressed ({packed[0].decode()}); export it without compression")
 
 
 @contextmanager

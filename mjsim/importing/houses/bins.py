@@ -58,7 +58,8 @@ def place_bins(plan: Plan, rooms: Rooms, catalogue: Catalogue, seed: int = 0) ->
             bins.append(place)
     if not bins:
         raise AssetError(
-            f"has no place for a bin: a wall of 0.6 m with {_STAND} m of free floor before it; remove furniture"
+            f"has no place for a bin: a wall along x or y, 0.6 m long and 1.9 m high, with {_STAND} m of free floor "
+            "before it; remove furniture, or turn the source"
         )
     return tuple(bins)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from trimesh.transformations import translation_matrix
 
+from mjsim.episode import POINTS
 from mjsim.errors import AssetError, RenderError
 from mjsim.files import work_folder
 from mjsim.importing.houses.bins import place_bins
@@ -17,15 +18,17 @@ from mjsim.importing.houses.look import make_looks
 from mjsim.importing.houses.meshes import SUFFIXES as MESHES
 from mjsim.importing.houses.mjcf import SUFFIXES as MJCF
 from mjsim.importing.houses.mjcf import read_mjcf
-from mjsim.importing.houses.plan import Plan, make_plan
+from mjsim.importing.houses.plan import Plan, make_plan, too_large
 from mjsim.importing.houses.procthor import SUFFIXES as PROCTHOR
 from mjsim.importing.houses.procthor import read_procthor
+from mjsim.importing.houses.robocasa import SUFFIXES as ROBOCASA
+from mjsim.importing.houses.robocasa import read_robocasa
 from mjsim.importing.houses.rooms import find_rooms, read_rooms, words_of
 from mjsim.importing.houses.sdf import SUFFIXES as SDF
 from mjsim.importing.houses.sdf import read_sdf
-from mjsim.importing.houses.solids import LOW, Solids, make_solids
+from mjsim.importing.houses.solids import HIGH, LOW, Solids, make_solids
 from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, left_out, moved
-from mjsim.importing.houses.writer import ImportedHouse, write_house
+from mjsim.importing.houses.writer import ImportedHouse, set_points, write_house
 from mjsim.importing.model_writer import write_png
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
@@ -41,6 +44,7 @@ _BIN, _STEP = 0.02, 0.3  # m: resolution of heights; what lies on the lowest are
 _UPWARD = 0.2  # share of level surfaces that face up, from where on only these count
 _FLAT = 0.95  # cosine of the slope of a floor
 _FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself
+_FAR = 200.0  # m; what spans more is in no unit of a house
 _DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # m: thickness at most, width and height of a door leaf
 
 
@@ -61,7 +65,7 @@ def import_house(
     try:
         house, decisions = _converted(scene, source, options, label)
     except AssetError as error:
-        raise AssetError(f"{source}: {error}") from error
+        raise AssetError(f"{source}: {error}{_without(scene)}") from error
     out.parent.mkdir(parents=True, exist_ok=True)
     with work_folder(out.parent) as work:
         new = work / "new"
@@ -70,6 +74,14 @@ def import_house(
         report = check_house_name(str(path))
         if found := errors(report.findings):
             raise AssetError(f"{source}: {_refusal(found)}")
+        fits = int(report.facts["points that fit"].split()[0])
+        if fits < POINTS:  # the house says for how many it is meant; a few less, for other packings
+            points = max(fits - 2, 1)
+            set_points(path, points)
+            report = check_house_name(str(path))
+            decisions.append(
+                ImportDecision("points", f"{points}", f"{fits} places for objects a metre apart")
+            )
         if (note := _write_picture(path, new / PICTURE)) is not None:
             decisions.append(note)
         text = json.dumps([asdict(decision) for decision in decisions], indent=2, ensure_ascii=False)
@@ -78,6 +90,12 @@ def import_house(
             out.rename(work / "old")
         new.rename(out)
     return tuple(decisions), report
+
+
+def _without(scene: SourceScene) -> str:
+    """What may be why a house cannot be made: what the scene lacks."""
+    lacking = [note for note in scene.notes if note.choice.endswith(" missing")]
+    return "".join(f"; {note.choice}, and left out: {note.reason}" for note in lacking)
 
 
 def _refusal(found: Sequence[Finding]) -> str:
@@ -104,6 +122,7 @@ _READERS: tuple[tuple[tuple[str, ...], Callable[[Path, HouseOptions], SourceScen
     (MESHES, read_mesh_scene),
     ((INSTANCE,), read_habitat),
     (PROCTHOR, read_procthor),
+    (ROBOCASA, read_robocasa),
 )
 
 
@@ -121,6 +140,7 @@ def _converted(
     decisions += scene.notes
     pieces, notes = _kept(pieces, ceiling - level)
     decisions += notes
+    _check_span(pieces)
     doors = [piece for piece in pieces if _is_door(piece)]
     still = [piece for piece in pieces if not _is_door(piece)]
     solids = make_solids(still)
@@ -232,6 +252,15 @@ def _kept(pieces: list[Piece], ceiling: float) -> tuple[list[Piece], list[Import
             ImportDecision("other storeys", f"{_counted(dropped, 'triangle')} left out", "one storey is kept")
         )
     return kept, notes
+
+
+def _check_span(pieces: Sequence[Piece]) -> None:
+    """`AssetError` where what stands there is far larger than a house: in voxels it would not fit the memory."""
+    standing = [p.surface.corners.reshape(-1, 3) for p in pieces if p.solid]
+    high = [corners for corners in standing if corners[:, 2].max() > LOW and corners[:, 2].min() < HIGH]
+    sides = np.ptp(np.concatenate(high)[:, :2], axis=0) if high else np.zeros(2)
+    if sides.max() > _FAR:
+        raise too_large(sides)
 
 
 def _is_door(piece: Piece) -> bool:

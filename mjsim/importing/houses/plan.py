@@ -12,6 +12,7 @@ from scipy.ndimage import distance_transform_edt, label
 from mjsim.errors import AssetError
 from mjsim.importing.houses.solids import Solid
 from mjsim.importing.surface import Floats
+from mjsim.importing.values import UNITS
 
 CELL = 0.05  # m
 BODY = 0.27  # m, radius of a person with a little air
@@ -95,20 +96,21 @@ def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) ->
     points = np.concatenate(corners)
     low, high = points.min(axis=0), points.max(axis=0)
     if (high - low).max() > MAX_SIDE:
-        sides = " x ".join(f"{side:.4g}" for side in high - low)
-        raise AssetError(
-            f"spans {sides} m, and houses have at most {MAX_SIDE:g} m; give its unit by --units, or --scale"
-        )
+        raise too_large(high - low)
     origin = low - _PAD
     shape = tuple(np.ceil((high - low + 2 * _PAD) / CELL).astype(int).tolist())
     blocked, shut = (_at_heights(shape, origin, chosen, _BAND) for chosen in (solids, doors))
-    walls = np.logical_and.reduce([_at_heights(shape, origin, solids, band) for band in _WALL]) | shut
-    # Windows have sills: what is low closes the outside off, too.
-    indoors = _enclosed(walls | _at_heights(shape, origin, solids, _WALL[0]))
+    levels = [_at_heights(shape, origin, solids, band) for band in _WALL]
     drawn = _raster(shape, origin, floor)
-    plan = Plan(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
-    whole = replace(plan, indoors=_rectangle(drawn), enclosed=False)
-    if plan.area < max(_MIN_AREA, _LEAST_SHARE * whole.area):
+    for count in (len(_WALL), len(_WALL) - 1):  # walls as high as eyes, else lower ones
+        walls = np.logical_and.reduce(levels[:count]) | shut
+        # Windows have sills: what is low closes the outside off, too.
+        indoors = _enclosed(walls | levels[0])
+        plan = Plan(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
+        whole = replace(plan, indoors=_rectangle(drawn), enclosed=False)
+        if plan.area >= max(_MIN_AREA, _LEAST_SHARE * whole.area):
+            break
+    else:
         plan = whole
     if plan.area < 1.0:
         raise AssetError(
@@ -116,6 +118,14 @@ def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) ->
             "is the unit right (--units), and which way is up (--up)?"
         )
     return plan
+
+
+def too_large(sides: Floats) -> AssetError:
+    """The error about a scene with such sides (2,), m, with the unit in which it would be a house."""
+    said = " x ".join(f"{side:.4g}" for side in sides)
+    unit = next((u for u, metres in UNITS.items() if 3.0 <= sides.max() * metres <= MAX_SIDE), None)
+    advice = "give its unit by --units, or --scale" if unit is None else f"is it in {unit} (--units {unit})?"
+    return AssetError(f"spans {said} m, and houses have at most {MAX_SIDE:g} m; {advice}")
 
 
 def clearance(free: Mask) -> Floats:

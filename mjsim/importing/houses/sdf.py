@@ -1,6 +1,7 @@
 """SDF worlds (Gazebo): models with their links, poses, shapes and meshes; joints stand still."""
 
 import os
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -33,7 +34,12 @@ def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
     top = root.find("world")
     pieces = list(reader.models(root if top is None else top, np.eye(4), path.parent, 0, static=False))
     if not pieces:
-        raise AssetError(f"{path} has no model with a shape or a mesh; give the world file of a house")
+        why = "give the world file of a house"
+        if files := reader.missing.files:
+            why = (
+                f"{len(files)} that it names are not there, such as {files[0]}: give their folder by --models"
+            )
+        raise AssetError(f"{path} has no model with a shape or a mesh; {why}")
     return SourceScene(tuple(pieces), "SDF world", (*reader.missing.notes(), *reader.unknown_kinds()))
 
 
@@ -160,7 +166,8 @@ class _Reader:
 
 def _root(path: Path) -> ET.Element:
     try:
-        root = ET.fromstring(read_text(path))
+        # Gazebo takes comments before the declaration.
+        root = ET.fromstring(re.sub(r"<\?xml[^>]*\?>", "", read_text(path), count=1))
     except (OSError, UnicodeDecodeError, ET.ParseError) as error:
         raise AssetError(f"cannot read {path} as SDF: {error}; is it complete?") from error
     if root.tag != "sdf":
@@ -173,11 +180,13 @@ def _model_file(folder: Path) -> Path:
     config = folder / "model.config"
     if config.is_file():
         try:
-            named = ET.fromstring(read_text(config)).findtext("sdf")
+            named = ET.fromstring(read_text(config)).findall("sdf")
         except (OSError, UnicodeDecodeError, ET.ParseError):
-            named = None
-        if named and (folder / named.strip()).is_file():
-            return folder / named.strip()
+            named = []
+        named.sort(key=lambda sdf: [int(n) for n in re.findall(r"\d+", sdf.get("version", ""))], reverse=True)
+        for sdf in named:  # the newest that is there
+            if (file := folder / (sdf.text or "").strip()).is_file():
+                return file
     if (folder / "model.sdf").is_file():
         return folder / "model.sdf"
     raise AssetError(f"the model {folder} has no model.sdf; correct its model.config")

@@ -14,7 +14,7 @@ from mjsim.importing.parts import _few_vertices
 from mjsim.importing.surface import Floats
 
 BUDGET = 1500  # geoms that collide
-LOW, HIGH = 0.045, 1.9  # m; what ends below is walked over, what begins above is only seen
+LOW, HIGH = 0.051, 1.9  # m; what ends below is walked over, what begins above is only seen
 _PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)  # m, sides of voxels, the first within the budget
 _BOX = 0.95  # share of its bounding box that the hull of a box fills
 _CONVEX = 0.85  # share of its hull that a convex thing fills
@@ -61,18 +61,21 @@ def make_solids(pieces: Iterable[Piece]) -> Solids:
     """Convex parts of all solid pieces at the heights of a person."""
     simple: list[Solid] = []
     rest: list[tuple[str, trimesh.Trimesh]] = []
+    things: dict[str, list[trimesh.Trimesh]] = {}
     for piece in pieces:
-        if not piece.solid:
-            continue
-        for mesh in _parts(piece):
-            solid = _simple(piece.name, mesh)
+        if piece.solid:
+            things.setdefault(piece.name, []).extend(_parts(piece))
+    for name, meshes in things.items():
+        for mesh in _together(meshes):
+            solid = _simple(name, mesh)
             if solid is None:
-                rest.append((piece.name, mesh))
+                rest.append((name, mesh))
             else:
                 simple.append(solid)
     boxes: list[Solid] = []
     for pitch in _PITCHES:
-        boxes = [solid for name, mesh in rest for solid in _few_voxels(name, mesh, pitch)]
+        made = (solid for name, mesh in rest for solid in _few_voxels(name, mesh, pitch))
+        boxes = [solid for solid in made if solid.high[2] > LOW]
         if len(simple) + len(boxes) <= BUDGET:
             break
     hulls = sum(solid.hull is not None for solid in simple)
@@ -91,6 +94,13 @@ def _parts(piece: Piece) -> Iterator[trimesh.Trimesh]:
             yield part
 
 
+def _together(meshes: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
+    """Parts of a thing; furniture of many, such as the keys of a keyboard, is one."""
+    if len(meshes) <= _FEW or not _compact(np.ptp([m.bounds for m in meshes], axis=(0, 1))):
+        return meshes
+    return [trimesh.util.concatenate(meshes)]
+
+
 def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
     """A box or a hull where that is what it is, or it is small; else None."""
     low, high = mesh.bounds
@@ -100,7 +110,7 @@ def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
         filled = mesh.area / 2 / max(flat[1] * flat[2], 1e-9) if not mesh.is_watertight else 1.0
         return _box(name, low, high) if filled > _CONVEX / 2 + 0.05 or flat[2] < _SMALL else None
     try:
-        hull = mesh.convex_hull
+        hull = trimesh.convex.convex_hull(_thickened(np.asarray(mesh.vertices)))
     except QhullError:
         return _box(name, low, high)
     if hull.volume > _BOX * np.prod(extents):
@@ -111,6 +121,14 @@ def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
         points = _few_vertices(np.asarray(hull.vertices))
         return Solid(name, points.min(axis=0), points.max(axis=0), points)
     return None
+
+
+def _thickened(points: Floats) -> Floats:
+    """Vertices (k, 3) of a thing, with others beside them where all lie on a slanted plane or line."""
+    for axis in np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][::-1][:2]:
+        if np.ptp(points @ axis) < _THIN:
+            points = np.concatenate([points - axis * _THIN / 2, points + axis * _THIN / 2])
+    return points
 
 
 def _filled(mesh: trimesh.Trimesh, hull: trimesh.Trimesh) -> bool:

@@ -72,6 +72,12 @@ def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Pat
     return path
 
 
+def set_points(catalogue: Path, points: int) -> None:
+    """Say in a catalogue that was written for how many points the house is meant."""
+    text = catalogue.read_text(encoding="utf-8")
+    catalogue.write_text(text.replace("[house]\n", f"[house]\npoints = {points}\n", 1), encoding="utf-8")
+
+
 def _assets(house: ImportedHouse, folder: Path) -> Iterator[str]:
     """Meshes, pictures and materials; writes their files."""
     known: set[str] = set()

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from house_scenes import write_glb, write_habitat, write_mjcf, write_obj, write_sdf
+from house_scenes import write_glb, write_habitat, write_mjcf, write_obj, write_robocasa, write_sdf
 
 from experiments.cli import main as cli
 from mjsim.errors import AssetError
@@ -167,6 +167,21 @@ def test_an_mjcf_scene_stands_still_and_walls_that_were_only_seen_are_solid(tmp_
     assert house.model.ntex >= 1  # the plaster
 
 
+def test_a_kitchen_layout_stands_where_its_fixtures_say(tmp_path):
+    decisions, catalogue = imported(tmp_path, write_robocasa(tmp_path))
+    assert list(catalogue.rooms.values()) == ["Kitchen"]
+    assert decisions["left out"].startswith("1 electric_kettle, 1 wall_accessory")
+    assert catalogue.points < 40  # and no warning about it
+    house = compiled_house(catalogue)
+    for name, low, high in (
+        ("counter_main", (3.35, -1.6, 0), (4.0, -0.4, 0.92)),  # turned to the right wall
+        ("stove_main", (3.34, -2.36, 0), (4.0, -1.6, 0.92)),  # flush with it
+        ("oven_tall_main", (3.4, -3.16, 0), (4.0, -2.36, 2.0)),  # its cabinet has the oven and the padding
+        ("upper_main", (3.6, -1.6, 1.52), (4.0, -0.4, 1.9)),  # up to 1.3 m above the floor, and 0.6 m higher
+    ):
+        np.testing.assert_allclose(colliding(house, name), (low, high), atol=0.01)
+
+
 @pytest.mark.slow
 def test_our_apartment_imports_with_its_rooms_and_its_floor(tmp_path):
     _, catalogue = imported(tmp_path, models_root() / "houses" / "apartment" / "house.xml")
@@ -263,6 +278,15 @@ def test_a_folder_that_is_there_is_kept(tmp_path):
         (write_habitat, lambda text: text.replace("[2, 0.45, -1]", "[2, -1]"), "3 numbers"),
         (write_habitat, lambda text: text[:-5], "cannot read"),
         (write_habitat, lambda _: "[]", "no JSON object"),
+        (write_robocasa, lambda _: "room: [", "cannot read"),
+        (write_robocasa, lambda _: "kitchen: 1", "without a room"),
+        (write_robocasa, lambda text: text.replace("type: oven", "type: forge"), "'oven': its type 'forge'"),
+        (
+            write_robocasa,
+            lambda text: text.replace("align_to: stove", "align_to: none"),
+            "'tall': KeyError: 'none'",
+        ),
+        (write_robocasa, lambda text: text.replace("[1.2, 0.65,", "[-1.2, 0.65,"), "'counter': its size"),
     ],
 )
 def test_a_damaged_scene_is_refused_by_its_cause(tmp_path, write, damage, reason):
@@ -278,7 +302,7 @@ def test_a_damaged_scene_is_refused_by_its_cause(tmp_path, write, damage, reason
     ("mesh", "options", "reason"),
     [
         (trimesh.creation.box((0.5, 0.5, 0.9)), {}, "nowhere to walk"),
-        (trimesh.creation.box((900, 700, 3)), {}, "spans"),
+        (trimesh.creation.box((900, 700, 3)), {}, r"spans 900 x 3 m.* \(--units cm\)"),
         (trimesh.creation.box((8, 0.01, 5)), {"up": "z"}, "nowhere|level"),
     ],
 )
