@@ -87,9 +87,9 @@ class Server:
 
 
 @contextmanager
-def mariadb() -> Iterator[Server]:
-    """A running MariaDB."""
-    with _folder("mysql") as (folder, user):
+def mariadb(place: Path | None = None) -> Iterator[Server]:
+    """A running MariaDB, with its data in a new folder at a place."""
+    with _folder("mysql", place) as (folder, user):
         port = _free_port()
         data = f"--datadir={folder / 'data'}"
         _run([_program("mariadb-install-db"), "--no-defaults", data, "--skip-test-db"], folder, user)
@@ -108,9 +108,9 @@ def mariadb() -> Iterator[Server]:
 
 
 @contextmanager
-def postgresql() -> Iterator[Server]:
-    """A running PostgreSQL."""
-    with _folder("postgres") as (folder, user):
+def postgresql(place: Path | None = None) -> Iterator[Server]:
+    """A running PostgreSQL, with its data in a new folder at a place."""
+    with _folder("postgres", place) as (folder, user):
         port = _free_port()
         data = str(folder / "data")
         _run([_program("initdb"), "-D", data, "-A", "trust", "-U", "study", "-E", "UTF8"], folder, user)
@@ -126,7 +126,7 @@ SERVERS = {"mariadb": mariadb, "postgresql": postgresql}
 
 
 @contextmanager
-def _folder(owner: str) -> Iterator[tuple[Path, str | None]]:
+def _folder(owner: str, place: Path | None) -> Iterator[tuple[Path, str | None]]:
     """A temporary folder, and the server's own user where root runs the tests: servers refuse root."""
     user = None
     if os.geteuid() == 0:
@@ -134,7 +134,7 @@ def _folder(owner: str) -> Iterator[tuple[Path, str | None]]:
             user = pwd.getpwnam(owner).pw_name
         except KeyError as error:
             raise MissingProgramError(f"there is no user {owner!r}") from error
-    folder = Path(tempfile.mkdtemp(prefix="database-"))
+    folder = Path(tempfile.mkdtemp(prefix="database-", dir=place))
     try:
         if user is not None:
             shutil.chown(folder, user)

@@ -139,12 +139,16 @@ class SimulatedBrowser:
         doing += [self._take_steps()] if self.draws else []
         self._tasks = [asyncio.create_task(task) for task in doing]
 
-    async def cut(self, *, amid_a_message: bool = False) -> None:
+    def lose(self, *, amid_a_message: bool = False) -> None:
         """Lose the connection, without a word to the server, or in the middle of one."""
         if self._socket is not None:
             if amid_a_message:
                 self._socket.transport.write(HALF_A_MESSAGE)
             self._socket.transport.abort()
+
+    async def cut(self, *, amid_a_message: bool = False) -> None:
+        """Lose the connection, and know it."""
+        self.lose(amid_a_message=amid_a_message)
         await self._end()
 
     async def close(self) -> None:
@@ -226,8 +230,7 @@ class SimulatedBrowser:
         self._say_run()
         await self.until(lambda: self.phase == "running")
         self.next = max([number, *(new["number"] for new in self._waiting)]) + 1
-        for first in range(0, len(self._waiting), MAX_INPUTS):
-            self.say(type="inputs", inputs=self._waiting[first : first + MAX_INPUTS])
+        self._repeat()
         return number
 
     async def taken(self) -> None:
@@ -243,6 +246,11 @@ class SimulatedBrowser:
 
     def _say_run(self) -> None:
         self.say(type="run", **({"until": 0} if self.draws else {}))
+
+    def _repeat(self) -> None:
+        """Send again what was not acknowledged."""
+        for first in range(0, len(self._waiting), MAX_INPUTS):
+            self.say(type="inputs", inputs=self._waiting[first : first + MAX_INPUTS])
 
     def _send_inputs(self, inputs: list[dict[str, Any]], **promise: int) -> None:
         now = time.perf_counter()
@@ -312,6 +320,7 @@ class SimulatedBrowser:
             self._step = None
             if content["reason"] == "silent":
                 self._say_run()
+                self._repeat()
         if content["type"] == "taken":
             now, before = time.perf_counter(), self.acknowledged
             self.acknowledged = max(before, content["input"])

@@ -31,6 +31,7 @@ class PlayProcess:
         words: Further words of its command line.
         core: The only one that it may use; None for all.
         command: What is run; `study serve FILE` for a study.
+        program: What runs it.
 
     Attributes:
         url: Its URL.
@@ -38,9 +39,14 @@ class PlayProcess:
     """
 
     def __init__(
-        self, folder: Path, *words: str, core: int | None = None, command: Sequence[str] = ("play",)
+        self,
+        folder: Path,
+        *words: str,
+        core: int | None = None,
+        command: Sequence[str] = ("play",),
+        program: Sequence[str] = (sys.executable, "-m", "mjsim"),
     ) -> None:
-        self._folder, self._words, self._command = folder, words, command
+        self._folder, self._words, self._command = folder, words, (*program, *command)
         self._cores = os.sched_getaffinity(0) if core is None else {core}
         self.output = folder.with_name("server.txt")
         self.url = ""
@@ -50,9 +56,7 @@ class PlayProcess:
         port = urlsplit(self.url).port or 0
         command = [*self._command, "--no-open", "--port", str(port), "--out", str(self._folder), *self._words]
         with self.output.open("ab") as output:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "mjsim", *command], stdout=subprocess.PIPE, stderr=output, text=True
-            )
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=output, text=True)
         os.sched_setaffinity(self.process.pid, self._cores)
         self.url = self.process.stdout.readline().strip() if self.process.stdout else ""
         if not self.url:

@@ -77,9 +77,18 @@ class Times:
 
 
 async def ask(
-    url: str, path: str, form: Mapping[str, str] | None = None, number: int = 0, cookie: str = ""
+    url: str,
+    path: str,
+    form: Mapping[str, str] | None = None,
+    number: int = 0,
+    cookie: str = "",
+    patience: float = PATIENCE,
 ) -> Answer:
-    """Ask for a page as person `number`, on a connection of its own; with a form, post it."""
+    """Ask for a page as person `number`, on a connection of its own; with a form, post it.
+
+    Raises:
+        OSError: No answer came; a TimeoutError after so many seconds.
+    """
     parts, body = urlsplit(url), "" if form is None else urlencode(form)
     head = [f"{'GET' if form is None else 'POST'} {path} HTTP/1.1", f"Host: {parts.netloc}"]
     head += [f"Origin: http://{parts.netloc}", "Connection: close", f"Content-Length: {len(body)}"]
@@ -88,7 +97,8 @@ async def ask(
     reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
     try:
         writer.write("\r\n".join([*head, "", body]).encode())
-        top, _, content = (await reader.read(-1)).decode().partition("\r\n\r\n")
+        async with asyncio.timeout(patience):
+            top, _, content = (await reader.read(-1)).decode().partition("\r\n\r\n")
     finally:
         writer.close()
     if not top:

@@ -6,7 +6,7 @@ from datetime import timedelta
 from typing import Literal, TypeVar
 
 from experiments.people.recruitment.payer import DeclinedError, Order, Payer, StoppedError, UnsureError
-from experiments.people.store import PaymentEvent, Store, utc_now
+from experiments.people.store import PaymentEvent, Store
 from experiments.people.store.ledger import IN_DOUBT_AFTER
 
 T = TypeVar("T")
@@ -60,7 +60,7 @@ class Sender:
     async def _settle(self, last: PaymentEvent) -> Sent | None:
         """Ask about an attempt without an outcome; None if the platform did certainly not pay."""
         later = last.at + max(IN_DOUBT_AFTER, self._payer.listed_after)
-        if later > utc_now():
+        if later > await self._ledger.now():
             again = f"{later:%Y-%m-%d %H:%M} UTC"
             return Sent(last.key, "in doubt", f"sent without an answer; run this again after {again}")
         order = await self._order(last, last.attempt)

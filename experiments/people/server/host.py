@@ -5,8 +5,8 @@ import logging
 import time
 
 from experiments.errors import StoreError
-from experiments.people.store import Person, Store, utc_now
-from experiments.people.store.hosts import LEASE, SILENT
+from experiments.people.store import Person, Store
+from experiments.people.store.hosts import LEASE
 from experiments.people.study_file import PLAYED
 from experiments.web.server.sessions import Sessions
 from experiments.web.server.visits import Visits
@@ -55,4 +55,4 @@ class HostOfVisits:
 
     async def leave(self) -> None:
         """Note that nothing runs here any more."""
-        await self._store.greet(self._name, utc_now() - SILENT)
+        await self._store.greet(self._name, leaves=True)

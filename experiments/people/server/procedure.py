@@ -66,7 +66,8 @@ class Procedure:
         number = self._names.index(person.phase)
         shown = await self.store.show_phase(person.id, person.phase)
         passed = (utc_now() - shown.shown).total_seconds()
-        wait = max(0.0, self.study.settings.minimum.get(person.phase, 0.0) - passed)
+        minimum = self.study.settings.minimum.get(person.phase, 0.0)
+        wait = max(0.0, minimum - passed) if passed >= 0.0 else 0.0  # the clock was set back
         rows = await self.store.answers(person.id)
         answers = {row.item: row.value for row in rows if row.phase == person.phase}
         visitor = Visitor(answers, passed, answers.get(ATTEMPTS, 0), path)

@@ -1,4 +1,7 @@
-"""Several hosts with one database: which of them are there, and which one keeps what a person plays."""
+"""Several hosts with one database: which of them are there, and which one keeps what a person plays.
+
+When a host was heard of is told by the database's clock, as those of hosts may be wrong.
+"""
 
 from datetime import datetime, timedelta
 
@@ -6,9 +9,9 @@ from sqlalchemy import delete, exists, insert, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
-from experiments.people.store.part import Part, note
+from experiments.people.store.part import Part, database_now, note
 from experiments.people.store.tables import assignment, host, person
-from experiments.people.store.values import Host, utc_now
+from experiments.people.store.values import Host
 
 LEASE = timedelta(seconds=60)  # without a word from it, a host ends its sessions
 SILENT = timedelta(seconds=90)  # and some time later, others may have them
@@ -18,14 +21,14 @@ HANDED_OVER = "-"  # in place of a host: whoever has the journal
 class Hosts(Part):
     """Rows of `host`, and `person.host`."""
 
-    async def greet(self, name: str, now: datetime | None = None) -> bool:
-        """Note that a host is there; whether it takes new visits."""
-        now = now or utc_now()
+    async def greet(self, name: str, *, leaves: bool = False) -> bool:
+        """Note that a host is there, or that it leaves; whether it takes new visits."""
         mine = (host.c.study_id == self._study_id, host.c.name == name)
 
         async def work(connection: AsyncConnection) -> bool:
-            if not (await connection.execute(update(host).where(*mine).values(seen=now))).rowcount:
-                values = {"study_id": self._study_id, "name": name, "seen": now, "draining": False}
+            seen = await database_now(connection) - SILENT * leaves
+            if not (await connection.execute(update(host).where(*mine).values(seen=seen))).rowcount:
+                values = {"study_id": self._study_id, "name": name, "seen": seen, "draining": False}
                 await connection.execute(insert(host).values(**values))
             return not (await connection.execute(select(host.c.draining).where(*mine))).scalar_one()
 
@@ -58,16 +61,17 @@ class Hosts(Part):
 
         return await self._database.write(work)
 
-    async def drain(self, name: str, draining: bool, who: str, now: datetime | None = None) -> None:
+    async def drain(self, name: str, draining: bool, who: str) -> None:
         """Let a host take no new visits, or take them again; those it has go on."""
-        now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:
             mine = (host.c.study_id == self._study_id, host.c.name == name)
             if not (await connection.execute(update(host).where(*mine).values(draining=draining))).rowcount:
                 raise StoreError(f"There is no host {name!r}; `mjsim study hosts` lists them.")
             action = "host drained" if draining else "host opened"
-            await note(connection, self._study_id, who, action, {"host": name}, now)
+            await note(
+                connection, self._study_id, who, action, {"host": name}, await database_now(connection)
+            )
 
         await self._database.write(work)
 
@@ -76,14 +80,14 @@ class Hosts(Part):
 
         Raises StoreError while the host may still run them.
         """
-        now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> int:
+            at = now or await database_now(connection)
             mine = (host.c.study_id == self._study_id, host.c.name == name)
             seen = (await connection.execute(select(host.c.seen).where(*mine).with_for_update())).scalar()
             if seen is None:
                 raise StoreError(f"There is no host {name!r}; `mjsim study hosts` lists them.")
-            if now - seen < SILENT:
+            if at - seen < SILENT:
                 raise StoreError(
                     f"Host {name!r} may be running: stop its server, or wait until nothing was heard of it for "
                     f"{SILENT.total_seconds():.0f} s."
@@ -92,7 +96,7 @@ class Hosts(Part):
             moved = await connection.execute(update(person).where(*theirs).values(host=HANDED_OVER))
             await connection.execute(delete(host).where(*mine))
             details = {"host": name, "visits": moved.rowcount}
-            await note(connection, self._study_id, who, "host handed over", details, now)
+            await note(connection, self._study_id, who, "host handed over", details, at)
             return moved.rowcount
 
         return await self._database.write(work)

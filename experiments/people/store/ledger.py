@@ -2,7 +2,7 @@
 
 Every payment has a key. `sending` is on the disk before the platform is asked, so after a crash between the platform's
 yes and our note the payment is known to be in doubt: the platform is asked what it knows of the key before anything is
-sent again.
+sent again. How long ago that was is told by the database's clock.
 """
 
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ from sqlalchemy import ColumnElement, insert, select
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
-from experiments.people.store.part import Part, lock_study
+from experiments.people.store.part import Part, database_now, lock_study
 from experiments.people.store.tables import payment, person
-from experiments.people.store.values import PaymentEvent, PaymentKind, utc_now
+from experiments.people.store.values import PaymentEvent, PaymentKind
 
 ONCE: tuple[PaymentKind, ...] = (
     "reward",
@@ -130,10 +130,15 @@ class Ledger(Part):
         Where it is `sending`, the payment is in doubt: ask the platform what it knows of the key, then
         :meth:`confirm` or :meth:`fail` that attempt.
         """
-        limit = (now or utc_now()) - in_doubt_after
+        limit = (now or await self.now()) - in_doubt_after
         payments = by_key(await self.history()).values()
         unpaid = [events[-1] for events in payments if not paid(events)]
         return tuple(last for last in unpaid if not last.in_doubt or last.at <= limit)
+
+    async def now(self) -> datetime:
+        """The time by the clock that tells when events were noted."""
+        async with self._database.reading() as connection:
+            return await database_now(connection)
 
     async def history(self, person_id: int | None = None) -> tuple[PaymentEvent, ...]:
         """Events of a person, or all, in order."""
@@ -180,7 +185,7 @@ class Ledger(Part):
             "key": key,
             "attempt": attempt,
             "event": event,
-            "at": now or utc_now(),
+            "at": now or await database_now(connection),
         }
         await connection.execute(insert(payment).values(**texts | row | values))
 

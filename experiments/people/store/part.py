@@ -4,11 +4,17 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import CursorResult, insert, select
+from sqlalchemy import CursorResult, func, insert, select
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.people.store import tables
 from experiments.people.store.engine import Database
+
+_NOW = {
+    "sqlite": func.current_timestamp(type_=tables.Utc),
+    "mysql": func.utc_timestamp(6, type_=tables.Utc),
+    "postgresql": func.timezone("UTC", func.now(), type_=tables.Utc),
+}
 
 
 class Part:
@@ -22,6 +28,11 @@ def new_id(inserted: CursorResult[Any]) -> int:
     """The id of a row that was inserted."""
     key = inserted.inserted_primary_key
     return int(key[0]) if key else 0
+
+
+async def database_now(connection: AsyncConnection) -> datetime:
+    """The time by the clock of the database, which all hosts share; those of hosts may be wrong."""
+    return (await connection.execute(select(_NOW[connection.dialect.name]))).scalar_one()
 
 
 async def lock_study(connection: AsyncConnection, study_id: int) -> dict[str, int]:
