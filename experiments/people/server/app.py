@@ -192,6 +192,7 @@ class StudyServer:
         form = await sent_form(request)
         async with self._lock(person):
             await self.sessions.release(lambda session: session.visit.name == person.token_hash)
+            self.sessions.limit.release(person.token_hash)  # also where its page had just been let in
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 

@@ -14,7 +14,7 @@ MOST = (
     1 / 3
 )  # of a core that a session takes whose frames are drawn here; one that is not measured yet counts as that
 SERVER = 0.7  # of the one core that the server can take, above which nobody is let in
-WINDOWS = 6  # measurements of which the largest counts
+WINDOWS = 6  # measurements of a session, of which the largest counts
 QUOTA = Path("/sys/fs/cgroup/cpu.max")  # of a container: time in a period, and the period, in microseconds
 
 
@@ -30,7 +30,6 @@ class Capacity:
         self._seen: dict[str, tuple[float, float]] = {}  # when, and processor time then, of running sessions
         self._shares: dict[str, deque[float]] = {}
         self._own = time.monotonic(), time.process_time()
-        self._own_shares: deque[float] = deque([0.0], WINDOWS)
 
     def measure(self, sessions: Mapping[str, PlayedSession], held: Collection[str]) -> int:
         """How many sessions there may be, at least one; call it every few seconds.
@@ -41,14 +40,12 @@ class Capacity:
         """
         now = time.monotonic()
         before, self._own = self._own, (now, time.process_time())
-        if now > before[0]:
-            self._own_shares.append((self._own[1] - before[1]) / (now - before[0]))
+        server = (self._own[1] - before[1]) / max(now - before[0], 1.0)
         for name in held:
             self._measure(name, now, sessions[name].processor_time if name in sessions else None)
         for name in self._shares.keys() - set(held):
             del self._shares[name]
             self._seen.pop(name, None)
-        server = max(self._own_shares)
         taken = server + sum(max(self._shares[name], default=MOST) for name in held)
         room = 0.0 if server > SERVER else SHARE * self._cores - taken
         return max(1, len(held) + max(0, int(room / MOST)))
