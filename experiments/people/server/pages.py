@@ -77,13 +77,13 @@ class StudyPages:
         return self.show(request, shown.template, **values, back=back, finished=True)
 
     def queue(self, request: Request, now: Now, queued: Queued) -> Response:
-        """The page of somebody who waits for a place; it loads itself again."""
+        """The page of somebody who waits for a place; it asks again by itself."""
         section = self._study.texts["queue"]
         values = {"place": str(queued.position), "wait": str(max(1, round(queued.wait / 60.0)))}
         texts = [*section.paragraphs(), *section.paragraphs("time_limit")[: self._recruiter.has_time_limit]]
         filled = [re.sub(r"\{(place|wait)\}", lambda found: values[found[1]], text) for text in texts]
-        around = {**self._around(now), "section": section, "paragraphs": filled}
-        return self.show(request, "queue", **around, refresh=round(queued.refresh))
+        around = {**self._around(now), "section": section, "paragraphs": []}
+        return self.show(request, "queue", **around, texts=filled, refresh=round(queued.refresh))
 
     def _around(self, now: Now) -> dict[str, Any]:
         """What the pages of all phases have."""

@@ -39,7 +39,7 @@ def place(client, link):
     text = client.get(link).text
     if "data-trial" in text:
         return None
-    assert re.search(r'<meta http-equiv="refresh" content="\d+">', text) and "<script" not in text
+    assert re.search(r'<noscript><meta http-equiv="refresh" content="\d+"></noscript>', text)
     return int(re.search(r"number (\d+) in the queue", text)[1])
 
 
