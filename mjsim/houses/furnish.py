@@ -1,5 +1,6 @@
 """Puts furniture and bins into a floor plan, by rules: what a home must have first, then what rooms usually have."""
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 
@@ -112,8 +113,8 @@ class Home:
         builder.shadow(w, (0, d))
         holder = Holder(receptacle, (0.0, d / 2, 0.0))
         piece = builder.piece((w, d, h), use=0.75, mounts=(holder,))
-        for space in (*self.rooms(uses), *self.spaces):
-            place = space.put(piece)
+        for space, beside_doors in itertools.product((*self.rooms(uses), *self.spaces), (False, True)):
+            place = space.put(piece, avoid=() if beside_doors else space.corners)
             if place is not None:
                 self._note(space, piece, place)
                 return True

@@ -13,6 +13,7 @@ from mjsim.houses.values import BACK, SIDES, FloorPlan, Room, Side
 
 BODY = 0.36  # m, radius of what has to come through: ways are twice as wide
 STEP = 0.1  # m, between the places that are tried along a wall
+BESIDE = 0.6  # m beside a door where no bin stands if there is another place
 DOORWAY = 1.0  # m in front of a door that stay free
 SNUG, APART = 0.09, 0.62  # m: gaps are at most, or at least, so wide, for nobody to be caught in them
 WALL_GAP = 0.01  # m, behind furniture
@@ -54,6 +55,9 @@ class Space:
     keep: list[Spot] = field(default_factory=list)  # no piece may stand there
     use: list[Spot] = field(default_factory=list)  # as `keep`; somebody must be able to go there
     near: list[Spot] = field(default_factory=list)  # solids that somebody must be able to come near to
+    corners: list[Spot] = field(
+        default_factory=list
+    )  # beside doors: who stands in one would reach around its frame
     doors: list[tuple[float, float]] = field(default_factory=list)  # points within them
     windows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     hung: list[tuple[Side, float, float, float]] = field(default_factory=list)  # side, from, to, lowest point
@@ -70,6 +74,8 @@ class Space:
             deep = min(DOORWAY, max(0.75, across - 0.3))
             zone = floor.along(side, door.center - half - 0.06, door.center + half + 0.06, 0, deep)
             space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
+            zone = floor.along(side, door.center - half - BESIDE, door.center + half + BESIDE, 0, BESIDE)
+            space.corners.append((zone.x0, zone.y0, zone.x1, zone.y1))
             space.doors.append(floor.along(side, door.center, door.center, 0.42, 0.42).center)
             space.hung.append((side, door.center - half - 0.12, door.center + half + 0.12, 0.0))
             if door.leaf is not None and door.leaf.room == room.key:
@@ -94,7 +100,11 @@ class Space:
         return self.room.floor.depth if side in ("south", "north") else self.room.floor.width
 
     def put(
-        self, piece: Piece, sides: Sequence[Side] = SIDES, near: tuple[float, float] | None = None
+        self,
+        piece: Piece,
+        sides: Sequence[Side] = SIDES,
+        near: tuple[float, float] | None = None,
+        avoid: Sequence[Spot] = (),
     ) -> Place | None:
         """Put a piece at the best place; None where there is none.
 
@@ -102,6 +112,7 @@ class Space:
             piece: What shall stand.
             sides: Walls that it may stand at.
             near: A point, m, that it shall be near to.
+            avoid: Where it shall not stand.
         """
         free = piece.stands == "free"
         places = self._free_places() if free else self._wall_places(piece, sides)
@@ -109,7 +120,8 @@ class Space:
             return None
         boxes, uses = (_moved(spots, places) for spots in ([part.spot for part in piece.parts], piece.use))
         tops = np.array([part.top for part in piece.parts])
-        fits = np.flatnonzero(self._fits(boxes, tops, uses, free))
+        ok = self._fits(boxes, tops, uses, free) & ~_overlap(boxes, np.array(avoid).reshape(-1, 4))
+        fits = np.flatnonzero(ok)
         scores = self._scores(boxes[fits], places[fits], near, free)
         best: list[int] = fits[np.argsort(-scores, kind="stable")[:TRIES]].tolist()
         for k in best:
