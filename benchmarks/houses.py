@@ -26,7 +26,17 @@ FIRST_SEED = 50_000
 OUT = Path("runs/bench-houses")
 AGAIN = 10  # one home of so many is made again in another process
 FURNISHED = (0.25, 0.45)  # of the floor
-FAULTS = ("failure", "errors", "warnings", "empty", "unusable", "windows_behind", "lacking", "areas_off")
+FAULTS = (
+    "failure",
+    "errors",
+    "warnings",
+    "empty",
+    "unusable",
+    "pockets",
+    "windows_behind",
+    "lacking",
+    "areas_off",
+)
 
 
 def _count(key: str) -> Callable[[Rows], float]:
@@ -108,6 +118,7 @@ REQUIREMENTS: Mapping[str, tuple[Callable[[Rows], float], str, float]] = {
     ),
     "narrowest way into a room, m": (_of("way", min), ">=", WAY),
     "pieces that nobody comes to by ways of 0.70 m": (_count("unusable"), "<=", 0),
+    "places that large people do not come to": (lambda rows: sum(row["pockets"] for row in rows), "<=", 0),
     "windows behind something higher than the sill": (_count("windows_behind"), "<=", 0),
     "homes that lack something they must have": (_homes("lacking"), "<=", 0),
     "least share of the floor that is furnished": (_of("share", min), ">=", FURNISHED[0]),

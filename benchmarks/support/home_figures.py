@@ -33,6 +33,11 @@ DRAWN = 10  # one home of so many is exported as the browser's client draws it
 CELL = 0.0125  # m
 BAND = (0.05, 1.8)  # m, heights in which a person bumps into things
 WAY = 0.70  # m
+USUAL, LARGE = (
+    0.50,
+    0.58,
+)  # m, a body of 0.20 and one of 0.24 m radius, with the planner's clearance of 0.05 m
+POCKET = 0.01  # m2 of floor for the middle of a body
 REACH = 0.60  # m from the middle of a person to a piece that the person uses
 BEFORE_WINDOW = 0.5  # m
 HEIGHTS, ACROSS = (0.1, 0.5, 1.0, 1.5, 1.9), (-0.15, -0.05, 0.0, 0.05, 0.15)  # m, of rays in doorways
@@ -143,6 +148,7 @@ class _Home:
             "empty": sorted(set(self._rooms) - {piece.room for piece in standing}),
             "doorway": min(doorways, default=None),
             "way": self._way(),
+            "pockets": self._pockets(),
             "unusable": list(self._unusable(standing)),
             "windows_behind": [
                 f"{p.room}: {p.kind}" for w in plan.windows for p in standing if self._hides(p, w)
@@ -191,6 +197,12 @@ class _Home:
             middle = (low + high + 1) // 2
             low, high = (middle, high) if self._free(middle * CELL).any() else (low, middle - 1)
         return low * CELL
+
+    def _pockets(self) -> int:
+        """Pieces of floor that people of the usual width come to, and large ones do not."""
+        usual, _ = label(self._free(USUAL))
+        islands, _ = label((self._field.distance >= LARGE / 2) & (usual > 0))
+        return int((np.bincount(islands[islands > 0]) * CELL**2 > POCKET).sum()) - 1
 
     def _unusable(self, pieces: list[_Piece]) -> Iterator[str]:
         """Pieces to which nobody comes, from within the room, by ways of `WAY`; plants and lamps are only seen."""

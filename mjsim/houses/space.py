@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,6 +13,8 @@ from mjsim.houses.furniture.piece import Piece, Spot, moved
 from mjsim.houses.values import BACK, SIDES, FloorPlan, Room, Side
 
 BODY = 0.36  # m, radius of what has to come through: ways are twice as wide
+LARGE = 0.3  # m, the same of a large person: no floor is shut off from anybody
+POCKET = 3  # cells of floor that do not count
 STEP = 0.1  # m, between the places that are tried along a wall
 BESIDE = 0.6  # m beside a door where no bin stands if there is another place
 DOORWAY = 1.0  # m in front of a door that stay free
@@ -217,7 +220,7 @@ class Space:
         return np.asarray(score)
 
     def connected(self, spots: Iterable[Spot], zones: Iterable[Spot] = (), near: Iterable[Spot] = ()) -> bool:
-        """Whether a body comes from each door to each place of use, and near to what is used.
+        """Whether a body comes from each door to each place of use, near to what is used, and to all free floor.
 
         Args:
             spots: Where something is to stand as well.
@@ -233,7 +236,10 @@ class Space:
             u, v = math.ceil((x1 - floor.x0) / _CELL - 1e-6), math.ceil((y1 - floor.y0) / _CELL - 1e-6)
             free[max(i, 0) + 1 : u + 1, max(j, 0) + 1 : v + 1] = 0
         distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _CELL
-        _, islands = cv2.connectedComponents((distance > BODY).astype(np.uint8), connectivity=4)
+        _, islands, stats, _ = _islands(distance, BODY)
+        for found in (stats, _islands(distance, LARGE)[2]):
+            if (found[1:, cv2.CC_STAT_AREA] > POCKET).sum() > 1:
+                return False
         targets: list[tuple[Spot, ...]] = [((x - 0.25, y - 0.25, x + 0.25, y + 0.25),) for x, y in self.doors]
         targets += [(zone,) for zone in (*self.use, *zones)]
         # Not around corners: there it would be farther away.
@@ -249,6 +255,10 @@ class Space:
             if not common:
                 return False
         return True
+
+
+def _islands(distance: Floats, radius: float) -> Any:
+    return cv2.connectedComponentsWithStats((distance > radius).astype(np.uint8), connectivity=4)
 
 
 def _moved(spots: Sequence[Spot], places: Floats) -> Floats:
