@@ -75,7 +75,7 @@ class Host:
         self._paying = None
         self.paid = site.folder / f"{name}.paid.txt"
         self._program = (sys.executable, str(WRONG_CLOCK), str(self._clock))
-        words = (*PROXIED, "--database", site.url, "--host-name", name)
+        words = (*PROXIED, "--workers", "50", "--database", site.url, "--host-name", name)
         command = ("study", "serve", str(site.file))
         self.server = PlayProcess(self.folder, *words, command=command, program=(*self._program, "0"))
         self.server.output = site.folder / f"{name}.server.txt"  # not on the disk that is full
