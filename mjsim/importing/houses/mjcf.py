@@ -203,7 +203,8 @@ def _surface(model: Any, geom: int, pictures: dict[str, _Picture]) -> Surface | 
     axis = np.abs(made.face_normals).argmax(axis=1)
     plane = np.array([[1, 2], [0, 2], [0, 1]])[axis]  # the axes along which a face lies
     places = surface.corners / sides
-    uv = np.take_along_axis(places, plane[:, None, :].repeat(3, axis=1), axis=2) * picture.repeat
+    # A picture that does not repeat covers a side from edge to edge.
+    uv = (np.take_along_axis(places, plane[:, None, :].repeat(3, axis=1), axis=2) + 0.5) * picture.repeat
     return _painted(surface, uv, picture)
 
 

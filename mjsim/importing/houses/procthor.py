@@ -4,7 +4,6 @@ import math
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -38,7 +37,7 @@ def read_procthor(path: Path, options: HouseOptions) -> SourceScene:
         library = Library({kind for _, kind in types}, Path(folder))
         shell = read_mjcf(_write_shell(plan, Path(folder) / "shell.xml"), options)
         library.take(read_mjcf(library.file, options).pieces)
-    pieces = [replace(piece, solid="glass" not in piece.name) for piece in shell.pieces]
+    pieces = list(shell.pieces)
     ours: Counter[str] = Counter()
     boxes: Counter[str] = Counter()
     small: list[str] = []
@@ -94,7 +93,8 @@ def _write_shell(plan: ProcthorPlan, path: Path) -> Path:
     for room in plan.rooms:
         low, high = np.min(room.boxes, axis=0), np.max(room.boxes, axis=0)
         rooms.append(Room(room.key, use_of(room.key), room.label, Rectangle(*low[:2], *high[2:])))
-    materials = surfaces(0, FloorPlan(tuple(rooms), (), ()))
+    daylight = '<material name="daylight" rgba="0.72 0.85 0.95 1"/>'
+    materials = [*surfaces(0, FloorPlan(tuple(rooms), (), ())), daylight]
     height = max((wall.height for wall in plan.walls), default=2.5)
     geoms: list[str] = []
     for room in plan.rooms:
@@ -112,10 +112,10 @@ def _write_shell(plan: ProcthorPlan, path: Path) -> Path:
             geoms.append(_slab(f"wall {len(geoms)}", wall, WALL, material, *part))
     for one in plan.openings:
         if not (one.is_door and len(one.rooms) > 1):
-            kind, material = ("door", "entrance") if one.is_door else ("window", "glass")
+            kind, material = ("door", "entrance") if one.is_door else ("window", "daylight")
             wall = PlanWall(one.start, one.end, 0.0)
             span = (0.0, math.dist(one.start, one.end), one.bottom, one.top)
-            name = "front entrance" if one.is_door else "window glass"
+            name = "front entrance" if one.is_door else "window pane"
             geoms.append(_slab(f"{name} {len(geoms)}", wall, _THICK[kind], material, *span))
     world = "\n".join(geoms)
     path.write_text(

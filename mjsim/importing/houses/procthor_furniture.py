@@ -27,7 +27,8 @@ from mjsim.model.assets import models_root
 DATABASE = "asset-database.json"  # of ProcTHOR: types and sizes of its assets
 _DRAWN = 4  # pieces of each kind, among which the nearest is chosen
 _STRETCH = math.log(2.2)  # the most that a side of ours is stretched
-_GREY = np.array([0.62, 0.6, 0.57])
+_GREY, _BLACK = np.array([0.62, 0.6, 0.57]), np.array([0.08, 0.08, 0.09])
+_SCREENS = ("desktop", "microwave", "television")
 _Entry = tuple[tuple[str, ...], tuple[float, float, float]]
 _CAN: _Entry = ((), (0.45, 0.35, 0.55))
 _SHELVES: _Entry = (("bookcase", "low_bookcase", "cube_shelf"), (0.9, 0.35, 1.45))
@@ -189,8 +190,8 @@ class Library:
                 choices.append((stretch, kind, pieces, low, high))
         best = min(choices, default=None, key=lambda choice: choice[0])
         if best is None or best[0] > _STRETCH:
-            box = primitive(trimesh.creation.box(size), _GREY).moved(frame)
-            return [Piece(thing.id, box)], ""
+            box = primitive(trimesh.creation.box(size), _BLACK if name in _SCREENS else _GREY)
+            return [Piece(thing.id, box.moved(frame))], ""
         _, kind, pieces, low, high = best
         fit = np.diag([*(size / (high - low)), 1.0])
         fit[:3, 3] = -fit.diagonal()[:3] * (low + high) / 2

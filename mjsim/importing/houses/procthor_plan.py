@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -25,12 +25,15 @@ NAMES = "mjsim_rooms"  # of the metadata: room id -> [key, label], where the hou
 _TYPES = {"livingroom": "living_room"}  # the others are their own words
 
 
-class Vector(msgspec.Struct):
-    """A point or angles."""
+_Number = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
 
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
+
+class Vector(msgspec.Struct):
+    """A point, m, or angles in degrees."""
+
+    x: _Number = 0.0
+    y: _Number = 0.0
+    z: _Number = 0.0
 
 
 class _Span(msgspec.Struct):
@@ -113,7 +116,7 @@ class ProcthorPlan:
 def read_plan(path: Path) -> tuple[ProcthorPlan, tuple[Thing, ...]]:
     """Rooms, walls and openings of a house, and its objects; `AssetError` where the file holds no such house."""
     try:
-        house = msgspec.convert(read_json(read_text(path)), _House)
+        house = msgspec.convert(_without_nulls(read_json(read_text(path))), _House)
     except (OSError, ValueError, RecursionError) as error:
         raise AssetError(brief(f"{path} is no house of ProcTHOR: {error}; export it again")) from error
     if not house.rooms:
@@ -133,6 +136,13 @@ def read_plan(path: Path) -> tuple[ProcthorPlan, tuple[Thing, ...]]:
         for one in ones
     ]
     return ProcthorPlan(rooms, tuple(walls.values()), tuple(openings)), tuple(house.objects)
+
+
+def _without_nulls(value: Any) -> Any:
+    """JSON without what is null: a door to the outside has a null for its second room."""
+    if isinstance(value, dict):
+        return {key: _without_nulls(one) for key, one in value.items() if one is not None}
+    return [_without_nulls(one) for one in value] if isinstance(value, list) else value
 
 
 def _rooms(house: _House, path: Path) -> Iterator[NamedRoom]:
@@ -157,7 +167,7 @@ def _rooms(house: _House, path: Path) -> Iterator[NamedRoom]:
 
 def _ends(wall: _Wall, path: Path) -> tuple[tuple[float, float], tuple[float, float], float]:
     """Where a wall begins and ends on the floor, in its own order, and its height, m."""
-    heights = [point.y for point in wall.polygon]
+    heights = [point.y for point in wall.polygon] or [0.0]
     low = [point for point in wall.polygon if point.y < min(heights) + 0.01]
     if len(low) < 2:
         raise AssetError(f"{path}: the wall {wall.id!r} has no lower edge; correct its polygon")

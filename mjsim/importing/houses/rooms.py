@@ -15,7 +15,7 @@ from scipy.ndimage import binary_dilation, label, maximum_filter
 
 from mjsim.errors import AssetError, brief
 from mjsim.files import read_text
-from mjsim.importing.houses.plan import CELL, Mask, Plan, clearance
+from mjsim.importing.houses.plan import CELL, MAX_SIDE, Mask, Plan, clearance
 from mjsim.importing.houses.solids import merged_rectangles
 from mjsim.importing.houses.values import NamedRoom, Piece
 from mjsim.importing.surface import Floats
@@ -113,6 +113,8 @@ def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
     polygon = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
     if not polygon.is_valid or polygon.area < _STEP**2:
         raise ValueError("has no floor")
+    if np.ptp(outline, axis=0).max() > MAX_SIDE:
+        raise ValueError(f"spans more than {MAX_SIDE:g} m")
     sides = np.abs(np.diff(outline, axis=0, append=outline[:1]))
     slanted = sides.min(axis=1).max() > 0.01
     cuts = [

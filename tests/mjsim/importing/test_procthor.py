@@ -43,6 +43,12 @@ def test_rooms_walls_and_openings_are_read(tmp_path):
         ({"rooms": []}, "has no rooms"),
         ({"rooms": 3}, "is no house of ProcTHOR: Expected `array`"),
         ({"rooms": [{"id": "room|1", "floorPolygon": [{"x": 1}, {"x": 2}]}]}, "'room|1' has no floor"),
+        (
+            {"rooms": [{"id": "room|1", "floorPolygon": [{}, {"x": 99}, {"z": 99}]}]},
+            "'room|1' spans more than 60 m",
+        ),
+        ({"walls": [{"id": "wall|1", "polygon": []}]}, "'wall|1' has no lower edge"),
+        ({"objects": [{"id": "Bed|1", "position": {"x": 1e9}}]}, "is no house of ProcTHOR: Expected `float`"),
         ({"doors": [{"id": "door|1|2", "wall0": "wall|9"}]}, "'door|1|2' has no hole in a wall"),
     ],
 )
