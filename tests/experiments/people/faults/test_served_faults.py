@@ -144,10 +144,9 @@ class Trial:
         known = dict(self._site.rows("SELECT token_hash, status FROM person"))
         assert all(known[person.name] == "withdrawn" for person in self._people if person.left)
         assert not [one for one in self._site.platform.paid().items() if one[1] > 1], "paid twice"
-        noted = {
-            key for (key,) in self._site.rows("SELECT payment.key FROM payment WHERE event = 'confirmed'")
-        }
-        assert set(self._said_to_be_paid()) <= noted
+        said = self._said_to_be_paid()
+        noted = self._site.rows("SELECT payment.key FROM payment WHERE event = 'confirmed'")
+        assert {(key,) for key in said} <= set(noted)
 
     def _said_to_be_paid(self):
         lines = [
