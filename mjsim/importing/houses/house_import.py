@@ -144,6 +144,8 @@ def _converted(
     doors = [piece for piece in pieces if _is_door(piece)]
     still = [piece for piece in pieces if not _is_door(piece)]
     solids = make_solids(still)
+    if not solids.solids:
+        raise AssetError("has no walls and no furniture: nothing that one could bump into; is it a house?")
     floor = _floor(still)
     leaves = make_solids(doors)
     plan = make_plan(solids.solids, leaves.solids, floor)
@@ -215,6 +217,8 @@ def _levels(pieces: Sequence[Piece]) -> tuple[float, float]:
     levels = np.flatnonzero(wide >= _LEVEL * wide.max())
     near_ground = levels[levels <= levels[0] + round(_STEP / _BIN)]  # ground, slab and floor are often layers
     lowest = near_ground[np.argmax(total[near_ground])] if np.ptp(near_ground) <= 2 else near_ground[-1]
+    if (lowest + first) * _BIN >= corners[:, :, 2].max() - LOW:  # walls without a floor: these are their tops
+        return float(corners[:, :, 2].min()), np.inf
     near = np.abs(bins - first - lowest) <= 1
     order = np.argsort(heights[near])
     share = np.cumsum(area[flat][near][order])

@@ -124,7 +124,7 @@ def too_large(sides: Floats) -> AssetError:
     """The error about a scene with such sides (2,), m, with the unit in which it would be a house."""
     said = " x ".join(f"{side:.4g}" for side in sides)
     unit = next((u for u, metres in UNITS.items() if 3.0 <= sides.max() * metres <= MAX_SIDE), None)
-    advice = "give its unit by --units, or --scale" if unit is None else f"is it in {unit} (--units {unit})?"
+    advice = "give its unit by --units, or --scale" if unit is None else f"try --units {unit}"
     return AssetError(f"spans {said} m, and houses have at most {MAX_SIDE:g} m; {advice}")
 
 

@@ -204,7 +204,7 @@ def test_public_houses_import_without_editing_or_are_refused_in_one_line(tmp_pat
     """Every world and scene below the folder; docs/import.md names those that were tried."""
     files = [
         p
-        for end in ("*.world", "libero_*.xml", "*.scene_instance.json")
+        for end in ("*.world", "libero_*.xml", "*.scene_instance.json", "layout*.yaml")
         for p in sorted(Path(PUBLIC).rglob(end))
     ]
     assert files
@@ -302,7 +302,8 @@ def test_a_damaged_scene_is_refused_by_its_cause(tmp_path, write, damage, reason
     ("mesh", "options", "reason"),
     [
         (trimesh.creation.box((0.5, 0.5, 0.9)), {}, "nowhere to walk"),
-        (trimesh.creation.box((900, 700, 3)), {}, r"spans 900 x 3 m.* \(--units cm\)"),
+        (trimesh.creation.box((9, 0.02, 9)), {}, "no walls and no furniture"),
+        (trimesh.creation.box((900, 700, 3)), {}, "spans 900 x 3 m.*--units cm"),
         (trimesh.creation.box((8, 0.01, 5)), {"up": "z"}, "nowhere|level"),
     ],
 )
