@@ -214,9 +214,10 @@ def _mixtures(analysis: Analysis) -> tuple[Block, ...]:
 
 
 def _mixed(analysis: Analysis) -> tuple[Block, ...]:
+    models = {r.measure: r.value for r in analysis.results if isinstance(r.value, MixedModel)}
     rows = [
         (
-            _labels(analysis)[r.measure],
+            _labels(analysis)[measure],
             effect,
             t.statistic,
             freedom(t),
@@ -225,8 +226,7 @@ def _mixed(analysis: Analysis) -> tuple[Block, ...]:
             m.residual_variance,
             m.houses,
         )
-        for r in analysis.results
-        if isinstance(m := r.value, MixedModel)
+        for measure, m in models.items()
         for effect, t in m.tests.items()
     ]
     head = (
@@ -239,7 +239,15 @@ def _mixed(analysis: Analysis) -> tuple[Block, ...]:
         "of people in a house (unit²)",
         "houses",
     )
-    return (Table(head, rows),)
+    said = [
+        Paragraph(
+            f"{_labels(analysis)[measure]}: {m.share:.0%} of the variance within conditions is between houses "
+            f"(95 % interval {m.interval[0]:.0%} to {m.interval[1]:.0%}, {m.houses} houses); "
+            "the rest is between people in a house."
+        )
+        for measure, m in models.items()
+    ]
+    return (*said, Table(head, rows))
 
 
 def _power(analysis: Analysis) -> tuple[Block, ...]:

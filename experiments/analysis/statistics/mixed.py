@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import fdtrc
+from scipy.special import chdtri, fdtrc
 
 from experiments.analysis.statistics.anova import Values, cells_of, varies
 from experiments.errors import StatisticsError
@@ -39,6 +39,8 @@ class MixedModel:
     house_variance: float  # variance between houses, in squared units of the measure
     residual_variance: float  # variance between people in a house
     houses: int  # number of houses
+    share: float  # of the variance within conditions that is between houses, from 0 to 1
+    interval: tuple[float, float]  # its 95 % interval, by the profile of the restricted likelihood
 
 
 def mixed_model(
@@ -62,7 +64,8 @@ def mixed_model(
     for effect, block in list(columns.items())[1:]:
         tests[effect] = fit.test(np.arange(start, start + block.shape[1]))
         start += block.shape[1]
-    return MixedModel(tests, fit.ratio * fit.residual * unit**2, fit.residual * unit**2, len(names))
+    between, within = fit.ratio * fit.residual * unit**2, fit.residual * unit**2
+    return MixedModel(tests, between, within, len(names), _share(fit.ratio), fit.interval())
 
 
 class _Fit:
@@ -137,6 +140,17 @@ class _Fit:
         else:
             self.at(0.0)
 
+    def interval(self) -> tuple[float, float]:
+        """Shares of the variance between houses that a likelihood ratio test at 5 % does not refuse."""
+        limit = float(self._deviance(np.array([self.ratio]))[0] + chdtri(1, 0.05))
+
+        def above(share: float) -> float:
+            return float(self._deviance(np.array([share / (1.0 - share)]))[0]) - limit
+
+        best, last = _share(self.ratio), _share(RATIOS[-1])
+        low = float(brentq(above, 0.0, best)) if above(0.0) > 0.0 else 0.0
+        return low, float(brentq(above, best, last)) if above(last) > 0.0 else 1.0
+
     def test(self, places: NDArray[np.int64]) -> WaldTest:
         """Test of the effects at these places of the design.
 
@@ -170,6 +184,10 @@ class _Fit:
         moved = np.stack([self.member @ (self.member.T @ self.left), self.left], axis=1)
         observed = moved.T @ self._project(moved) / self.residual - traces / 2.0
         return np.asarray(np.linalg.inv(observed) * self.residual**2)
+
+
+def _share(ratio: float) -> float:
+    return float(ratio / (1.0 + ratio))
 
 
 def _joint_freedom(freedom: Values) -> float:

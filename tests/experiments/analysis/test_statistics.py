@@ -281,6 +281,19 @@ def test_the_mixed_model_of_a_published_example():
     assert deviations == pytest.approx((1.332465, 1.100295), abs=5e-7)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7])
+def test_the_interval_of_the_share_of_houses_holds_the_true_one(share):
+    rng, held = np.random.default_rng(4), 0
+    houses, condition = np.repeat(np.arange(20), 6), np.tile([*"ab"], 60)
+    for _ in range(200):
+        values = rng.normal(0, math.sqrt(share), 20)[houses] + rng.normal(0, math.sqrt(1 - share), 120)
+        model = mixed_model(values, condition, np.full(120, 6), houses)
+        low, high = model.interval
+        assert 0 <= low <= model.share <= high <= 1
+        held += low <= share <= high
+    assert 0.91 <= held / 200 <= (1.0 if share == 0 else 0.99)
+
+
 @pytest.mark.parametrize(
     ("people", "message"),
     [(8, "as many houses and cells as people"), (80, "each cell has houses of its own, one each")],
