@@ -133,8 +133,12 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
 
 
 def _results(missing: Mapping[Path, TrialConfig], workers: int, executor: str) -> Iterator[str | None]:
-    """Yield None for each trial that succeeds, else what went wrong; those whose process may die go last and alone."""
-    left = {path: config for path, config in missing.items() if not _died(path).exists()}
+    """Yield None for each trial that succeeds, else what went wrong; those whose process may die go last and alone.
+
+    Trials go house by house: making one takes longer than many a trial in it.
+    """
+    by_house = sorted(missing.items(), key=lambda trial: trial[1].house)
+    left = {path: config for path, config in by_house if not _died(path).exists()}
     alone = {path: config for path, config in missing.items() if path not in left}
     while left:
         with EXECUTORS[executor](min(workers, len(left))) as pool:
