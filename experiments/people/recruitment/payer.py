@@ -106,11 +106,11 @@ class Api:
         self._timeout = timeout
 
     async def ask(self, method: str, path: str, **request: Any) -> Any:
-        """The JSON of the answer, or None where it is none.
+        """The JSON of the answer, or None where it is empty.
 
         Raises:
             DeclinedError: It was not done: the platform was not reached, or says no.
-            UnsureError: It may have been done: there is no answer, or one of a platform in trouble.
+            UnsureError: It may have been done: there is no answer, or none of a platform that is in order.
         """
         for attempt in range(1, TRIES + 1):
             answer = await self._answer(method, path, request)
@@ -125,9 +125,9 @@ class Api:
         if not answer.is_success:
             raise DeclinedError(f"the platform says {said}")
         try:
-            return answer.json()
-        except ValueError:
-            return None
+            return answer.json() if answer.content else None
+        except ValueError as error:  # a proxy's page, perhaps
+            raise UnsureError(f"the platform's answer is not understood: {said}") from error
 
     async def close(self) -> None:
         """Close connections."""
