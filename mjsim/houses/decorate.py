@@ -7,11 +7,12 @@ import numpy as np
 from mjsim.houses.chance import stream
 from mjsim.houses.furniture.catalogue import KINDS
 from mjsim.houses.furniture.look import Look
-from mjsim.houses.furniture.piece import Piece, Spot, moved
+from mjsim.houses.furniture.piece import Piece, Spot, flattened, moved
 from mjsim.houses.space import BLINDS, WALL_GAP, Place, Space
 from mjsim.houses.values import BACK, SIDES, FloorPlan, Side, Window
 
 LOW = 1.15  # m: pictures hang over what is lower
+LAMPS_APART = 0.8  # m
 MOST_HUNG = 3  # on the walls of a room: every picture is a texture of its own
 _WALLS: dict[str, tuple[str, ...]] = {
     "hall": ("picture", "wall_mirror", "picture", "clock"),
@@ -103,8 +104,14 @@ def _dress(space: Space, window: Window, use: str, look: Look, rng: np.random.Ge
 
 
 def _lamps(space: Space, look: Look, rng: np.random.Generator) -> None:
-    """One lamp under the ceiling, two in a long room."""
+    """One lamp under the ceiling, two in a long room; none where one hangs over a table."""
     floor = space.room.floor
+    hanging = [
+        moved((0.0, 0.3, 0.0, 0.3), x, y, yaw)[:2]
+        for piece, at in space.stood
+        for member, x, y, yaw in flattened(piece, at.x, at.y, at.yaw)
+        if member.kind == "pendant_lamp"
+    ]
     longer = max(floor.width, floor.depth)
     lamp = KINDS["ceiling_lamp"].make(rng, look)
     count = 2 if longer > 4.8 and longer > 1.5 * min(floor.width, floor.depth) else 1
@@ -115,7 +122,8 @@ def _lamps(space: Space, look: Look, rng: np.random.Generator) -> None:
             x = floor.x0 + share * floor.width
         else:
             y = floor.y0 + share * floor.depth
-        space.stood.append((lamp, Place(x, y, 0 if floor.width >= floor.depth else 1, None)))
+        if all(max(abs(x - u), abs(y - v)) > LAMPS_APART for u, v in hanging):
+            space.stood.append((lamp, Place(x, y, 0 if floor.width >= floor.depth else 1, None)))
 
 
 def _rug(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
