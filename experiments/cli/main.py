@@ -127,13 +127,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             return _run(words, watch=argv is None)
         except KeyboardInterrupt as stop:
-            number = signal_of(stop)
-            print(f"mjsim: stopped by {number.name}; what was finished is kept", file=sys.stderr)
-            return exit_code(number)
+            return _stopped(stop)
         except Exception as error:
+            if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
+                return _stopped(error.__cause__)  # the signal came while compiled code returned
             return end_with(error, words)
         finally:
             tell_end()
+
+
+def _stopped(stop: KeyboardInterrupt) -> int:
+    number = signal_of(stop)
+    print(f"mjsim: stopped by {number.name}; what was finished is kept", file=sys.stderr)
+    return exit_code(number)
 
 
 def _run(words: list[str], *, watch: bool) -> int:

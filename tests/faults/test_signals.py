@@ -78,6 +78,17 @@ def test_a_replay_that_films_names_the_signal_that_stops_it(seconds, walked, tmp
     assert not list(tmp_path.iterdir())
 
 
+def test_a_signal_that_comes_while_compiled_code_returns_is_named(monkeypatch, capsys):
+    """The interpreter raises this then."""
+
+    def interrupted(*_, **__):
+        raise SystemError("returned a result with an exception set") from Stopped(signal.SIGTERM)
+
+    monkeypatch.setattr("experiments.cli.main._run", interrupted)
+    assert main(["doctor"]) == 128 + signal.SIGTERM
+    assert "stopped by SIGTERM" in one_line(capsys.readouterr().err)
+
+
 def test_an_ignored_signal_stays_ignored():
     """As SIGHUP is after `nohup`."""
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
