@@ -13,7 +13,8 @@ from mjsim.houses.values import BACK, SIDES, FloorPlan, Side, Window
 
 LOW = 1.15  # m: pictures hang over what is lower
 LAMPS_APART = 0.8  # m
-MOST_HUNG = 3  # on the walls of a room: every picture is a texture of its own
+LONG = 2.0  # m: a stretch of wall that looks bare with nothing on it
+MOST_HUNG = 4  # on the walls of a room: every picture is a texture of its own
 _WALLS: dict[str, tuple[str, ...]] = {
     "hall": ("picture", "wall_mirror", "picture", "clock"),
     "kitchen": ("clock", "picture", "wall_shelf", "pinboard"),
@@ -179,20 +180,26 @@ def _walls(space: Space, use: str, look: Look, rng: np.random.Generator) -> None
     if use in ("bedroom", "living_room"):
         kinds = ("picture", "wall_lamp", "picture", "wall_mirror")
     hung = 0
-    for side in (SIDES[i] for i in rng.permutation(4)):
-        low, high = space.room.floor.wall(side)
-        for start, end in _stretches(space, side, low, high):
-            if rng.random() > 0.75 or hung >= MOST_HUNG:
-                continue
-            kind = kinds[hung % len(kinds)]
-            piece = KINDS[kind].make(rng, look, smaller=int(end - start < 1.5))
-            if piece.size[0] + 0.3 > end - start:
-                continue
-            middle = _over(space, side, start + piece.size[0] / 2 + 0.1, end - piece.size[0] / 2 - 0.1)
-            if kind == "wall_mirror" and _tallest(space, side, middle - 0.4, middle + 0.4, 0.4) > 0.3:
-                piece = KINDS["picture"].make(rng, look, smaller=1)
-            space.stood.append((piece, _at_wall(space, side, middle)))
-            hung += 1
+    found = [
+        (side, *stretch)
+        for side in (SIDES[i] for i in rng.permutation(4))
+        for stretch in _stretches(space, side, *space.room.floor.wall(side))
+    ]
+    found.sort(
+        key=lambda stretch: stretch[2] - stretch[1] < LONG
+    )  # long walls first: none of them stays bare
+    for side, start, end in found:
+        if hung >= MOST_HUNG or (rng.random() > 0.75 and end - start < LONG):
+            continue
+        kind = kinds[hung % len(kinds)]
+        piece = KINDS[kind].make(rng, look, smaller=int(end - start < 1.5))
+        if piece.size[0] + 0.3 > end - start:
+            continue
+        middle = _over(space, side, start + piece.size[0] / 2 + 0.1, end - piece.size[0] / 2 - 0.1)
+        if kind == "wall_mirror" and _tallest(space, side, middle - 0.4, middle + 0.4, 0.4) > 0.3:
+            piece = KINDS["picture"].make(rng, look, smaller=1)
+        space.stood.append((piece, _at_wall(space, side, middle)))
+        hung += 1
 
 
 def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[float, float]]:

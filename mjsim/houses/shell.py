@@ -155,8 +155,8 @@ class _Walls:
         for along, up in bars:
             yield self._slab(side, along, up, (0.08, 0.15), "frame", "trim")
         yield self._slab(
-            side, (left - 0.03, right + 0.03), (sill - 0.03, sill), (-0.04, 0.15), "frame", "trim"
-        )
+            side, (left - 0.03, right + 0.03), (sill - 0.03, sill + 0.004), (-0.04, 0.15), "frame", "trim"
+        )  # its top lies above that of the wall below, or the two would flicker
 
     def _frame(self, door: Door) -> Iterator[str]:
         """The half of a door's frame that this room sees."""
@@ -190,10 +190,10 @@ class _Walls:
 
 
 def _outside(plan: FloorPlan) -> Iterator[str]:
-    """What is seen through the windows."""
+    """What is seen through the windows: four panels that meet at the corners, where the picture goes on."""
     x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
     y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
-    (x, y), w, d = ((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0) / 2 + 5, (y1 - y0) / 2 + 5
+    (x, y), w, d = ((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0) / 2 + 3, (y1 - y0) / 2 + 3
     for name, kind, at, length in (
         ("north", "trim_y", (x, y1 + 3), w),
         ("south", "trim_y", (x, y0 - 3), w),

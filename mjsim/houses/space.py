@@ -19,6 +19,7 @@ STEP = 0.1  # m, between the places that are tried along a wall
 BESIDE = 0.6  # m beside a door where no bin stands if there is another place
 DOORWAY = 1.0  # m in front of a door that stay free
 SNUG, APART = 0.09, 0.62  # m: gaps are at most, or at least, so wide, for nobody to be caught in them
+BEFORE_LEAF = 0.45  # m in front of a door leaf that stand free: it looks as if it could be closed
 WALL_GAP = 0.01  # m, behind furniture
 BEFORE_WINDOW = 0.6  # m, depth in which nothing is higher than the sill
 CURTAIN = 0.3  # m beside a window, the same
@@ -86,6 +87,8 @@ class Space:
                 space.solids.append((leaf.x0, leaf.y0, leaf.x1, leaf.y1, door.height))
                 low, high = (leaf.x0, leaf.x1) if door.leaf.side in ("south", "north") else (leaf.y0, leaf.y1)
                 space.hung.append((door.leaf.side, low, high, 0.0))
+                zone = floor.along(door.leaf.side, low, high, 0, BEFORE_LEAF)
+                space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
         for window in plan.windows_of(room.key):
             half = window.width / 2 + (0.03 if room.use in BLINDS else CURTAIN)
             zone = floor.along(window.side, window.center - half, window.center + half, 0, BEFORE_WINDOW)

@@ -43,7 +43,9 @@ def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: i
     quilt = b.pick(*b.look.quilts)
     b.box("linen", w - 0.04, (y[0] + 0.02, y[1] - 0.02), (z, z + 0.18))
     start = y[0] + b.pick(0.45, 0.55, 0.62)
-    b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.215), seen=True)
+    side = "quilt_a" if quilt == "quilt_c" else quilt  # its pattern would be smeared on the narrow sides
+    b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205), seen=True)
+    b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215), seen=True)
     if b.chance(0.5):
         b.rod(
             "linen", (-w / 2 + 0.05, start, z + 0.19), (w / 2 - 0.05, start, z + 0.19), 0.045, shape="capsule"

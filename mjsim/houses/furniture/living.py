@@ -81,7 +81,8 @@ def stove(b: Builder) -> Piece:
     y = 0.1 + d
     b.box("black", w - 0.1, (y, y + 0.012), (0.42, 0.85), seen=True)
     b.box("orange", w - 0.2, (y + 0.004, y + 0.014), (0.46, 0.6), seen=True)
-    b.soft("bulb", (0, y + 0.01, 0.55), (0.07, 0.012, 0.09))
+    for x, tall in ((-0.06, 0.05), (0.0, 0.075), (0.06, 0.045)):  # flames
+        b.soft("shade", (x, y + 0.012, 0.47 + tall), (0.025, 0.008, tall))
     b.box("chrome", 0.012, (y + 0.01, y + 0.04), (0.55, 0.72), w / 2 - 0.07, seen=True)
     b.post("black", 0, 0.2, (h, 2.6), 0.07)
     for i in range(5):
@@ -123,8 +124,9 @@ def coat_rack(b: Builder) -> Piece:
         b.rod(b.metal, (x, 0.02, 1.6), (x, 0.09, 1.62), 0.01)
         if b.chance(0.65):
             cloth, long = b.pick(*b.look.cloths, *b.look.accents), b.pick(0.4, 0.55)
-            b.box(cloth, 0.13, (0.06, 0.2), (1.56 - 2 * long, 1.52), x, seen=True)
-            b.soft(cloth, (x, 0.13, 1.52), (0.065, 0.07, 0.08))
+            b.rod(cloth, (x, 0.13, 1.5), (x, 0.13, 1.6 - 2 * long), 0.07, shape="capsule")
+            for u in (-0.07, 0.07):  # sleeves
+                b.rod(cloth, (x + u, 0.14, 1.46), (x + u, 0.14, 1.0), 0.03, shape="capsule")
     b.box("wicker", 0.3, (0.04, 0.22), (1.775, 1.9), -0.2 * w, seen=True)
     b.box(b.wood, w, (0.02, 0.24), (0.18, 0.2), seen=True)
     b.legs(b.wood, w, (0.02, 0.24), 0.2, 0.02, 0.012)
