@@ -17,7 +17,6 @@ from experiments.web.protocol import (
     Inputs,
     Occupied,
     Saved,
-    Snapshot,
     State,
     TakeOver,
     WireMessage,
@@ -29,7 +28,6 @@ HELLO_TIMEOUT = 10.0  # s for the first message
 OCCUPIED_TIMEOUT = 60.0  # s for the answer to `occupied`
 CLOSE_TIMEOUT = 0.5  # s that the connection before has to end, as when a page is reloaded
 MAX_WAITING = 300  # messages that wait to be sent
-MAX_WAITING_FOR_SNAPSHOTS = 8  # with more than these waiting, no snapshots are sent
 RATE, BURST = 200.0, 1200.0  # messages and inputs a second, and at once: inputs are repeated after a failure
 MAX_ERRORS = 50  # refused messages of one connection
 
@@ -47,8 +45,6 @@ class BrowserSocket:
     def send(self, message: WireMessage) -> None:
         """Send a message, without waiting; a browser that does not keep up is disconnected."""
         waiting = self._waiting.qsize()
-        if isinstance(message, Snapshot) and waiting > MAX_WAITING_FOR_SNAPSHOTS:
-            return
         if waiting < MAX_WAITING:
             self._waiting.put_nowait(message)
         elif waiting == MAX_WAITING:

@@ -26,7 +26,7 @@ def test_another_client_does_a_task(tmp_path, delay):
     report = replay(run)
     assert all(verdict.verified for verdict in report.verdicts)
     steps = sorted(client.snapshots)
-    assert steps == list(range(steps[0], steps[-1] + 1)), "one snapshot a control step"
+    assert list(client.snapshots) == steps, "in order; a late server leaves some out"
     assert client.refused == [] and set(client.models) == {"object_00"}
     overruns = [
         e for e in records.read_events(run / "events.jsonl") if e["event"] == "overrun" and e["missing"]
