@@ -207,7 +207,7 @@ class StudyServer:
     async def _play(self, socket: WebSocket) -> None:
         token = socket.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
-        visit = None if person is None else await asyncio.to_thread(self._procedure.visits.find, token)
+        visit = None if person is None else self._procedure.visits.find(token)
         if person is not None and self._host is not None and not await self._host.has(person):
             await socket.send_denial_response(Response(status_code=404))  # the proxy asks the next host
             return

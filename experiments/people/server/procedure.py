@@ -105,7 +105,7 @@ class Procedure:
 
     async def visit(self, person: Person, token: str) -> Visit | None:
         """The visit in which a person plays, begun with the first phase that is played; None if all cells are full."""
-        visit = await asyncio.to_thread(self.visits.find, token)
+        visit = self.visits.find(token)  # a small file, read once: a thread would take longer
         if visit is not None:
             return visit
         assignment = await self._assign(person)
@@ -115,7 +115,7 @@ class Procedure:
         trials = self._trials(assignment)
         played = [name for name in self._names if name in PLAYED]
         await asyncio.to_thread(self.visits.create, played, trials, ended, token)
-        return await asyncio.to_thread(self.visits.find, token)
+        return self.visits.find(token)
 
     async def withdraw(self, person: Person, *, delete: bool) -> None:
         """Let a person leave."""
@@ -156,14 +156,15 @@ class Procedure:
 
     async def _before_playing(self, person: Person) -> list[Ended]:
         """The phases that the record of the task tells of."""
-        found = {phase.name: phase for phase in await self.store.phases(person.id)}
-        told = [found[name] for name in (STORY, FLYTHROUGH) if name in found and name in self._names]
+        wanted = [name for name in (STORY, FLYTHROUGH) if name in self._names]
+        found = {phase.name: phase for phase in await self.store.phases(person.id)} if wanted else {}
+        told = [found[name] for name in wanted if name in found]
         return [Ended(phase.name, phase.duration_s or 0.0) for phase in told]
 
     async def after_trials(self, person: Person) -> Person:
         """The person, after all trials that are over were noted; their runs are on the disk."""
         while person.active and person.phase in PLAYED:
-            visit = await asyncio.to_thread(self.visits.named, person.token_hash)
+            visit = self.visits.named(person.token_hash)
             if visit is None or visit.phase == person.phase:
                 break
             metrics = await asyncio.to_thread(visit.metrics, person.phase)
