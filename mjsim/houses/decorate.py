@@ -12,7 +12,9 @@ from mjsim.houses.space import BLINDS, WALL_GAP, Place, Space
 from mjsim.houses.values import BACK, SIDES, FloorPlan, Side, Window
 
 LOW = 1.15  # m: pictures hang over what is lower
+BESIDE_TILES = 0.3  # m between the tiles of a kitchen and a picture
 LAMPS_APART = 0.8  # m
+LARGE = 15.0  # m^2: the middle of a larger room looks bare without a large rug
 LONG = 2.0  # m: a stretch of wall that looks bare with nothing on it
 MOST_HUNG = 4  # on the walls of a room: every picture is a texture of its own
 _WALLS: dict[str, tuple[str, ...]] = {
@@ -22,10 +24,11 @@ _WALLS: dict[str, tuple[str, ...]] = {
     "child": ("picture", "wall_shelf", "picture", "pinboard"),
     "bathroom": ("picture",),
     "shower_room": ("picture",),
-    "utility": ("clock",),
+    "utility": ("clock", "picture", "wall_shelf", "picture"),
 }
 _RUGS: dict[str, tuple[str, ...]] = {
     "hall": ("runner",),
+    "living_room": ("rug", "round_rug"),
     "bedroom": ("rug", "round_rug", "runner"),
     "child": ("round_rug", "rug"),
     "office": ("rug", "round_rug"),
@@ -82,7 +85,7 @@ def _dress(space: Space, window: Window, use: str, look: Look, rng: np.random.Ge
         place = _at_wall(space, side, window.center)
         spots = [moved(part.spot, place.x, place.y, place.yaw) for part in radiator.parts]
         if space.connected(spots):
-            space.stand(radiator, place, spots, ())
+            space.stand(radiator, place, spots, (), spots)
             below = radiator.size[2]
     reach = half + 0.33
     room = window.center - reach > low and window.center + reach < high
@@ -129,13 +132,17 @@ def _lamps(space: Space, look: Look, rng: np.random.Generator) -> None:
 
 def _rug(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
     """A rug on the largest free floor, or a mat before the bath."""
-    if use not in _RUGS or rng.random() > 0.85:
+    lies = any(p.kind == "rug" for piece, _ in space.stood for p, *_ in flattened(piece))
+    if use not in _RUGS or lies or (rng.random() > 0.85 and space.room.floor.area < LARGE):
         return
     kinds = _RUGS[use]
-    kind = kinds[int(rng.integers(len(kinds)))]
+    kind = kinds[int(rng.integers(len(kinds)))] if space.room.floor.area < LARGE else kinds[0]
     taken = [*space.solids, *(_spot(piece, at) for piece, at in space.stood if piece.kind == "door_mat")]
-    for smaller in (0, 1):
-        rug = KINDS[kind].make(rng, look, smaller=smaller)
+    sizes: list[tuple[int, tuple[float, float, float] | None]] = [(0, None), (1, None)]
+    if space.room.floor.area > LARGE and kind == "rug":
+        sizes = [(0, (2.8, 1.9, 0.0)), (0, (2.2, 1.5, 0.0)), *sizes]
+    for smaller, fit in sizes:
+        rug = KINDS[kind].make(rng, look, smaller=smaller, fit=fit)
         if kind == "bath_mat":
             baths = [(p, at) for p, at in space.stood if p.kind in ("bathtub", "shower")]
             places = [Place(*_before(p, at), at.turns, None) for p, at in baths]
@@ -214,7 +221,9 @@ def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[
     ]
     for x0, y0, x1, y1, top in (*space.solids, *tiled):
         if top > LOW and x0 < deep.x1 and deep.x0 < x1 and y0 < deep.y1 and deep.y0 < y1:
-            blocked.append((x0 - 0.05, x1 + 0.05) if side in ("south", "north") else (y0 - 0.05, y1 + 0.05))
+            apart = BESIDE_TILES if top == LOW + 1 else 0.05
+            low_end, high_end = (x0, x1) if side in ("south", "north") else (y0, y1)
+            blocked.append((low_end - apart, high_end + apart))
     found, at = [], low + WALL_GAP
     for a, b in sorted(blocked):
         if a - at > 0.7:

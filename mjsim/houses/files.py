@@ -20,13 +20,14 @@ _ALWAYS = {
     "shadow_round",
     "shadow_edge",
 }  # of classes, and of drawn shadows
+_SHADOWS = 15.0  # m: a shorter range of shadows is finer, and speckles what is round
 _HEAD = """\
 <mujoco model="{name}">
 <compiler angle="radian" texturedir="textures"/>
 <statistic center="{x:g} {y:g} 0.8" extent="{extent:g}"/>
 <visual>
 <headlight ambient="0.53 0.53 0.53" diffuse="0.05 0.05 0.05" specular="0 0 0"/>
-<map znear="0.006" zfar="6"/>
+<map znear="0.006" zfar="6" shadowclip="{clip:g}"/>
 <quality shadowsize="2048" numslices="16" numstacks="8" numquads="1"/>
 </visual>
 {default}
@@ -68,6 +69,7 @@ def write_files(
         x=round((x0 + x1) / 2, 3),
         y=round((y0 + y1) / 2, 3),
         extent=round(max(x1 - x0, y1 - y0) * 0.62, 3),
+        clip=round(_SHADOWS / (max(x1 - x0, y1 - y0) * 0.62), 3),
         default=ET.tostring(style[0], encoding="unicode").strip(),
         assets="\n".join(used_materials(world, surfaces(seed, plan), own.values(), models)),
         world=world,

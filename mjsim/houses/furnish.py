@@ -15,13 +15,15 @@ from mjsim.houses.furniture.look import Look, draw_look
 from mjsim.houses.furniture.piece import Mount as Holder
 from mjsim.houses.furniture.piece import Piece, flattened, moved
 from mjsim.houses.space import UNUSED, Place, Space
-from mjsim.houses.usual import LITTLE, MUSTS, OFTEN, ROUNDS, SHARES, USUAL
+from mjsim.houses.usual import LITTLE, MOST_PLANTS, MUSTS, OFTEN, PLANTS, ROUNDS, SHARES, USUAL
 from mjsim.houses.values import FloorPlan, Furnishing, Mount, Palette, Placement, Rectangle, Side
 
 ATTEMPTS = 6
 SIZES = 4  # a piece is made so often, each time smaller, for a lack of space
-BARE = 0.285  # of the floor
+BARE = 0.285  # of the floor: a home with less gets more
+LEAST, MOST = 0.26, 0.44  # of the floor: no home has less or more
 IN_VAIN = 4  # so many tries, and a room is left as it is
+ASIDE = ("wash_corner", "kitchenette")  # a screen hides a door beside it, and nobody wants a cooker there
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 BINS = {  # receptacle -> width, depth, height, m, and the uses of rooms that it belongs to, the best first
     "recycling_bin": (
@@ -86,7 +88,9 @@ class Home:
             for sides in AXES if kind == "lounge" else ((*AXES[0], *AXES[1]),):
                 fit = (space.depth(sides[0]), 0.0, 0.0) if kind == "lounge" else None
                 piece = KINDS[kind].make(rng, self.look, smaller=smaller, fit=fit)
-                place = space.put(piece, sides)
+                place = space.put(
+                    piece, sides, avoid=space.corners if kind in ASIDE and self.attempt < 3 else ()
+                )
                 if place is not None:
                     self._note(space, piece, place)
                     return True
@@ -176,7 +180,7 @@ class Home:
         narrow = min(space.room.floor.width, space.room.floor.depth) < 2.3
         order = ["corner_kitchen", "straight_kitchen"][int(narrow or space.rng.random() < 0.4) :]
         return any(
-            self.put(space, kind, largest=size, smallest=size) for size in range(SIZES) for kind in order
+            self.put(space, kind, largest=size, smallest=size) for size in range(SIZES + 2) for kind in order
         )
 
     def _any(self, space: Space, kinds: Sequence[str]) -> None:
@@ -204,6 +208,15 @@ class Home:
             if all(piece.kind in BINS for piece, _ in space.stood):
                 _ = any(self.put(space, kind) for kind in LITTLE)
 
+    def check(self) -> None:
+        """`HouseError` where a room is empty, or where too little or too much of the floor is furnished."""
+        share = sum(space.area for space in self.spaces) / self.plan.area
+        if not LEAST <= share <= MOST:
+            raise HouseError(f"{share:.0%} of the floor is furnished in seed {self.seed}")
+        for space in self.spaces:
+            if not any(piece.parts and piece.kind not in BINS for piece, _ in space.stood):
+                raise HouseError(f"nothing finds a place in {space.room.key} of seed {self.seed}")
+
     def _usual(self, space: Space, again: int = 0) -> None:
         use = self.uses[space.room.key]
         rng = stream(self.seed, "usual", space.room.key, *again * ["again"])
@@ -225,6 +238,8 @@ class Home:
     def _one_more(self, space: Space, kinds: Sequence[str], number: int, more: int) -> bool:
         """The first of some kinds that has a place and is not yet there often enough; `more` than usual may be."""
         there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
+        if kinds[0] in PLANTS and sum(kind in PLANTS for kind in there) >= MOST_PLANTS:
+            return False
         for kind in kinds:
             often = OFTEN.get(kind, 1) + (kind not in UNUSED) * more
             if there.count(kind) < often and self.put(space, kind, smallest=1, number=number):
@@ -272,6 +287,7 @@ def furnished(plan: FloorPlan, bins: Sequence[str], palette: Palette, seed: int)
         else:
             home.usual()
             decorate(home.spaces, home.uses, plan, look, seed)
+            home.check()
             return home
 
 

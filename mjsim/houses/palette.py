@@ -1,6 +1,7 @@
 """Colours of a house: of its furniture, and of the walls and floors of each room."""
 
 import colorsys
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -23,6 +24,7 @@ _PLANKS: tuple[Rgb, ...] = (
     (0.72, 0.66, 0.60),
     (0.76, 0.56, 0.38),
 )
+_GROUNDS: Mapping[str, Rgb] = {"damask": (0.95, 0.95, 0.95), "polka_dots": (0.98, 0.9, 0.72)}  # of wallpapers
 _HUES = (0.02, 0.08, 0.11, 0.14, 0.25, 0.38, 0.48, 0.55, 0.60, 0.66, 0.92)  # that walls and cloth are seen in
 
 
@@ -50,7 +52,7 @@ def draw_palette(seed: int) -> Palette:
 
 
 def surfaces(seed: int, plan: FloorPlan) -> list[str]:
-    """MJCF materials `wall_<room>` and `floor_<room>`, and those of the front door."""
+    """MJCF materials `wall_<room>`, `wall_<room>_plain`, `floor_<room>`, of the front door, and `facade`."""
     rng = stream(seed, "surfaces")
     hue, planks = _hue(rng), str(rng.choice(["oak_planks", "pine_planks"]))
     tone = _PLANKS[int(rng.integers(len(_PLANKS)))]
@@ -58,10 +60,11 @@ def surfaces(seed: int, plan: FloorPlan) -> list[str]:
     found = [
         f'<material name="entrance" rgba="{rgba(door)}"/>',
         f'<material name="entrance_panel" rgba="{rgba(_lighter(door))}"/>',
+        '<material name="facade" rgba="0.9 0.88 0.84 1"/>',
     ]
     for room in plan.rooms:
         own = stream(seed, "surfaces", room.key)
-        found += [_wall(room, hue, own), _floor(room, planks, tone, own)]
+        found += [*_wall(room, hue, own), _floor(room, planks, tone, own)]
     return found
 
 
@@ -70,8 +73,9 @@ def rgba(colour: Rgb) -> str:
     return " ".join(f"{value:.3f}" for value in colour) + " 1"
 
 
-def _wall(room: Room, hue: float, rng: np.random.Generator) -> str:
-    text = ""
+def _wall(room: Room, hue: float, rng: np.random.Generator) -> Iterator[str]:
+    """Its walls, with a pattern where they have one, and without."""
+    text = paper = ""
     colour = _colour(rng, hue + rng.uniform(-0.06, 0.06), (0.03, 0.22), (0.86, 0.97))
     if room.use in WET:
         text = 'texture="metro_tiles" texuniform="true" texrepeat="2.6 2.6" '
@@ -80,7 +84,10 @@ def _wall(room: Room, hue: float, rng: np.random.Generator) -> str:
         paper, repeat = [("damask", 4.5), ("polka_dots", 2.0)][int(rng.integers(2))]
         text = f'texture="{paper}" texuniform="true" texrepeat="{repeat} {repeat}" '
         colour = _colour(rng, _hue(rng), (0.05, 0.2), (0.86, 0.96))
-    return f'<material name="wall_{room.key}" {text}rgba="{rgba(colour)}" emission="0.1"/>'
+    ground = _GROUNDS.get(paper, (1.0, 1.0, 1.0))
+    plain = colour[0] * ground[0], colour[1] * ground[1], colour[2] * ground[2]
+    for name, pattern, shade in (("", text, colour), ("_plain", "", plain)):
+        yield f'<material name="wall_{room.key}{name}" {pattern}rgba="{rgba(shade)}" emission="0.1"/>'
 
 
 def _floor(room: Room, planks: str, tone: Rgb, rng: np.random.Generator) -> str:

@@ -15,7 +15,7 @@ from mjsim.houses.values import ROOMS, FloorPlan
 
 PREFIX = "generated:"
 RECIPE = "recipe.json"
-VERSION = 2  # of the generator: raised by whatever changes a house of a seed
+VERSION = 3  # of the generator: raised by whatever changes a house of a seed
 MAX_SEED = 2**63 - 1
 MAX_HOUSES = 100_000  # of a range
 # How usual homes of 1 to 10 rooms are, bathrooms and halls counted, where no number is asked for.

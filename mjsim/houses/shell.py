@@ -7,7 +7,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mjsim.houses.openings import LEAF_DEPTH, portions
+from mjsim.houses.openings import LEAF_DEPTH, NARROW_SILL, portions
+from mjsim.houses.palette import WET
 from mjsim.houses.values import (
     HEIGHT,
     OUTER_WALL,
@@ -22,6 +23,7 @@ from mjsim.houses.values import (
 )
 
 HALF = WALL / 2
+TILED = NARROW_SILL  # m, the height of tiles on walls
 _NORMAL = {"south": "y", "north": "y", "east": "x", "west": "x"}
 _SHADOW_TURN = {"south": 0.0, "north": math.pi, "west": -math.pi / 2, "east": math.pi / 2}
 
@@ -62,12 +64,15 @@ class _Walls:
     def elements(self) -> Iterator[str]:
         for side in SIDES:
             holes = sorted(self._holes(side), key=lambda hole: hole.start)
+            low, high = self._room.floor.wall(side)
+            for up, material in self._bands(
+                holes
+            ):  # the inner half, of one piece as far as its pattern goes on
+                yield from self._wall(side, (low - HALF, high + HALF), up, (0.0, HALF), material, holes)
             for start, end, is_outside in portions(self._room, side, self._plan.rooms):
-                depth = OUTER_WALL if is_outside else HALF
-                before, after = (
-                    self._extension(side, at, sign, depth) for at, sign in ((start, -1), (end, 1))
-                )
-                yield from self._wall(side, start - before, end + after, depth, holes)
+                if is_outside:
+                    along = start - self._extension(side, start, -1), end + self._extension(side, end, 1)
+                    yield from self._wall(side, along, (0.0, HEIGHT), (HALF, OUTER_WALL), "facade", holes)
             yield from self._foot(side, holes)
         for window in self._plan.windows_of(self._room.key):
             yield from self._window(window)
@@ -84,10 +89,18 @@ class _Walls:
             if w.side == side:
                 yield _Hole(w.center - w.width / 2, w.center + w.width / 2, w.sill, w.top)
 
-    def _extension(self, side: Side, end: float, sign: int, depth: float) -> float:
+    def _bands(self, holes: list[_Hole]) -> Iterator[tuple[tuple[float, float], str]]:
+        """From where to where each material goes up. Boxes begin their patterns in their own middles: tiles end below
+        windows, and wallpaper is where a wall has no opening, so that no seam is seen."""
+        paper = f"wall_{self._room.key}"
+        if self._room.use in WET:
+            yield (0.0, TILED), paper
+            yield (TILED, HEIGHT), f"{paper}_plain"
+        else:
+            yield (0.0, HEIGHT), f"{paper}_plain" if holes else paper
+
+    def _extension(self, side: Side, end: float, sign: int) -> float:
         """How far an outer wall goes on at an end where the house has a corner."""
-        if depth == HALF:
-            return 0.0
         edge = {"south": "y0", "north": "y1", "west": "x0", "east": "x1"}[side]
         across = getattr(self._room.floor.grown(HALF), edge)
         points = [(end + sign * 0.05, across + beyond) for beyond in (-0.05, 0.05)]
@@ -111,19 +124,25 @@ class _Walls:
             f'size="{_n(length / 2)} {_n((up[1] - up[0]) / 2)} {_n(depth / 2)}"/>'
         )
 
-    def _wall(self, side: Side, start: float, end: float, depth: float, holes: list[_Hole]) -> Iterator[str]:
-        material, at, out = f"wall_{self._room.key}", start, (0.0, depth)
+    def _wall(
+        self, side: Side, along: tuple[float, float], up: tuple[float, float], out: tuple[float, float],
+        material: str, holes: list[_Hole],
+    ) -> Iterator[str]:  # fmt: skip
+        """What is left of a slab around holes."""
+        at, end = along
         for hole in holes:
-            if hole.end < start or hole.start > end:
+            if hole.end < at or hole.start > end or hole.bottom >= up[1] or hole.top <= up[0]:
                 continue
-            if hole.start > at + 1e-6:
-                yield self._slab(side, (at, hole.start), (0.0, HEIGHT), out, material)
-            yield self._slab(side, (hole.start, hole.end), (hole.top, HEIGHT), out, material)
-            if hole.bottom > 0:
-                yield self._slab(side, (hole.start, hole.end), (0.0, hole.bottom), out, material)
+            for stretch, height in (
+                ((at, hole.start), up),
+                ((hole.start, hole.end), (hole.top, up[1])),
+                ((hole.start, hole.end), (up[0], hole.bottom)),
+            ):
+                if min(stretch[1] - stretch[0], height[1] - height[0]) > 1e-6:
+                    yield self._slab(side, stretch, height, out, material)
             at = hole.end
         if end > at + 1e-6:
-            yield self._slab(side, (at, end), (0.0, HEIGHT), out, material)
+            yield self._slab(side, (at, end), up, out, material)
 
     def _foot(self, side: Side, holes: list[_Hole]) -> Iterator[str]:
         """Skirting, and the soft shadow where the wall meets the floor."""

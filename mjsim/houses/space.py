@@ -13,8 +13,15 @@ from mjsim.houses.furniture.piece import Piece, Spot, moved
 from mjsim.houses.values import BACK, SIDES, FloorPlan, Room, Side
 
 BODY = 0.36  # m, radius of what has to come through: ways are twice as wide
-LARGE = 0.3  # m, the same of a large person: no floor is shut off from anybody
-POCKET = 3  # cells of floor that do not count
+WIDTHS = (
+    0.25,
+    0.265,
+    0.28,
+    0.29,
+    0.3,
+)  # m, the same of people with the planner's clearance: no floor is shut off from
+# somebody whom others get past
+POCKET = 0.005  # m^2 of floor that do not count
 STEP = 0.1  # m, between the places that are tried along a wall
 BESIDE = 0.6  # m beside a door where no bin stands if there is another place
 DOORWAY = 1.0  # m in front of a door that stay free
@@ -23,12 +30,13 @@ BEFORE_LEAF = 0.45  # m in front of a door leaf that stand free: it looks as if 
 WALL_GAP = 0.01  # m, behind furniture
 BEFORE_WINDOW = 0.6  # m, depth in which nothing is higher than the sill
 CURTAIN = 0.3  # m beside a window, the same
+LEAVES = 0.1  # m, the same where no curtains hang: leaves of plants reach over their parts
 BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # rooms without curtains
 AROUND = 0.76  # m around what stands free
 NEAR = BODY + 0.15  # m from the middle of a body to a piece that somebody uses
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 TRIES = 14  # places of a piece that are tried for free ways
-_CELL = 0.05  # m, of the grid on which ways are looked for
+_CELL, _FINE = 0.05, 0.0125  # m, of the grids on which ways, and floor that is shut off, are looked for
 
 Floats = NDArray[np.float64]
 
@@ -56,6 +64,7 @@ class Space:
     room: Room
     rng: np.random.Generator
     solids: list[tuple[float, float, float, float, float]] = field(default_factory=list)
+    hit: list[Spot] = field(default_factory=list)  # what people bump into: less than the solids, under leaves
     keep: list[Spot] = field(default_factory=list)  # no piece may stand there
     use: list[Spot] = field(default_factory=list)  # as `keep`; somebody must be able to go there
     near: list[Spot] = field(default_factory=list)  # solids that somebody must be able to come near to
@@ -85,12 +94,13 @@ class Space:
             if door.leaf is not None and door.leaf.room == room.key:
                 leaf = door.leaf.floor
                 space.solids.append((leaf.x0, leaf.y0, leaf.x1, leaf.y1, door.height))
+                space.hit.append(space.solids[-1][:4])
                 low, high = (leaf.x0, leaf.x1) if door.leaf.side in ("south", "north") else (leaf.y0, leaf.y1)
                 space.hung.append((door.leaf.side, low, high, 0.0))
                 zone = floor.along(door.leaf.side, low, high, 0, BEFORE_LEAF)
                 space.keep.append((zone.x0, zone.y0, zone.x1, zone.y1))
         for window in plan.windows_of(room.key):
-            half = window.width / 2 + (0.03 if room.use in BLINDS else CURTAIN)
+            half = window.width / 2 + (LEAVES if room.use in BLINDS else CURTAIN)
             zone = floor.along(window.side, window.center - half, window.center + half, 0, BEFORE_WINDOW)
             space.windows.append((zone.x0, zone.y0, zone.x1, zone.y1, window.sill))
             space.hung.append((window.side, window.center - half - 0.05, window.center + half + 0.05, 0.0))
@@ -124,28 +134,34 @@ class Space:
         places = self._free_places() if free else self._wall_places(piece, sides)
         if not len(places):
             return None
-        boxes, uses = (_moved(spots, places) for spots in ([part.spot for part in piece.parts], piece.use))
+        boxes, hits, uses = (
+            _moved(spots, places)
+            for spots in ([part.spot for part in piece.parts], [part.hit for part in piece.parts], piece.use)
+        )
         tops = np.array([part.top for part in piece.parts])
         ok = self._fits(boxes, tops, uses, free) & ~_overlap(boxes, np.array(avoid).reshape(-1, 4))
         fits = np.flatnonzero(ok)
         scores = self._scores(boxes[fits], places[fits], near, free)
         best: list[int] = fits[np.argsort(-scores, kind="stable")[:TRIES]].tolist()
         for k in best:
-            spots, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, uses))
+            spots, hit, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, hits, uses))
             used = [] if piece.kind in UNUSED else spots
-            if self.connected(spots, zones, used):
+            if self.connected(hit, zones, used):
                 self.near += used
                 x, y, turns, along = places[k].tolist()
                 place = Place(x, y, int(turns), None if free else SIDES[int(turns)], along)
-                self.stand(piece, place, spots, zones)
+                self.stand(piece, place, spots, zones, hit)
                 return place
         return None
 
-    def stand(self, piece: Piece, place: Place, spots: Iterable[Spot], zones: Iterable[Spot]) -> None:
+    def stand(
+        self, piece: Piece, place: Place, spots: Iterable[Spot], zones: Iterable[Spot], hit: Iterable[Spot]
+    ) -> None:
         """Note a piece that stands."""
-        for spot, part in zip(spots, piece.parts, strict=True):
+        for spot, low, part in zip(spots, hit, piece.parts, strict=True):
             self.solids.append((*spot, part.top))
-            self.area += (spot[2] - spot[0]) * (spot[3] - spot[1])
+            self.hit.append(low)
+            self.area += (low[2] - low[0]) * (low[3] - low[1])
         self.use.extend(zones)
         self.stood.append((piece, place))
 
@@ -230,19 +246,8 @@ class Space:
             zones: Places of its use.
             near: What of it is used.
         """
-        floor = self.room.floor
-        nx, ny = math.ceil(floor.width / _CELL), math.ceil(floor.depth / _CELL)
-        free = np.zeros((nx + 2, ny + 2), np.uint8)
-        free[1:-1, 1:-1] = 1
-        for x0, y0, x1, y1, *_ in (*self.solids, *spots):
-            i, j = math.floor((x0 - floor.x0) / _CELL + 1e-6), math.floor((y0 - floor.y0) / _CELL + 1e-6)
-            u, v = math.ceil((x1 - floor.x0) / _CELL - 1e-6), math.ceil((y1 - floor.y0) / _CELL - 1e-6)
-            free[max(i, 0) + 1 : u + 1, max(j, 0) + 1 : v + 1] = 0
-        distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _CELL
-        _, islands, stats, _ = _islands(distance, BODY)
-        for found in (stats, _islands(distance, LARGE)[2]):
-            if (found[1:, cv2.CC_STAT_AREA] > POCKET).sum() > 1:
-                return False
+        floor, spots = self.room.floor, [*self.hit, *spots]
+        _, islands, *_ = _islands(self._distance(spots, _CELL), BODY)
         targets: list[tuple[Spot, ...]] = [((x - 0.25, y - 0.25, x + 0.25, y + 0.25),) for x, y in self.doors]
         targets += [(zone,) for zone in (*self.use, *zones)]
         # Not around corners: there it would be farther away.
@@ -257,7 +262,24 @@ class Space:
             common = here - {0} if common is None else common & here
             if not common:
                 return False
+        distance = self._distance(spots, _FINE)
+        for radius in (*WIDTHS, BODY):
+            _, _, stats, _ = _islands(distance, radius)
+            if (stats[1:, cv2.CC_STAT_AREA] > POCKET / _FINE**2).sum() > 1:
+                return False
         return True
+
+    def _distance(self, spots: Iterable[Spot], cell: float) -> Any:
+        """How far cells are from the walls and from what stands in `spots`, m."""
+        floor = self.room.floor
+        nx, ny = math.ceil(floor.width / cell), math.ceil(floor.depth / cell)
+        free = np.zeros((nx + 2, ny + 2), np.uint8)
+        free[1:-1, 1:-1] = 1
+        for x0, y0, x1, y1 in spots:
+            i, j = math.floor((x0 - floor.x0) / cell + 1e-6), math.floor((y0 - floor.y0) / cell + 1e-6)
+            u, v = math.ceil((x1 - floor.x0) / cell - 1e-6), math.ceil((y1 - floor.y0) / cell - 1e-6)
+            free[max(i, 0) + 1 : u + 1, max(j, 0) + 1 : v + 1] = 0
+        return cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * cell
 
 
 def _islands(distance: Floats, radius: float) -> Any:

@@ -9,13 +9,13 @@ MUSTS: dict[str, tuple[Options, ...]] = {  # one of each
     "bathroom": (("bathtub", "shower"), ("toilet", "toilet"), ("washbasin", "washbasin")),
     "shower_room": (("shower", "shower"), ("toilet", "toilet"), ("washbasin", "washbasin")),
 }
-_PLANTS: Options = ("bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
+PLANTS: Options = ("bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 _SHELVES: Options = ("bookcase", "low_bookcase", "cube_shelf", "ladder_shelf")
 USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this chance, while there is room
     "bedroom": (
         (("chest_of_drawers", "dressing_table"), 1.0),
         (("standing_mirror", "armchair", "pouf", "bench"), 0.7),
-        (_PLANTS, 0.7),
+        (PLANTS, 0.7),
         ((*_SHELVES, "trunk", "television"), 0.6),
         (("floor_lamp", "chest_of_drawers"), 0.5),
     ),
@@ -24,32 +24,32 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (("toy_shelf", "low_bookcase", "cube_shelf"), 0.9),
         (("desk",), 0.6),
         (("pouf", "stool", "trunk", "aquarium"), 0.7),
-        (_PLANTS, 0.4),
+        (PLANTS, 0.4),
     ),
     "living_room": (
         (("armchair",), 0.8),
         ((*_SHELVES, "sideboard", "display_cabinet"), 0.9),
-        (_PLANTS, 0.9),
+        (PLANTS, 0.9),
         (("floor_lamp", "side_table"), 0.8),
         (("sideboard", "piano", "stove", "aquarium", "chest_of_drawers"), 0.8),
         (("armchair", "pouf", "day_bed"), 0.6),
         ((*_SHELVES, "trunk", "console"), 0.7),
-        (_PLANTS, 0.6),
+        (PLANTS, 0.6),
     ),
     "studio": (
         (("chest_of_drawers", "low_bookcase", "cube_shelf"), 1.0),
         (_SHELVES, 0.7),
-        (_PLANTS, 0.8),
+        (PLANTS, 0.8),
         (("floor_lamp", "armchair"), 0.6),
     ),
     "kitchen": (
         (("bar_table", "larder", "dresser", "kitchen_trolley"), 0.9),
-        (("kitchen_trolley", "larder", "stool", "fridge"), 0.7),
-        (_PLANTS, 0.6),
+        (("kitchen_trolley", "larder", "stool"), 0.7),
+        (PLANTS, 0.6),
     ),
     "dining_room": (
         (("sideboard", "dresser", "display_cabinet"), 1.0),
-        (_PLANTS, 0.8),
+        (PLANTS, 0.8),
         (("bookcase", "ladder_shelf", "console", "stove", "piano", "bench"), 0.7),
         (("floor_lamp", "armchair"), 0.5),
     ),
@@ -58,7 +58,7 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (_SHELVES, 1.0),
         (("filing_cabinet",), 0.8),
         (("armchair", "day_bed", "sofa"), 0.7),
-        (_PLANTS, 0.8),
+        (PLANTS, 0.8),
         (("floor_lamp", "side_table", *_SHELVES), 0.6),
     ),
     "bathroom": (
@@ -76,11 +76,12 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (("coat_rack", "shoe_cupboard"), 1.0),
         (("console", "bench", "shoe_cupboard", "chest_of_drawers"), 0.9),
         (("umbrella_stand",), 0.7),
-        (_PLANTS, 0.7),
+        (PLANTS, 0.7),
         (("mirror_wardrobe", "low_bookcase", "armchair", "standing_mirror"), 0.6),
     ),
 }
 LITTLE: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")  # where nothing else fits
+MOST_PLANTS = 3  # in one room
 ROUNDS = 3  # through these lists
 OFTEN = {
     "armchair": 2,

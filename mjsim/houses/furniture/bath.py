@@ -23,15 +23,19 @@ def toilet(b: Builder) -> Piece:
         b.box("ceramic", 0.24, (0.02, d - 0.16), (0, 0.3), seen=True)
     b.soft("ceramic", (0, y, 0.3), (w / 2 - 0.01, r, 0.12 if hung else 0.14))
     b.soft("white", (0, y, 0.41), (w / 2, r + 0.01, 0.025))
-    b.soft("ceramic_shade", (0, y, 0.424), (w / 2 - 0.05, r - 0.05, 0.016))
+    b.soft("ceramic_shade", (0, y, 0.414), (w / 2 - 0.05, r - 0.05, 0.028))
     if b.smaller == 0:
         b.rod("chrome", (-w / 2 - 0.12, 0.0, 0.7), (-w / 2 - 0.12, 0.08, 0.7), 0.008)
         b.rod("linen", (-w / 2 - 0.17, 0.08, 0.7), (-w / 2 - 0.07, 0.08, 0.7), 0.05)
     wide, aside = 0.5 if hung else w + 0.02, 0.35 - 0.05 * b.smaller
+    top = 1.1 if hung else 0.82
+    parts = [(-wide / 2, 0.0, wide / 2, d, top)]
+    if b.smaller == 0:
+        parts.append((-w / 2 - 0.17, 0.0, -wide / 2, 0.14, top))  # the paper
     return b.piece(
-        (max(wide, w + 0.34) if b.smaller == 0 else wide, d, 1.1 if hung else 0.82),
+        (max(wide, w + 0.34) if b.smaller == 0 else wide, d, top),
         use=((-aside, d, aside, d + 0.55),),
-        parts=((-wide / 2, 0, wide / 2, d, 1.1 if hung else 0.82),),
+        parts=parts,
     )
 
 
@@ -56,7 +60,7 @@ def washbasin(b: Builder) -> Piece:
         b.guard(0.4, (0.02, 0.38), (0, 0.75))
         b.post("ceramic", 0, 0.2, (0, 0.75), 0.09)
         b.box("ceramic", w, (0, d), (0.75, 0.86))
-        b.soft("ceramic_shade", (0, d / 2 + 0.03, 0.862), (w / 2 - 0.06, d / 2 - 0.08, 0.012))
+        b.soft("ceramic_shade", (0, d / 2 + 0.03, 0.853), (w / 2 - 0.055, d / 2 - 0.075, 0.018))
     else:
         paint, low = b.pick(b.wood, b.front, "white"), b.pick(0.0, 0.3)
         top = 0.78 if form == "bowl" else 0.8
@@ -68,7 +72,7 @@ def washbasin(b: Builder) -> Piece:
                 b.post("ceramic", x, 0.24, (0.83, 0.94), 0.19, seen=False)
                 b.post("ceramic_shade", x, 0.24, (0.94, 0.944), 0.165)
             else:
-                b.soft("ceramic_shade", (x, 0.25, 0.852), (0.21, 0.14, 0.012))
+                b.soft("ceramic_shade", (x, 0.25, 0.843), (0.22, 0.15, 0.018))
     for x in (-0.3, 0.3) if form == "double" else (0.0,):
         _tap(b, x, 0.06, 0.83)
     b.post(b.pick(*b.look.accents), w / 2 - 0.1, 0.1, (0.84, 0.98), 0.03)

@@ -242,6 +242,7 @@ class Builder:
         *,
         use: float | Sequence[Spot] = 0.0,
         parts: Sequence[tuple[float, float, float, float, float]] | None = None,
+        stem: float = 0.0,
         **more: Any,
     ) -> Piece:
         """The piece of what was written.
@@ -250,6 +251,7 @@ class Builder:
             size: Along the wall, into the room, up, m.
             use: Depth, m, of free floor in front of it; or the places, each x0, y0, x1, y1.
             parts: x0, y0, x1, y1, top, m, of what nobody can walk through; by default the whole size.
+            stem: Half the width, m, of what people bump into, where only this is narrower than the parts.
             more: Other fields of `Piece`.
         """
         w, d, h = (float(v) for v in size)
@@ -261,7 +263,7 @@ class Builder:
             self.kind,
             (w, d, h),
             "".join(self.geoms),
-            tuple(Part((a, b, c, e), top) for a, b, c, e, top in parts),
+            tuple(Part((a, b, c, e), top, stem) for a, b, c, e, top in parts),
             tuple(use),
             mounts=tuple(more.pop("mounts", ())),
             pictures=tuple(self.pictures),

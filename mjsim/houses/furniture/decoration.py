@@ -153,26 +153,28 @@ def curtains(b: Builder) -> Piece:
 
 
 def roller_blind(b: Builder) -> Piece:
-    """A roll of cloth, drawn a part of the way down."""
+    """A roll of cloth in the window's recess, drawn a part of the way down."""
     w, low, high = _window(b)
     down = round(b.pick(0.2, 0.35) * (high - low), 2)
-    b.box("white", w + 0.06, (0.0, 0.06), (high, high + 0.07), seen=True)
-    b.box(b.pick("curtain", "linen", b.cloth), w + 0.02, (0.02, 0.028), (high - down, high), seen=True)
-    b.box("white", w + 0.03, (0.015, 0.035), (high - down - 0.02, high - down), seen=True)
-    return b.piece((w + 0.06, 0.06, high + 0.07), parts=(), stands="hangs")
+    b.box("white", w - 0.004, (-0.07, -0.01), (high - 0.07, high - 0.002), seen=True)
+    b.box(
+        b.pick("curtain", "linen", b.cloth), w - 0.03, (-0.044, -0.036), (high - down, high - 0.07), seen=True
+    )
+    b.box("white", w - 0.02, (-0.05, -0.03), (high - down - 0.02, high - down), seen=True)
+    return b.piece((w, 0.0, high), parts=(), stands="recess")
 
 
 def blind(b: Builder) -> Piece:
-    """Slats, drawn a part of the way down."""
+    """Slats in the window's recess, drawn a part of the way down."""
     w, low, high = _window(b)
     down = round(b.pick(0.15, 0.25, 0.35) * (high - low), 2)
-    b.box("white", w + 0.06, (0.0, 0.06), (high, high + 0.07), seen=True)
+    b.box("white", w - 0.004, (-0.07, -0.01), (high - 0.05, high - 0.002), seen=True)
     count = max(3, round(down / 0.05))
     slat = b.pick("white", "white", b.wood)
     for i in range(count):
-        z = high - 0.01 - down * (i + 0.5) / count
-        b.box(slat, w + 0.02, (0.005, 0.05), (z, z + 0.008), seen=True)
-    return b.piece((w + 0.06, 0.06, high + 0.07), parts=(), stands="hangs")
+        z = high - 0.05 - down * (i + 0.5) / count
+        b.box(slat, w - 0.02, (-0.065, -0.02), (z, z + 0.008), seen=True)
+    return b.piece((w, 0.0, high), parts=(), stands="recess")
 
 
 def radiator(b: Builder) -> Piece:
@@ -237,7 +239,7 @@ def floor_lamp(b: Builder) -> Piece:
         b.post("bulb", 0, r, (tall + 0.055, tall + 0.07), 0.12)
     else:
         b.post("shade", 0, r, (tall - 0.1, tall + 0.18), b.pick(0.16, 0.2))
-    return b.piece((0.4, 0.4, tall + 0.24), parts=((-0.17, 0, 0.17, 2 * r, tall + 0.24),))
+    return b.piece((0.4, 0.4, tall + 0.24), parts=((-0.17, 0, 0.17, 2 * r, tall + 0.24),), stem=0.07)
 
 
 def standing_mirror(b: Builder) -> Piece:

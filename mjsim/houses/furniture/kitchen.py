@@ -6,6 +6,7 @@ from mjsim.houses.furniture.builder import Builder
 from mjsim.houses.furniture.piece import Mount, Piece, group
 
 WIDE = 0.6  # m, a module
+SIZES = 4  # of kitchens
 DEEP = 0.62  # m, with the worktop
 TOP = 0.9  # m, of the worktop
 ON_TOP = 1.09  # m, of what stands on it, a little below the sills of kitchens
@@ -182,15 +183,21 @@ _STRAIGHT = (  # by size
         "tall_oven cooker drawers rack sink fridge",
     ),
     ("fridge sink rack cooker drawers", "fridge cooker drawers sink rack"),
-    ("fridge sink rack cooker", "fridge cooker rack sink"),
+    ("fridge cooker sink rack", "fridge cooker rack sink"),
 )
 
 
 def straight_kitchen(b: Builder) -> Piece:
     """Four to seven modules along a wall, with a bin for dishes beside the sink."""
-    modules = tuple(b.pick(*_STRAIGHT[min(b.smaller, 3)]).split())
+    size = _size(b)
+    modules = tuple(b.pick(*_STRAIGHT[size]).split())
     b.handle = b.pick("bar", "knob", "none")
-    return Run(b, modules if b.chance(0.5) else modules[::-1], b.smaller < 3 or b.chance(0.5)).write()
+    return Run(b, modules if b.chance(0.5) else modules[::-1], b.smaller < SIZES).write()
+
+
+def _size(b: Builder) -> int:
+    """Kitchens that had no place with cabinets on the wall are tried without, first the larger of the two smallest."""
+    return b.smaller if b.smaller < SIZES else b.smaller - 2
 
 
 def kitchenette(b: Builder) -> Piece:
@@ -204,14 +211,15 @@ def corner_kitchen(b: Builder) -> Piece:
     b.handle = b.pick("bar", "knob", "none")
     side = b.pick(-1, 1)
     longer = b.pick(("rack", "sink", "dishwasher", "fridge"), ("sink", "rack", "drawers", "doors", "fridge"))
-    if b.smaller:
-        longer = ("rack", "sink", "fridge") if b.smaller < 3 else ("sink", "fridge")
-    other = b.pick(("cooker", "drawers"), ("drawers", "cooker", "doors")) if b.smaller < 2 else ("cooker",)
-    if b.smaller == 3:
+    size = _size(b)
+    if size:
+        longer = ("rack", "sink", "fridge") if size < 3 else ("sink", "fridge")
+    other = b.pick(("cooker", "drawers"), ("drawers", "cooker", "doors")) if size < 2 else ("cooker",)
+    if size == 3:
         other = ("rack", "cooker")
     # the corner itself: a closed module that both runs touch
     modules = ("doors", *longer) if side < 0 else (*longer[::-1], "doors")
-    run = Run(Builder("straight_kitchen", b.rng, b.look), modules, b.smaller < 2)
+    run = Run(Builder("straight_kitchen", b.rng, b.look), modules, b.smaller < SIZES)
     leg = Run(Builder("straight_kitchen", b.rng, b.look), other if side > 0 else other[::-1], False)
     for r in (run, leg):
         r.b.front, r.b.handle, r.b.metal = b.front, b.handle, b.metal

@@ -18,6 +18,16 @@ class Part:
 
     spot: Spot  # m
     top: float  # m
+    stem: float = (
+        0.0  # m, half the width of what people bump into, where leaves or a shade reach farther; 0: all of it
+    )
+
+    @property
+    def hit(self) -> Spot:
+        """What people bump into."""
+        x0, y0, x1, y1 = self.spot
+        x, y, r = (x0 + x1) / 2, (y0 + y1) / 2, self.stem
+        return (x - r, y - r, x + r, y + r) if r else self.spot
 
 
 @dataclass(frozen=True)
@@ -54,7 +64,9 @@ class Piece:
     geoms: str  # MJCF elements in the frame of the piece
     parts: tuple[Part, ...]  # what nobody can walk through
     use: tuple[Spot, ...] = ()  # where somebody stands to use it: stays free, and can be reached
-    stands: str = "wall"  # "wall", "left" and "right" (that end in a corner), "free", "hangs", "flat"
+    stands: str = (
+        "wall"  # "wall", "left" and "right" (that end in a corner), "free", "hangs", "flat", "recess"
+    )
     seats: int = 0  # how many can sit
     mounts: tuple[Mount, ...] = ()  # for bins
     pictures: tuple[Picture, ...] = ()  # its own textures
@@ -86,7 +98,9 @@ def group(
     `use` in the frame of the group; by default the members' own, and so are the `seats`.
     """
     members = list(members)
-    parts = [Part(moved(part.spot, x, y, yaw), part.top) for p, x, y, yaw in members for part in p.parts]
+    parts = [
+        Part(moved(part.spot, x, y, yaw), part.top, part.stem) for p, x, y, yaw in members for part in p.parts
+    ]
     spots = [part.spot for part in parts]
     left, right = min(s[0] for s in spots), max(s[2] for s in spots)
     back, front = min(s[1] for s in spots), max(s[3] for s in spots)
@@ -102,7 +116,7 @@ def group(
         kind,
         (right - left, front - back, max(p.size[2] for p, *_ in members)),
         "",
-        tuple(Part(moved(part.spot, dx, dy, 0), part.top) for part in parts),
+        tuple(Part(moved(part.spot, dx, dy, 0), part.top, part.stem) for part in parts),
         tuple(moved(spot, dx, dy, 0) for spot in use),
         stands,
         sum(p.seats for p, *_ in members) if seats is None else seats,

@@ -26,7 +26,9 @@ def _pot(b: Builder, r: float, h: float, y: float) -> str:
 def _potted(b: Builder, r: float, wide: float, tall: float) -> Piece:
     """A plant whose leaves reach `wide` around the middle of its pot, at y = wide; nobody walks into the pot."""
     reach = max(r, 0.8 * wide)  # neighbours stay out of its leaves
-    return b.piece((2 * wide, 2 * wide, tall), parts=((-reach, wide - reach, reach, wide + reach, tall),))
+    return b.piece(
+        (2 * wide, 2 * wide, tall), parts=((-reach, wide - reach, reach, wide + reach, tall),), stem=r
+    )
 
 
 def bush(b: Builder) -> Piece:
