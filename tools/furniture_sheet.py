@@ -22,7 +22,7 @@ from mjsim.houses.furniture.look import draw_look
 from mjsim.houses.furniture.piece import Piece
 from mjsim.houses.palette import draw_palette
 from mjsim.houses.space import Place
-from mjsim.houses.values import FloorPlan, Furnishing, Placement, Rectangle, Room
+from mjsim.houses.values import FloorPlan, Furnishing, Placement, Rectangle, Room, Window
 from mjsim.model.assets import models_root
 from mjsim.model.model_files import read_model
 from mjsim.render import Renderer
@@ -57,10 +57,16 @@ def pictures(kind: str, count: int = 3) -> Iterator[Image]:
     look = draw_look(draw_palette(seed), stream(seed, "look"))
     for i in range(count):
         piece = KINDS[kind].make(stream(seed, "sheet", kind, str(i)), look)
-        place = Place(APART * (i + 0.5), 0.0 if piece.stands != "ceiling" else 1.0, 0, "south")
+        x = APART * (i + 0.5)
+        place = Place(x, 0.0 if piece.stands != "ceiling" else 1.0, 0, "south", x)
         pieces.append((piece, place))
         placements += placed(room.key, piece, place, look)
-    plan = FloorPlan((room,), (), ())
+    windows = [
+        Window(room.key, "south", place.along, piece.size[0], 0.95, piece.size[2])
+        for piece, place in pieces
+        if piece.stands == "recess"
+    ]
+    plan = FloorPlan((room,), (), tuple(windows))
     files = write_files(seed, kind, kind, plan, Furnishing(tuple(placements), ()), 1, models_root())
     with tempfile.TemporaryDirectory() as folder:
         for name, content in files.items():
@@ -78,7 +84,7 @@ def pictures(kind: str, count: int = 3) -> Iterator[Image]:
 def _camera(piece: Piece, place: Place) -> CameraPose:
     """From above its right side."""
     w, d, h = piece.size
-    low = max(0.0, h - 1.3) if piece.stands in ("hangs", "ceiling") else 0.0
+    low = max(0.0, h - 1.3) if piece.stands in ("hangs", "ceiling", "recess") else 0.0
     middle = np.array([place.x, place.y + (d / 2 if piece.stands != "ceiling" else 0.0), (low + h) / 2])
     away = 0.9 + 1.25 * max(w, d, h - low)
     rise = -0.35 if piece.stands == "ceiling" else 0.4

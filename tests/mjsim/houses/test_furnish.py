@@ -83,7 +83,13 @@ def test_a_home_has_what_it_must_have(home: Home) -> None:
 
 def test_a_quarter_to_a_half_of_the_floor_is_furnished(home: Home) -> None:
     share = sum(space.area for space in home.spaces) / home.plan.area
-    assert 0.2 < share < 0.45
+    assert 0.25 < share < 0.45
+
+
+def test_no_floor_is_shut_off_from_large_people_alone() -> None:
+    space = Space.of(studio(), studio().rooms[1], np.random.default_rng(0))
+    assert space.connected([(5.72, 1.95, 7.08, 1.99)])
+    assert not space.connected([(5.72, 1.95, 7.15, 1.99)])  # 0.55 m to a strip of 0.61 m
 
 
 def test_the_same_seed_gives_the_same_home() -> None:
