@@ -49,6 +49,7 @@ pictures: $(READY) ## Make the pictures of the README and of docs/rendering.md a
 	$(BIN)/mjsim gallery --force --out docs/pictures
 	$(BIN)/python -m tools.drawn_pairs docs/pictures/browser.webp
 	$(BIN)/python -m tools.furniture_sheet docs/pictures/furniture.webp
+	$(BIN)/python -m tools.homes_sheet docs/pictures/homes.webp
 
 data-dictionary: $(READY) ## Make docs/data.md anew from the types
 	$(BIN)/python -m tools.data_dictionary > docs/data.md

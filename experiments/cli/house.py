@@ -1,6 +1,7 @@
-"""`mjsim house`: write a disorganized house as MJCF or glTF, generate a house, or export one."""
+"""`mjsim house`: write a disorganized house as MJCF or glTF, generate a house, export one, or show many."""
 
 import argparse
+import os
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from experiments.errors import ConfigError
 from mjsim.episode import POINTS
 
 MJCF, GLTF = ".xml", ".glb"
-GENERATE, EXPORT = "generate", "export"
+GENERATE, EXPORT, GALLERY = "generate", "export", "gallery"
 HABITAT, PROCTHOR = "habitat", "procthor"
 
 DESCRIPTION = """\
@@ -25,13 +26,27 @@ floor plan and a picture of each room. It is the one that --house generated:SEED
 
 With `export`: write the house --house for another simulator. --format habitat makes a scene dataset in the folder
 --out, with --episodes episodes of rearrangement from --seed on; --format procthor makes a file of the floor plan.
-`mjsim import house` reads both back (docs/houses.md)."""
+`mjsim import house` reads both back (docs/houses.md).
+
+With `gallery SOURCE...`: draw homes into the folder --out: contact sheets of ten homes each (sheet_1.png, ...) with a
+floor plan and two views at eye height, and index.html, which lists them by rooms and area and opens each in three
+dimensions, without a server. A SOURCE is a house, or generated ones of a range of seeds whose end is not included:
+`mjsim house gallery apartment my-house generated:0:20 'generated:7?rooms=5' --out runs/gallery`. The same command
+continues after an interruption; homes that are there are not drawn again."""
 
 
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     parser = add_command(commands, "house", run, description=DESCRIPTION)
-    parser.add_argument("what", nargs="?", choices=[GENERATE, EXPORT], help="make a new house, or export one")
+    parser.add_argument(
+        "what",
+        nargs="?",
+        choices=[GENERATE, EXPORT, GALLERY],
+        help="make a new house, export one, or show many",
+    )
+    parser.add_argument(
+        "sources", nargs="*", metavar="SOURCE", help="of gallery: a house, or a range of seeds"
+    )
     parser.add_argument(
         "--objects", type=int, default=12, metavar="N", help="misplaced objects, 1 to --points"
     )
@@ -43,7 +58,7 @@ def add_parser(commands: Any) -> None:
         type=Path,
         required=True,
         metavar="PATH",
-        help="file to write, which ends in .xml or .glb; of generate and --format habitat, a folder",
+        help="file to write, which ends in .xml or .glb; of generate, gallery and --format habitat, a folder",
     )
     parser.add_argument(
         "--rooms",
@@ -57,6 +72,13 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--episodes", type=int, default=1, metavar="N", help="of export (default: %(default)s)"
     )
+    parser.add_argument(
+        "--workers",
+        type=int,
+        default=os.cpu_count(),
+        metavar="N",
+        help="of gallery: homes at a time (default: one per core, %(default)s here)",
+    )
     parser.add_argument("--no-pictures", action="store_true", help="generate without pictures")
     add_force(parser)
 
@@ -67,6 +89,12 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.record.run_directory import check_file
     from mjsim.model.scene import compose
 
+    if arguments.what == GALLERY:
+        return _gallery(arguments)
+    if arguments.sources:
+        raise ConfigError(
+            f"{arguments.sources[0]!r} is one word too many; only gallery takes names of houses here"
+        )
     if arguments.what == GENERATE:
         return _generate(arguments)
     if arguments.what == EXPORT:
@@ -84,6 +112,44 @@ def run(arguments: argparse.Namespace) -> int:
     episode.save(episode_file)
     print(f"{arguments.out} ({len(episode.objects)} misplaced objects, seed {arguments.seed})")
     return 0
+
+
+def _gallery(arguments: argparse.Namespace) -> int:
+    """Draw homes, with a progress bar; 1 if one of them failed."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.trials.design import counted
+    from experiments.web.gallery.gallery import homes_of, write_gallery
+
+    if not arguments.sources:
+        raise ConfigError("a gallery needs houses: name some, such as apartment or generated:0:20")
+    homes, out = homes_of(arguments.sources), arguments.out
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with progress_bars(error_console(), "homes", *columns) as bars:
+        bar = bars.add_task("homes", total=len(homes))
+
+        def show(failure: str | None) -> None:
+            bars.advance(bar)
+            if failure:
+                bars.console.print(f"failed: {failure}", style="red", soft_wrap=True)
+
+        failed = write_gallery(homes, out, workers=arguments.workers, on_home=show)
+    drawn = counted(len(homes) - failed, "home")
+    print(f"{out / 'index.html'} ({drawn}{f', {failed} failed' if failed else ''})")
+    return 1 if failed else 0
 
 
 def _generate(arguments: argparse.Namespace) -> int:

@@ -16,6 +16,7 @@ from mjsim.render import CameraPose, Renderer, render_house_map
 SIZE = (960, 640)  # px
 FIELD = math.radians(62.0)  # vertical; corners need a wider one than people have
 SCALE, MARGIN = 70.0, 0.4  # px/m of the plan; m around it
+TEXT, LINE = 13, 16  # px of letters and lines on the plan
 LOOKED_AT = 0.9  # m above the middle of a room
 PLACES = 3000
 
@@ -40,33 +41,48 @@ def draw_house(house: House, folder: Path) -> list[Path]:
     return paths
 
 
-def floor_plan(house: House) -> NDArray[np.uint8]:
-    """The house from above, with names and areas of the rooms, RGB."""
+def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+    """The house from above, with names and areas of the rooms, RGB.
+
+    `within` is the width and height, px, which it is to fill; else the scale is fixed.
+    """
     x0, y0, x1, y1 = house.bounds
     bounds = x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
-    plan = np.ascontiguousarray(render_house_map(house.catalogue, bounds, SCALE)[..., :3])
+    sides = bounds[2] - bounds[0], bounds[3] - bounds[1]
+    scale = min(px / side for px, side in zip(within, sides, strict=True)) if within else SCALE
+    plan = np.ascontiguousarray(render_house_map(house.catalogue, bounds, scale)[..., :3])
     scale = plan.shape[1] / (bounds[2] - bounds[0])
     rooms = house.rooms
     for key, label in rooms.labels.items():
         number = rooms.keys.index(key)
         area = 4 * float(rooms.half_sizes[number].prod())
         x, y = (rooms.centers[number] - bounds[::3]) * (scale, -scale)
-        for line, text in enumerate((label, f"{area:.1f} m2")):
-            width, height = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)[0]
-            at = round(x - width / 2), round(y + line * (height + 8))
-            for colour, thickness in (((255, 255, 255), 4), ((20, 20, 20), 1)):
-                cv2.putText(plan, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, thickness, cv2.LINE_AA)
+        _write_over(plan, (label, f"{area:.1f} m²"), round(float(x)), round(float(y)))
     return plan
 
 
-def corner_view(house: House, room: str) -> CameraPose:
-    """A view over a room from where one can stand, as far from its middle as that is."""
+def _write_over(plan: NDArray[np.uint8], lines: tuple[str, ...], x: int, y: int) -> None:
+    """Lines of text with their middle at a pixel, on ground that is paler than the rest."""
+    face = cv2.FontFace("sans")
+    widths = [cv2.getTextSize((0, 0), text, (0, 0), face, TEXT, 500)[2] for text in lines]
+    half, top = max(widths) // 2 + 3, y - TEXT
+    ground = plan[max(top, 0) : top + len(lines) * LINE + 4, max(x - half, 0) : x + half]
+    ground[:] = ground // 4 + 191
+    for line, (text, width) in enumerate(zip(lines, widths, strict=True)):
+        at = x - width // 2, top + (line + 1) * LINE - 4
+        cv2.putText(plan, text, at, (20, 20, 20), face, TEXT, 500)
+
+
+def corner_view(house: House, room: str, *, opposite: bool = False) -> CameraPose:
+    """A view over a room from where one can stand, as far from its middle as that is; or from far across that place."""
     floor = house.sampling_floor.sample(np.random.default_rng(0), PLACES)
     distances = house.rooms.distances(floor)
     number = house.rooms.keys.index(room)
     center = house.rooms.centers[number]
     places = floor[distances.argmin(axis=1) == number]
     place = places[np.hypot(*(places - center).T).argmax()] if len(places) else house.viewpoints[room][0]
+    if opposite and len(places):
+        place = places[np.hypot(*(places - place).T).argmax()]
     # A room that is seen from its middle is seen towards its longer side.
     target = center if np.hypot(*(place - center)) > 0.3 else place + np.array([1.0, 0.0])
     eye = np.array([*place, PersonParameters().eye_height])

@@ -2,7 +2,7 @@
 
 import base64
 import gzip
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,6 @@ from mjsim.render import render_pictures
 from mjsim.scene_export.cache import cached_scene
 from mjsim.scene_export.store import GZIP, scenes_folder
 
-ENTRY = "view/view.js"
 _TYPES = {
     ".js": "text/javascript",
     ".json": "application/json",
@@ -58,15 +57,28 @@ def view_page(
     replay(directory, watch=watch, catalogue=catalogue, on_progress=on_progress)
     ((replayer, seen),) = watched
     record, house = replayer.record, replayer.house
-    modules = {name: _data_url(name, source.encode()) for name, source in modules_of(ENTRY).items()}
     models = {placed.model for placed in record.episode.objects}
-    page: str = _template().render(
-        title=_title(record),
-        style=(STATIC / "style.css").read_text("utf-8"),
-        modules=msgspec.json.encode({"imports": modules}).decode(),
-        entry=ENTRY,
-        run=_packed(_run(record, house, seen)),
-        scene=_packed(_scene(house, models)),
+    return run_page(_title(record), _run(record, house, seen), _scene(house, models))
+
+
+def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **values: Any) -> str:
+    """HTML of the page that shows a run as it is recorded, in a scene of these files; `values` are the template's."""
+    urls = {name: _data_url(name, content) for name, content in scene.items()}
+    return own_page("view.html", "view/view.js", title=title, run=_packed(run), scene=_packed(urls), **values)
+
+
+def own_page(template: str, entry: str, **values: Any) -> str:
+    """HTML of a page that runs the module `entry` of the client, with nothing in another file."""
+    modules = {name: _data_url(name, source.encode()) for name, source in modules_of(entry).items()}
+    page: str = (
+        Environment(loader=FileSystemLoader(CLIENT / "templates"), autoescape=True, trim_blocks=True)
+        .get_template(template)
+        .render(
+            style=(STATIC / "style.css").read_text("utf-8"),
+            modules=msgspec.json.encode({"imports": modules}).decode(),
+            entry=entry,
+            **values,
+        )
     )
     return page
 
@@ -99,27 +111,21 @@ def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
     }
 
 
-def _scene(house: House, models: set[str]) -> dict[str, str]:
-    """The files that draw a house with objects of some models, as data URLs by name."""
+def _scene(house: House, models: set[str]) -> dict[str, bytes]:
+    """The files that draw a house with objects of some models, by name."""
     folder = cached_scene(house.catalogue, scenes_folder())
     found = {}
     for path in sorted(folder.rglob("*.*")):
         name = path.relative_to(folder).as_posix().removesuffix(GZIP)
         if Path(name).stem in models or not name.startswith(("objects/", "floor")):
             content = path.read_bytes()
-            found[name] = _data_url(name, gzip.decompress(content) if path.suffix == GZIP else content)
+            found[name] = gzip.decompress(content) if path.suffix == GZIP else content
     return found
 
 
 def _title(record: Record) -> str:
     start = record.start
     return f"{start['user']}, {start['assistance']}, {len(record.names)} objects, seed {start['house_seed']}"
-
-
-def _template() -> Any:
-    return Environment(loader=FileSystemLoader(CLIENT / "templates"), autoescape=True).get_template(
-        "view.html"
-    )
 
 
 def _packed(value: Any) -> str:

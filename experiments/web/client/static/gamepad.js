@@ -24,8 +24,7 @@ export function connectGamepad(inputs, commands, listens) {
     const pad = navigator.getGamepads().find((found) => found?.mapping === "standard");
     if (!pad) {
       running = false;
-      inputs.hold("gamepad", {});
-      return;
+      return inputs.hold("gamepad", {});
     }
     const pressed = pad.buttons.map((button) => button.pressed);
     if (listens()) {

@@ -77,16 +77,12 @@ export class Help {
     if (!action) {
       if (this.#bindings.action(event.code)?.name !== "help") return;
       event.stopPropagation(); // else the view, which listens again, opens the table anew
-      this.hide();
-      return;
+      return this.hide();
     }
     if (event.code === "Tab") return;
     event.preventDefault();
     this.#changing = null;
-    if (event.code === "Escape") {
-      this.#report("");
-      return;
-    }
+    if (event.code === "Escape") return this.#report("");
     this.#bindings.bind(action, event.code);
     this.#fill();
     this.#report(`${action.text}: ${keyName(event.code)}`);

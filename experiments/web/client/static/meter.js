@@ -62,8 +62,7 @@ export class Meter {
       latency_ms: this.#trips.length ? rounded(quantile(this.#trips, 0.5) ?? 0) : null,
       kilobits: rounded((8 * this.#bytes) / 1000 / seconds),
     };
-    this.#trips = [];
-    this.#gaps = [];
+    [this.#trips, this.#gaps] = [[], []];
     this.#shown = this.#came = this.#bytes = 0;
     this.#start = now;
     return found;

@@ -140,10 +140,7 @@ export class Picture {
   /** Lets the server draw from now on. @param {string} reason */
   fallBack(reason) {
     if (!this.drawn) return;
-    if (this.#wanted === "browser") {
-      this.#events.failed(reason);
-      return;
-    }
+    if (this.#wanted === "browser") return this.#events.failed(reason);
     this.drawn = this.#chosen = null;
     byId("field-of-view", HTMLElement).hidden = true;
     this.#show(false);

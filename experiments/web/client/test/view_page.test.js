@@ -79,7 +79,7 @@ test("events lead to when they happened", () => {
   part("moments").children[1].querySelector("button").click();
   later();
   expect([part("time").value, part("progress").textContent]).toEqual(["5.05", "1 / 2 put away"]);
-  expect([...part("moments").children].map((item) => item.getAttribute("aria-current"))).toEqual([null, "step"]);
+  expect([...part("moments").children].map((item) => item.getAttribute("aria-current"))).toEqual(["false", "step"]);
 });
 
 test("slider and keys lead to a time", () => {
@@ -112,6 +112,12 @@ test("from above one sees the person and both paths, and no ceiling", () => {
   expect(markers().length).toBeLessThan(shapes.length);
   camera("free");
   expect(world.setCamera.mock.lastCall?.[0].fovy).toBeCloseTo((50 * Math.PI) / 180);
+  const pose = () => world.setCamera.mock.lastCall?.[0].position;
+  const [before, at] = [pose(), part("time").value];
+  for (const key of ["ArrowLeft", "+"]) part("screen").dispatchEvent(new KeyboardEvent("keydown", { key, code: key }));
+  later();
+  expect(Math.hypot(...pose())).toBeLessThan(Math.hypot(...before));
+  expect([pose()[0] === before[0], part("time").value]).toEqual([false, at]); // turned, at the same time
   camera("person");
   expect(markers()).toEqual(RUN.markers);
 });

@@ -27,7 +27,7 @@ START = """async ([position, heading]) => {
   }, "1:07");
   const headset = new Headset(world, panel);
   const found = await hasHeadset();
-  Object.assign(window, { device, headset, frames: 0, over: false });
+  Object.assign(window, { device, headset, world, frames: 0, over: false });
   world.onFrame(() => { headset.place(position); world.draw(); frames++; });
   await headset.enter(heading, () => { over = true; });
   return found;
@@ -85,5 +85,5 @@ def test_a_headset_shows_the_house_and_the_hud_to_both_eyes(page):
     assert page.evaluate(AFTER) == {"forward": 1, "left": 0, "pressed": ["right hand"]}
     assert page.evaluate(AFTER) == {"forward": 1, "left": 0, "pressed": []}
     page.wait_for_function(f"headset.look().heading < {0.9 - math.pi / 6 + 0.01}", timeout=PATIENCE)
-    page.evaluate("headset.exit()")
+    page.evaluate("world.stage.renderer.xr.getSession().end()")
     page.wait_for_function("over", timeout=PATIENCE)

@@ -109,8 +109,4 @@ export class Headset {
     if (pushed && !this.#turned) this.#rig.rotation.y -= Math.sign(x) * SNAP;
     this.#turned = pushed;
   }
-
-  async exit() {
-    await this.#session?.end();
-  }
 }

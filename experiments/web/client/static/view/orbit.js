@@ -3,6 +3,8 @@
 const FOV = (50 * Math.PI) / 180;
 const NARROW = (20 * Math.PI) / 180; // from far away, so that walls hide little of the floor
 const TURN = 0.006; // rad a pixel
+/** @type {Record<string, [number, number, number]>} as of a drag and a wheel, px */
+const KEYS = { ArrowLeft: [-30, 0, 0], ArrowRight: [30, 0, 0], ArrowUp: [0, 30, 0], ArrowDown: [0, -30, 0], "+": [0, 0, -100], "-": [0, 0, 100] };
 const [LOWEST, HIGHEST] = [0.1, 1.5]; // rad above the horizon
 
 /** @typedef {{ position: [number, number, number], target: [number, number, number], fovy: number }} Camera */
@@ -31,7 +33,7 @@ export class Orbit {
       "wheel",
       (event) => {
         event.preventDefault();
-        this.#distance = Math.min(100, Math.max(0.5, this.#distance * Math.exp(event.deltaY / 800)));
+        this.#turn(0, 0, event.deltaY);
       },
       { passive: false },
     );
@@ -48,15 +50,22 @@ export class Orbit {
 
   /** @returns {Camera} */
   pose() {
-    const out = this.#distance * Math.cos(this.#elevation);
+    const distance = this.#distance * Math.max(1, this.#canvas.clientHeight / (this.#canvas.clientWidth || 1)); // narrow views
+    const out = distance * Math.cos(this.#elevation);
     const [x, y, z] = this.#target;
-    const [dx, dy] = [out * Math.cos(this.#azimuth), out * Math.sin(this.#azimuth)];
-    const height = this.#distance * Math.sin(this.#elevation);
-    return { position: [x + dx, y + dy, z + height], target: [x, y, z], fovy: FOV };
+    const height = distance * Math.sin(this.#elevation);
+    return { position: [x + out * Math.cos(this.#azimuth), y + out * Math.sin(this.#azimuth), z + height], target: [x, y, z], fovy: FOV };
   }
 
-  /** @param {number} dx px @param {number} dy */
-  #turn(dx, dy) {
+  /** Turns or comes nearer; whether the key is for that. @param {string} key */
+  key(key) {
+    this.#turn(...(KEYS[key] ?? [0, 0, 0]));
+    return key in KEYS;
+  }
+
+  /** @param {number} dx px @param {number} dy @param {number} [away] of a wheel */
+  #turn(dx, dy, away = 0) {
+    this.#distance = Math.min(100, Math.max(0.5, this.#distance * Math.exp(away / 800)));
     this.#azimuth -= TURN * dx;
     this.#elevation = Math.min(HIGHEST, Math.max(LOWEST, this.#elevation + TURN * dy));
   }

@@ -19,6 +19,7 @@ const slider = byId("time", HTMLInputElement);
 const speed = byId("speed", HTMLSelectElement);
 const paths = byId("paths", HTMLInputElement);
 const play = byId("run", HTMLButtonElement);
+const cameras = /** @type {HTMLElement[]} */ ([...document.querySelectorAll("[data-camera]")]);
 
 /** @type {Recorded} */
 const recorded = await unpacked("run-data");
@@ -83,11 +84,9 @@ function showStep(step, x, y, heading) {
     if (paths.checked) markers.push(...dots(run.walked(step), "walked"), ...(plan ? dots(plan.path, "planned") : []));
   }
   world.setMarkers(markers);
-  for (const item of byId("moments", HTMLElement).children) {
-    const at = Number(/** @type {HTMLElement} */ (item).dataset.t);
-    if (at <= time && time < at + 2) item.setAttribute("aria-current", "step");
-    else item.removeAttribute("aria-current");
-  }
+  const moments = [...byId("moments", HTMLElement).children];
+  const latest = moments.findLast((item) => Number(item.getAttribute("data-t")) <= time);
+  for (const item of moments) item.setAttribute("aria-current", item === latest ? "step" : "false");
 }
 
 /** @param {boolean} on */
@@ -108,9 +107,7 @@ function setCamera(name) {
   camera = name;
   shown = -1;
   world.showCeilings(name === "person");
-  for (const button of document.querySelectorAll("[data-camera]")) {
-    button.setAttribute("aria-pressed", `${/** @type {HTMLElement} */ (button).dataset.camera === name}`);
-  }
+  for (const button of cameras) button.setAttribute("aria-pressed", `${button.dataset.camera === name}`);
 }
 
 /** @param {Moment} moment */
@@ -139,17 +136,14 @@ slider.addEventListener("input", () => seek(Number(slider.value)));
 play.addEventListener("click", () => setPlaying(!playing));
 paths.addEventListener("change", () => seek(time));
 canvas.addEventListener("keydown", (event) => {
+  const turned = camera === "free" && orbit.key(event.key);
   if (event.code === "Space") setPlaying(!playing);
-  else if (event.code === "ArrowRight") seek(time + 1);
-  else if (event.code === "ArrowLeft") seek(time - 1);
-  else return;
+  else if (event.code === "ArrowRight" && !turned) seek(time + 1);
+  else if (event.code === "ArrowLeft" && !turned) seek(time - 1);
+  else if (!turned) return;
   event.preventDefault();
 });
-for (const button of document.querySelectorAll("[data-camera]")) {
-  button.addEventListener("click", () => {
-    setCamera(/** @type {typeof camera} */ (/** @type {HTMLElement} */ (button).dataset.camera));
-  });
-}
+for (const button of cameras) button.addEventListener("click", () => setCamera(/** @type {typeof camera} */ (button.dataset.camera)));
 byId("moments", HTMLElement).append(...recorded.moments.map(listed));
 byId("ticks", HTMLElement).append(...recorded.moments.map(tick));
 hud.learn({ type: "pictures", pictures: recorded.pictures });
@@ -160,7 +154,7 @@ await world.setObjects(
 );
 world.setFieldOfView(recorded.person.field_of_view);
 byId("debug", HTMLElement).textContent = "";
-setCamera("person");
+setCamera(/** @type {typeof camera} */ (byId("play", HTMLElement).dataset.cameraFirst || "person"));
 world.resize();
 headset.offer(byId("headset-button", HTMLElement), () => run.body(run.at(time).step, 0)[2] ?? 0);
 world.onFrame(show);

@@ -1,0 +1,1 @@
+"""Shows many homes: `mjsim house gallery`."""
