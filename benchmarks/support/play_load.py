@@ -94,14 +94,12 @@ def measure_capacity(
 async def _sessions_at_once(
     server: PlayProcess, browsers: Sequence[SimulatedBrowser], seconds: float, settling: float
 ) -> dict[str, float]:
-    opening = asyncio.Semaphore(AT_ONCE)
-    await asyncio.gather(*(_show_something(browser, opening) for browser in browsers))
-    await asyncio.gather(*(_turn(browser, settling) for browser in browsers))
+    await settle(browsers, settling)
     workers = [worker_of(server.journal(browser.address, TASK)) for browser in browsers]
     processes = [*workers, server.process.pid, os.getpid()]
     before = [processor_time(pid) for pid in processes]
     began, arrived = time.perf_counter(), [browser.arrived for browser in browsers]
-    turns = await asyncio.gather(*(_turn(browser, seconds) for browser in browsers))
+    turns = await asyncio.gather(*(turn(browser, seconds) for browser in browsers))
     trips = [trip for times in turns for trip in times]
     passed = time.perf_counter() - began
     busy = np.subtract([processor_time(pid) for pid in processes], before) / passed
@@ -131,6 +129,13 @@ def median_width(browsers: Sequence[SimulatedBrowser]) -> float:
     return float(np.median([browser.frames[-1].width if browser.frames else 0 for browser in browsers]))
 
 
+async def settle(browsers: Sequence[SimulatedBrowser], seconds: float = SETTLING_TOGETHER) -> None:
+    """Start the tasks of visits that have no other phase, and let the clocks of pages and server agree."""
+    opening = asyncio.Semaphore(AT_ONCE)
+    await asyncio.gather(*(_show_something(browser, opening) for browser in browsers))
+    await asyncio.gather(*(turn(browser, seconds) for browser in browsers))
+
+
 async def _show_something(browser: SimulatedBrowser, opening: asyncio.Semaphore) -> None:
     """Start the task of a visit that has no other phase."""
     async with opening:
@@ -139,7 +144,7 @@ async def _show_something(browser: SimulatedBrowser, opening: asyncio.Semaphore)
         await browser.until(lambda: bool(browser.frames))
 
 
-async def _turn(browser: SimulatedBrowser, seconds: float) -> list[float]:
+async def turn(browser: SimulatedBrowser, seconds: float) -> list[float]:
     """Turn to and fro; the times from an input to what shows it, ms; where the client draws, to its acknowledgement."""
     browser.forget()
     first, until = browser.next, time.perf_counter() + seconds

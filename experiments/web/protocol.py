@@ -17,6 +17,7 @@ VERSION = 1  # of the head of a frame
 MAX_TEXT = 64 * 1024  # bytes of a message from the browser
 MAX_INPUTS = 64  # of one message
 FRAME_HEAD = struct.Struct("<BBBBHHIIQf")
+LENGTH = struct.Struct("!I")  # in bytes, of a message between server and worker
 CODECS = {"jpeg": 1, "h264": 2}
 BEAT_PERIOD = 0.5  # s between two signs of life, both ways
 MAX_SILENCE = 1.0  # s without a message after which the link counts as lost
@@ -381,4 +382,10 @@ decode_from_browser: Any = msgspec.json.Decoder(FromBrowser).decode
 encode_to_browser = msgspec.json.Encoder().encode
 decode_to_worker: Any = msgspec.msgpack.Decoder(ToWorker).decode
 decode_from_worker: Any = msgspec.msgpack.Decoder(FromWorker).decode
-encode = msgspec.msgpack.Encoder().encode
+_encode = msgspec.msgpack.Encoder().encode
+
+
+def packed(message: WireMessage) -> bytes:
+    """A message between server and worker, after its length."""
+    content = _encode(message)
+    return LENGTH.pack(len(content)) + content

@@ -1,10 +1,10 @@
 """A worker process: one world, one session at a time. It ends with its server; the journal keeps the session."""
 
 import os
+import socket
 import threading
 from contextlib import closing, suppress
 from functools import partial
-from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import SimpleQueue
 
@@ -43,7 +43,7 @@ from experiments.web.worker.viewer import BrowserViewer
 class Worker:
     """Runs one session after the other."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
         self._sending = threading.Lock()
         self._opened: SimpleQueue[tuple[Open, SessionControl]] = SimpleQueue()
@@ -62,15 +62,17 @@ class Worker:
 
     def _send(self, message: WireMessage) -> None:
         with self._sending, suppress(OSError):  # the receiving thread notices that the server is gone
-            self._connection.send_bytes(protocol.encode(message))
+            self._connection.sendall(protocol.packed(message))
 
     def _receive(self) -> None:
         """Take messages until the server is gone; a worker has nothing to tidy up then."""
-        try:
-            while True:
-                self._take(protocol.decode_to_worker(self._connection.recv_bytes()))
-        except (EOFError, OSError):
-            os._exit(0)
+        with suppress(OSError), self._connection.makefile("rb") as stream:
+            while len(head := stream.read(protocol.LENGTH.size)) == protocol.LENGTH.size:
+                (length,) = protocol.LENGTH.unpack(head)
+                if len(content := stream.read(length)) < length:
+                    break
+                self._take(protocol.decode_to_worker(content))
+        os._exit(0)
 
     def _take(self, message: WireMessage) -> None:
         if not isinstance(message, Open | Pause):  # which the server may send by itself

@@ -578,15 +578,18 @@ def test_workers_that_die_now_and_then_are_replaced_for_ever(client, pool):
 def test_a_fork_server_that_was_just_killed_costs_no_session(monkeypatch):
     faults = iter([EOFError, ConnectionResetError])
 
-    def worker(_loop):
-        for fault in faults:
-            raise fault
-        return "worker"
+    class Worker:
+        def __init__(self):
+            for fault in faults:
+                raise fault
 
-    monkeypatch.setattr("experiments.web.server.pool.WorkerProcess", worker)
+        async def connect(self):
+            pass
+
+    monkeypatch.setattr("experiments.web.server.pool.WorkerProcess", Worker)
     for name in (*SETTINGS, HOUSE):
         monkeypatch.setenv(name, "")  # is put back afterwards
-    assert asyncio.run(WorkerPool("apartment").start()) == "worker"
+    assert isinstance(asyncio.run(WorkerPool("apartment").start()), Worker)
     faults = iter(lambda: EOFError, None)
     monkeypatch.setattr("experiments.web.server.pool.END_TIMEOUT", 0.3)
     with pytest.raises(OSError, match="the fork server ended"):

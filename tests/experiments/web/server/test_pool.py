@@ -10,8 +10,11 @@ def test_a_worker_that_nobody_waits_for_any_more_is_ended(monkeypatch):
     goes_on, ended = threading.Event(), threading.Event()
 
     class Slow:
-        def __init__(self, loop):  # noqa: ARG002 - as a worker process
+        def __init__(self):
             goes_on.wait(10.0)
+
+        async def connect(self):
+            pass
 
         def end(self):
             ended.set()

@@ -125,7 +125,7 @@ def test_the_display_has_no_markers_and_survives_the_way_to_the_page(shown):
     assert hud.state.markers == () and hud.state.checklist and hud.state.clock is None
     assert of_kind(shown, Markers)[0].markers
     for message in shown.sent:
-        assert protocol.decode_from_worker(protocol.encode(message)) == message
+        assert protocol.decode_from_worker(protocol.packed(message)[protocol.LENGTH.size :]) == message
         assert msgspec.json.decode(protocol.encode_to_browser(message))["type"]
 
 
