@@ -57,20 +57,25 @@ def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[n
         number = rooms.keys.index(key)
         area = 4 * float(rooms.half_sizes[number].prod())
         x, y = (rooms.centers[number] - bounds[::3]) * (scale, -scale)
-        _write_over(plan, (label, f"{area:.1f} m²"), round(float(x)), round(float(y)))
+        fits = _width(label) < 2 * scale * float(rooms.half_sizes[number, 0])
+        lines = (*((label,) if fits else label.split()), f"{area:.1f} m²")
+        _write_over(plan, lines, round(float(x)), round(float(y)))
     return plan
 
 
 def _write_over(plan: NDArray[np.uint8], lines: tuple[str, ...], x: int, y: int) -> None:
     """Lines of text with their middle at a pixel, on ground that is paler than the rest."""
-    face = cv2.FontFace("sans")
-    widths = [cv2.getTextSize((0, 0), text, (0, 0), face, TEXT, 500)[2] for text in lines]
-    half, top = max(widths) // 2 + 3, y - TEXT
+    widths = [_width(text) for text in lines]
+    half, top = max(widths) // 2 + 3, y - len(lines) * LINE // 2
     ground = plan[max(top, 0) : top + len(lines) * LINE + 4, max(x - half, 0) : x + half]
     ground[:] = ground // 4 + 191
     for line, (text, width) in enumerate(zip(lines, widths, strict=True)):
         at = x - width // 2, top + (line + 1) * LINE - 4
-        cv2.putText(plan, text, at, (20, 20, 20), face, TEXT, 500)
+        cv2.putText(plan, text, at, (20, 20, 20), cv2.FontFace("sans"), TEXT, 500)
+
+
+def _width(text: str) -> int:
+    return int(cv2.getTextSize((0, 0), text, (0, 0), cv2.FontFace("sans"), TEXT, 500)[2])
 
 
 def corner_view(house: House, room: str, *, opposite: bool = False) -> CameraPose:

@@ -115,7 +115,8 @@ def _draw(house: House, folder: Path) -> tuple[str, ...]:
     compiled, rooms = compiled_house(house.catalogue), house.rooms
     areas = dict.fromkeys(house.viewpoints, 0.0)
     for key, half in zip(rooms.keys, rooms.half_sizes, strict=True):
-        areas[key] += float(half.prod())
+        if key in areas:  # one can stand in it
+            areas[key] += float(half.prod())
     largest = sorted(areas, key=lambda key: -areas[key])[:2]
     cameras = [corner_view(house, key) for key in largest]
     if len(cameras) == 1:
