@@ -26,7 +26,7 @@ COMMANDS = {
     "compare": "compare the assistance conditions of a batch",
     "study": "simulate and analyse studies, score them against the published one, plan them",
     "plan": "solve a routing problem from a JSON file",
-    "house": "write a disorganized house as MJCF",
+    "house": "write a disorganized house as MJCF; generate, export and show houses",
     "flythrough": "film the rooms and bins of a house",
     "check": "check a house, an object or an episode",
     "import": "make objects from mesh files",

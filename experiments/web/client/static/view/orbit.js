@@ -50,7 +50,7 @@ export class Orbit {
 
   /** @returns {Camera} */
   pose() {
-    const distance = this.#distance * Math.max(1, this.#canvas.clientHeight / (this.#canvas.clientWidth || 1)); // narrow views
+    const distance = this.#distance * Math.max(1, (1.3 * this.#canvas.clientHeight) / (this.#canvas.clientWidth || 1)); // narrow views
     const out = distance * Math.cos(this.#elevation);
     const [x, y, z] = this.#target;
     const height = distance * Math.sin(this.#elevation);
