@@ -48,7 +48,8 @@ def write_sdf(folder: Path, *, extra: str = "", walls: bool = True) -> Path:
     )
     mesh.export(models / "meshes" / "table.obj")
     (models / "model.sdf").write_text(
-        '<sdf version="1.6"><model name="table"><link name="link"><visual name="v"><geometry><mesh>'
+        '<sdf version="1.6"><model name="table"><frame name="top"><pose>0 0 0.7 0 0 0</pose></frame>'
+        '<link name="link"><pose relative_to="top">0 0 -0.7 0 0 0</pose><visual name="v"><geometry><mesh>'
         "<uri>model://table/meshes/table.obj</uri><scale>0.001 0.001 0.001</scale>"
         "</mesh></geometry></visual></link></model></sdf>"
     )

@@ -49,9 +49,8 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
         notes.append(ImportDecision("up", "y", "given" if given else "the house is lowest along it"))
     elif known and given == ("z" if path.suffix.lower() in GLTF else "y"):
         frame = np.linalg.inv(Y_TO_Z) if up == "z" else Y_TO_Z
-    unit = options.units
-    if unit is None and not known:
-        longest = float(sides.max())
+    unit, longest = options.units, float(sides.max())
+    if unit is None and (not known or longest > _SIDE[1]):  # many glTF files are not in metres
         unit = next((u for u, m in UNITS.items() if _SIDE[0] <= longest * m <= _SIDE[1]), "m")
         notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
     frame = scale_matrix(UNITS[unit or "m"] * options.scale) @ frame

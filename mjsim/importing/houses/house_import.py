@@ -144,6 +144,10 @@ def _converted(
     doors = [piece for piece in pieces if _is_door(piece)]
     still = [piece for piece in pieces if not _is_door(piece)]
     solids = make_solids(still)
+    if not solids.solids and any(piece.seen and not piece.solid for piece in still):
+        still = [replace(piece, solid=piece.seen) for piece in still]
+        solids = make_solids(still)
+        decisions.append(ImportDecision("solid", "what is seen", "what the source lets collide is no house"))
     if not solids.solids:
         raise AssetError("has no walls and no furniture: nothing that one could bump into; is it a house?")
     floor = _floor(still)

@@ -17,6 +17,7 @@ from mjsim.importing.values import UNITS
 CELL = 0.05  # m
 BODY = 0.27  # m, radius of a person with a little air
 MAX_SIDE = 60.0  # m, of a house
+_MAX_AREA = 1500.0  # m^2 that can be walked on
 _BAND = (0.05, 1.8)  # m, heights at which a person bumps into things
 _WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # m; what is at all these heights is a wall
 _GAP = 0.6  # m, half of the widest opening of the outer wall that is closed
@@ -112,6 +113,12 @@ def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) ->
             break
     else:
         plan = whole
+    if not plan.walls.any():  # none is as high as eyes: those that one bumps into
+        plan = replace(plan, walls=levels[0] | shut)
+    if plan.area > _MAX_AREA:
+        raise AssetError(
+            f"has {plan.area:.0f} m2 that can be walked on, houses at most {_MAX_AREA:.0f} m2; give a part"
+        )
     if plan.area < 1.0:
         raise AssetError(
             "leaves nowhere to walk: its walls enclose no floor, or what stands there fills it; "

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import cv2
 import msgspec
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, label, maximum_filter
+from scipy.ndimage import binary_dilation, label
 
 from mjsim.errors import AssetError, brief
 from mjsim.files import read_text
@@ -203,7 +204,7 @@ def _grown(seeds: NDArray[np.integer], region: Mask) -> Labels:
     """Seeds spread over a region, around corners, not through what is off it."""
     labels = np.where(region, seeds, 0).astype(np.int32)
     while True:
-        fresh = np.where(region & (labels == 0), maximum_filter(labels, footprint=_CROSS), labels)
+        fresh = np.where(region & (labels == 0), _spread(labels, cv2.MORPH_CROSS), labels)
         if np.array_equal(fresh, labels):
             return labels
         labels = fresh
@@ -212,7 +213,7 @@ def _grown(seeds: NDArray[np.integer], region: Mask) -> Labels:
 def _within_walls(labels: Labels) -> Labels:
     """Rooms two cells farther, into their walls."""
     for _ in range(2):
-        labels = np.where(labels == 0, maximum_filter(labels, size=3), labels)
+        labels = np.where(labels == 0, _spread(labels, cv2.MORPH_RECT), labels)
     return labels
 
 
@@ -239,4 +240,7 @@ def words_of(name: str) -> list[str]:
     return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
 
 
-_CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], bool)
+def _spread(labels: Labels, shape: int) -> Labels:
+    """The largest label of each cell and its neighbours."""
+    kernel = cv2.getStructuringElement(shape, (3, 3))  # OpenCV has no dilation of integers
+    return np.asarray(cv2.dilate(labels.astype(np.float32), kernel), np.int32)

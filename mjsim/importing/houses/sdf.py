@@ -81,7 +81,9 @@ class _Reader:
         for element in parent.findall("include"):
             yield from self._included(element, frame, depth, static, name)
         for model in parent.findall("model"):
-            yield from self._model(model, frame @ _pose(model, self._path), folder, depth, static, name)
+            yield from self._model(
+                model, frame @ _pose(model, self._path, parent), folder, depth, static, name
+            )
 
     def _included(
         self, element: ET.Element, frame: Floats, depth: int, static: bool, name: str
@@ -113,7 +115,7 @@ class _Reader:
         name = name or model.get("name", "model")
         static = static or _is_true(model.findtext("static"))
         for link in model.findall("link"):
-            at = _Place(name, frame @ _pose(link, self._path), folder, not static)
+            at = _Place(name, frame @ _pose(link, self._path, model), folder, not static)
             visuals = [s for v in link.findall("visual") for s in self._shape(v, at)]
             solids = [s for c in link.findall("collision") for s in self._shape(c, at)]
             yield from (Piece(name, s, seen=True, solid=not solids, loose=at.loose) for s in visuals)
@@ -142,7 +144,13 @@ class _Reader:
         if file is None:
             return
         if file not in self._meshes:
-            self._meshes[file] = read_parts(file)
+            try:
+                self._meshes[file] = read_parts(file)
+            except AssetError:
+                if not self.missing.skip:
+                    raise
+                self._meshes[file] = []
+                self.missing.files.append(file.name)
         scale = _numbers(shape.findtext("scale") or "1 1 1", 3, self._path)
         yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
 
@@ -192,23 +200,34 @@ def _model_file(folder: Path) -> Path:
     raise AssetError(f"the model {folder} has no model.sdf; correct its model.config")
 
 
-def _pose(element: ET.Element, path: Path) -> Floats:
-    """Transform (4, 4) of an element's <pose>: x y z roll pitch yaw."""
+def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, depth: int = 0) -> Floats:
+    """Transform (4, 4) of an element's <pose>, x y z roll pitch yaw, to the frame of the model or link it is in.
+
+    Args:
+        element: A model, link, joint, ....
+        path: The file, for errors.
+        model: Where what `relative_to` names is looked for.
+        depth: How many such names led here.
+    """
     pose = element.find("pose")
+    attributes = {} if pose is None else pose.attrib
+    named = attributes.get("relative_to") or element.get("attached_to") or ""
+    if element.tag == "joint":
+        named = named or element.findtext("child") or ""
+    frame = np.eye(4)
+    if named not in ("", "world", "__model__"):
+        other = next((e for e in (() if model is None else model) if e.get("name") == named), None)
+        if other is None or depth > _DEPTH:
+            raise AssetError(f"{path} has a <pose> relative to {named!r}, which is not there; correct it")
+        frame = _pose(other, path, model, depth + 1)
     if pose is None or not (pose.text or "").strip():
-        return np.eye(4)
-    if pose.get("rotation_format", "euler_rpy") != "euler_rpy" or pose.get("relative_to", "") not in (
-        "",
-        "world",
-        "__model__",
-    ):
-        raise AssetError(
-            f"{path} has a <pose> with {dict(pose.attrib)}; write it as 'x y z roll pitch yaw' in its parent's frame"
-        )
+        return frame
+    if attributes.get("rotation_format", "euler_rpy") != "euler_rpy":
+        raise AssetError(f"{path} has a <pose> with {dict(attributes)}; write it as 'x y z roll pitch yaw'")
     values = _numbers(pose.text or "", 6, path)
     if _is_true(pose.get("degrees")):
         values[3:] = np.deg2rad(values[3:])
-    return np.asarray(compose_matrix(translate=values[:3], angles=values[3:]))
+    return np.asarray(frame @ compose_matrix(translate=values[:3], angles=values[3:]))
 
 
 def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
@@ -220,9 +239,8 @@ def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
     if shape.tag == "box":
         return trimesh.creation.box(number("size", 3))
     if shape.tag == "plane":
-        return trimesh.creation.box([*np.minimum(number("size", 2), _PLANE), _THIN]).apply_translation(
-            [0, 0, -_THIN / 2]
-        )
+        size = np.full(2, _PLANE) if shape.find("size") is None else np.minimum(number("size", 2), _PLANE)
+        return trimesh.creation.box([*size, _THIN]).apply_translation([0, 0, -_THIN / 2])
     if shape.tag == "sphere":
         return trimesh.creation.icosphere(2, float(number("radius")[0]))
     if shape.tag in ("cylinder", "capsule"):

@@ -22,6 +22,7 @@ _SMALL = 0.5  # m; smaller things collide as their hulls
 _HANGING = 1.6  # m; lamps and pictures that begin above are only seen
 _OVERHEAD = 0.8  # m; what begins above is a box: as a hull it would seem to fill the free floor below
 _FURNITURE = 1.5  # m, sides of furniture that is taken for filled where it is closed
+_ROOM = (2.0, 2.0, 1.8)  # m; a closed mesh that is larger is a room, not a block: people are inside
 _FEW = 30  # boxes of voxels of a piece of furniture
 _MAX_PARTS = 60  # connected parts of a piece that are looked at one by one
 _THIN = 0.01  # m, least thickness of what collides
@@ -105,6 +106,8 @@ def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
     """A box or a hull where that is what it is, or it is small; else None."""
     low, high = mesh.bounds
     extents = high - low
+    if (extents > _ROOM).all():
+        return None
     if extents.min() < _THIN:  # a sheet
         flat = np.sort(extents)
         filled = mesh.area / 2 / max(flat[1] * flat[2], 1e-9) if not mesh.is_watertight else 1.0

@@ -147,6 +147,13 @@ def test_an_obj_scene_tells_its_unit_and_axes(tmp_path):
     assert decisions["unit"].startswith("cm")
 
 
+def test_a_closed_box_in_centimetres_is_a_room(tmp_path):
+    trimesh.creation.box((400, 250, 500)).export(tmp_path / "room.glb")
+    decisions, _ = imported(tmp_path, tmp_path / "room.glb")
+    assert decisions["unit"].startswith("cm")
+    assert decisions["outline"].startswith("closed by its walls")
+
+
 def test_a_habitat_scene_is_a_stage_with_objects_in_their_places(tmp_path):
     decisions, catalogue = imported(tmp_path, write_habitat(tmp_path / "data"))
     assert "ball" in decisions["loose things"]
@@ -251,12 +258,15 @@ def test_a_damaged_world_is_refused_by_its_cause_and_nothing_is_written(tmp_path
     assert not (tmp_path / "out").exists()
 
 
-def test_what_is_missing_is_left_out_if_the_user_says_so(tmp_path):
-    source = write_sdf(tmp_path, extra=INCLUDE)
-    with pytest.raises(AssetError, match="--skip-missing"):
+@pytest.mark.parametrize("broken", [False, True])
+def test_what_is_missing_is_left_out_if_the_user_says_so(tmp_path, broken):
+    source = write_sdf(tmp_path, extra="" if broken else INCLUDE)
+    if broken:
+        (tmp_path / "models" / "table" / "meshes" / "table.obj").write_text("v 0 0 0")
+    with pytest.raises(AssetError, match="no triangles" if broken else "--skip-missing"):
         import_house(source, tmp_path / "house", HouseOptions())
     decisions, _ = imported(tmp_path, source, skip_missing=True)
-    assert "model://chair" in decisions["left out"]
+    assert ("table.obj" if broken else "model://chair") in decisions["left out"]
 
 
 def test_a_folder_that_is_there_is_kept(tmp_path):
@@ -303,7 +313,7 @@ def test_a_damaged_scene_is_refused_by_its_cause(tmp_path, write, damage, reason
     [
         (trimesh.creation.box((0.5, 0.5, 0.9)), {}, "nowhere to walk"),
         (trimesh.creation.box((9, 0.02, 9)), {}, "no walls and no furniture"),
-        (trimesh.creation.box((900, 700, 3)), {}, "spans 900 x 3 m.*--units cm"),
+        (trimesh.creation.box((900, 700, 3)), {"units": "m"}, "spans 900 x 3 m.*--units cm"),
         (trimesh.creation.box((8, 0.01, 5)), {"up": "z"}, "nowhere|level"),
     ],
 )
