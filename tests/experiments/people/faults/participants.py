@@ -2,18 +2,21 @@
 
 import asyncio
 import json
+import time
 from contextlib import suppress
 
 import numpy as np
 from websockets.exceptions import WebSocketException
 
 from benchmarks.support.play_browser import SimulatedBrowser
+from benchmarks.support.play_server import PATIENCE
 from experiments.record.journal import Entry, read_entries
 from experiments.record.phases import TASK
 from experiments.web.server.visits import token_hash
 from tests.experiments.people.faults.site import NAMES, QUESTIONS, RIGHT
 
-TRIES, PAUSE = 200, 0.1  # of a form that is not taken; s between two of them
+PAUSE = 0.1  # s between two tries of a form that is not taken
+PLAYING_S = 120.0  # for a connection and some inputs, which a loaded machine can delay
 MAX_ROWS = 100
 CUT = 0.1  # share of answers whose connection is cut
 LOST = (OSError, EOFError, WebSocketException)  # what a connection ends with
@@ -68,7 +71,8 @@ class Person:
     async def _until_taken(self, path, form, *, once=False):
         """Send a form until it is taken; `once` is for one that has no page any more then."""
         hosts = NAMES if self._twice else (None,)
-        for _ in range(TRIES):
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
             asked = (self.site.ask(path, form, self.number, self.rng, host) for host in hosts)
             answers = await asyncio.gather(*asked, return_exceptions=True)
             for error in answers:
@@ -152,7 +156,7 @@ class Playing(Person):
         try:
             while True:
                 try:
-                    async with asyncio.timeout(30.0):
+                    async with asyncio.timeout(PLAYING_S):
                         await self._play()
                 except LOST:
                     await self._cut()

@@ -16,14 +16,13 @@ import numpy as np
 import pytest
 from database_servers import MissingProgramError
 
-from benchmarks.support.play_server import worker_of
+from benchmarks.support.play_server import PATIENCE, worker_of
 from tests.experiments.people.faults.participants import RIGHT_ANSWERS, Answering, Person, Playing
 from tests.experiments.people.faults.site import NAMES, running_site
 from tests.experiments.people.platforms.emulator import SECRET
 from tests.experiments.people.platforms.prolific import Prolific
 
 FAULTS_OF_A_GROUP = 10  # of people
-PATIENCE = 90.0  # s until everybody goes on
 AHEAD = 3 * 3600.0  # s that a clock is wrong at most
 AFTERWARDS = 3  # answers or inputs that are acknowledged once somebody goes on
 LONG_AGO = 15.0  # s after which no payment is on its way any more
