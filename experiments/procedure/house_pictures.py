@@ -1,6 +1,7 @@
 """Pictures of a tidy house: a plan with the names of its rooms, and each room from a corner of it."""
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
@@ -19,6 +20,7 @@ SCALE, MARGIN = 70.0, 0.4  # px/m of the plan; m around it
 TEXT, LINE = 13, 16  # px of letters and lines on the plan
 LOOKED_AT = 0.9  # m above the middle of a room
 PLACES = 3000
+SMALL, FAR = (96, 64), 4.0  # px and m in which views are compared
 
 
 def draw_house(house: House, folder: Path) -> list[Path]:
@@ -29,9 +31,10 @@ def draw_house(house: House, folder: Path) -> list[Path]:
     """
     pictures = {"floorplan": floor_plan(house)}
     model, data = compiled_house(house.catalogue).model, compiled_house(house.catalogue).data
+    views_of = room_views(house, house.viewpoints)
     with Renderer(model, width=SIZE[0], height=SIZE[1], profile="quality") as renderer:
-        for key in house.viewpoints:
-            pictures[f"room_{key}"] = renderer.rgb(data, corner_view(house, key))
+        for key, views in views_of.items():
+            pictures[f"room_{key}"] = renderer.rgb(data, views[0])
     paths = []
     for name, picture in pictures.items():
         path = folder / f"{name}.png"
@@ -78,17 +81,41 @@ def _width(text: str) -> int:
     return int(cv2.getTextSize((0, 0), text, (0, 0), cv2.FontFace("sans"), TEXT, 500)[2])
 
 
-def corner_view(house: House, room: str, *, opposite: bool = False) -> CameraPose:
-    """A view over a room from where one can stand, as far from its middle as that is; or from far across that place."""
+def room_views(house: House, rooms: Iterable[str]) -> dict[str, list[CameraPose]]:
+    """Views over rooms from where one can stand, as far from their middle as that is, one for each corner: those first
+    in which the least is hidden by what is near.
+
+    Raises:
+        RenderError: Nothing can be drawn on this machine.
+    """
+    compiled = compiled_house(house.catalogue)
     floor = house.sampling_floor.sample(np.random.default_rng(0), PLACES)
-    distances = house.rooms.distances(floor)
-    number = house.rooms.keys.index(room)
-    center = house.rooms.centers[number]
-    places = floor[distances.argmin(axis=1) == number]
-    place = places[np.hypot(*(places - center).T).argmax()] if len(places) else house.viewpoints[room][0]
-    if opposite and len(places):
-        place = places[np.hypot(*(places - place).T).argmax()]
-    # A room that is seen from its middle is seen towards its longer side.
-    target = center if np.hypot(*(place - center)) > 0.3 else place + np.array([1.0, 0.0])
-    eye = np.array([*place, PersonParameters().eye_height])
-    return CameraPose.looking_at(eye, np.array([*target, LOOKED_AT]), FIELD)
+    nearest = house.rooms.distances(floor).argmin(axis=1)
+    with Renderer(compiled.model, width=SMALL[0], height=SMALL[1], profile="draft") as renderer:
+
+        def depth(view: CameraPose) -> float:
+            return float(np.minimum(renderer.depth(compiled.data, view), FAR).mean())
+
+        found = {}
+        for room in rooms:
+            number = house.rooms.keys.index(room)
+            views = _corner_views(house, room, floor[nearest == number], house.rooms.centers[number])
+            found[room] = sorted(views, key=depth, reverse=True)
+    return found
+
+
+def _corner_views(
+    house: House, room: str, places: NDArray[np.float64], center: NDArray[np.float64]
+) -> list[CameraPose]:
+    """Views to the middle of a room (2,), m, from the farthest of some places (n, 2) in each quarter around it."""
+    offsets = places - center
+    quarters = (offsets > 0) @ (1, 2)
+    mine = [np.flatnonzero(quarters == quarter) for quarter in range(4)]
+    corners = [places[rows[np.hypot(*offsets[rows].T).argmax()]] for rows in mine if len(rows)]
+    views = []
+    for place in corners or [house.viewpoints[room][0]]:
+        # A room that is seen from its middle is seen towards its longer side.
+        target = center if np.hypot(*(place - center)) > 0.3 else place + np.array([1.0, 0.0])
+        eye = np.array([*place, PersonParameters().eye_height])
+        views.append(CameraPose.looking_at(eye, np.array([*target, LOOKED_AT]), FIELD))
+    return views

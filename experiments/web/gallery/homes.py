@@ -11,7 +11,7 @@ import numpy as np
 
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.procedure.house_pictures import corner_view, floor_plan
+from experiments.procedure.house_pictures import floor_plan, room_views
 from experiments.web.view.page import run_page
 from experiments.web.view.tour import tour_page
 from mjsim.files import exchange, work_folder
@@ -118,9 +118,8 @@ def _draw(house: House, folder: Path) -> tuple[str, ...]:
         if key in areas:  # one can stand in it
             areas[key] += float(half.prod())
     largest = sorted(areas, key=lambda key: -areas[key])[:2]
-    cameras = [corner_view(house, key) for key in largest]
-    if len(cameras) == 1:
-        cameras.append(corner_view(house, largest[0], opposite=True))
+    views = list(room_views(house, largest).values())
+    cameras = views[0][:2] if len(views) == 1 else [views[0][0], views[1][0]]
     pictures = {"plan.webp": floor_plan(house, PLAN)}
     with Renderer(compiled.model, width=2 * VIEW[0], height=2 * VIEW[1], profile="quality") as renderer:
         for number, camera in enumerate(cameras, 1):
