@@ -30,6 +30,7 @@ from mjsim.importing.houses.solids import HIGH, LOW, Solids, make_solids
 from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, left_out, moved
 from mjsim.importing.houses.writer import ImportedHouse, set_points, write_house
 from mjsim.importing.model_writer import write_png
+from mjsim.importing.reading import MAX_TRIANGLES
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
 from mjsim.model.catalogue import Catalogue
@@ -45,6 +46,7 @@ _UPWARD = 0.2  # share of level surfaces that face up, from where on only these 
 _FLAT = 0.95  # cosine of the slope of a floor
 _FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself
 _FAR = 200.0  # m; what spans more is in no unit of a house
+_FEW = 4  # things that stand about, fewer than which are no house where there are no walls
 _DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # m: thickness at most, width and height of a door leaf
 
 
@@ -129,6 +131,8 @@ _READERS: tuple[tuple[tuple[str, ...], Callable[[Path, HouseOptions], SourceScen
 def _converted(
     scene: SourceScene, source: Path, options: HouseOptions, label: str | None
 ) -> tuple[ImportedHouse, list[ImportDecision]]:
+    if (count := sum(len(piece.surface) for piece in scene.pieces)) > MAX_TRIANGLES:
+        raise AssetError(f"has {count:,} triangles; reduce it to {MAX_TRIANGLES:,} or fewer")
     level, ceiling = _levels(scene.pieces) if options.floor is None else (options.floor, np.inf)
     pieces = moved(list(scene.pieces), translation_matrix([0, 0, -level]))
     decisions = [
@@ -157,6 +161,8 @@ def _converted(
     kept = [leaf for leaf in leaves.solids if leaf.name not in opened]
     solids = Solids((*solids.solids, *kept), solids.boxes, solids.hulls, solids.voxels, solids.pitch)
     plan = make_plan(solids.solids, [leaf for leaf in leaves.solids if leaf.name in opened], floor)
+    if not plan.enclosed and len(solids.solids) < _FEW:
+        raise AssetError(f"has neither walls nor furniture, only {len(solids.solids)} things to bump into")
     drawn = [piece for piece in pieces if piece.name not in opened]
     given = read_rooms(options.rooms) if options.rooms is not None else scene.rooms
     rooms = find_rooms(plan, given, drawn)

@@ -13,12 +13,11 @@ from trimesh.transformations import rotation_matrix, scale_matrix
 from mjsim.errors import AssetError
 from mjsim.files import check_input, read_bytes
 from mjsim.importing.houses.values import TEXTURE_SIDE
-from mjsim.importing.reading import Beside, check_mesh_file, parsing, surface_of
+from mjsim.importing.reading import MAX_TRIANGLES, Beside, check_mesh_file, parsing, surface_of
 from mjsim.importing.surface import Floats, Surface
 
 SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")
-MAX_TRIANGLES = 5_000_000
 Y_TO_Z = rotation_matrix(np.pi / 2, [1, 0, 0])
 
 

@@ -103,13 +103,15 @@ def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) ->
     blocked, shut = (_at_heights(shape, origin, chosen, _BAND) for chosen in (solids, doors))
     levels = [_at_heights(shape, origin, solids, band) for band in _WALL]
     drawn = _raster(shape, origin, floor)
+    standing = _box(shape, origin, solids)  # a ground plane reaches far beyond the house
     for count in (len(_WALL), len(_WALL) - 1):  # walls as high as eyes, else lower ones
         walls = np.logical_and.reduce(levels[:count]) | shut
         # Windows have sills: what is low closes the outside off, too.
         indoors = _enclosed(walls | levels[0])
         plan = Plan(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
         whole = replace(plan, indoors=_rectangle(drawn), enclosed=False)
-        if plan.area >= max(_MIN_AREA, _LEAST_SHARE * whole.area):
+        near = replace(whole, indoors=whole.indoors & standing)
+        if plan.area >= max(_MIN_AREA, _LEAST_SHARE * near.area):
             break
     else:
         plan = whole
@@ -163,6 +165,13 @@ def _rectangle(floor: Mask) -> Mask:
     else:
         inside[edge:-edge, edge:-edge] = True
     return inside
+
+
+def _box(shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid]) -> Mask:
+    """The rectangle around all that stands."""
+    points = np.concatenate([solid.outline for solid in solids] or [np.zeros((1, 2))])
+    (xmin, ymin), (xmax, ymax) = points.min(axis=0), points.max(axis=0)
+    return _raster(shape, origin, [np.array([[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]])])
 
 
 def _at_heights(

@@ -26,7 +26,6 @@ _ROOM = (2.0, 2.0, 1.8)  # m; a closed mesh that is larger is a room, not a bloc
 _FEW = 30  # boxes of voxels of a piece of furniture
 _MAX_PARTS = 60  # connected parts of a piece that are looked at one by one
 _THIN = 0.01  # m, least thickness of what collides
-_SINK = 0.005  # m; bottoms so near to the floor stand on it
 
 
 @dataclass(frozen=True, eq=False)
