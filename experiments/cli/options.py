@@ -34,7 +34,7 @@ PAGE_SETTINGS = ("draw", "field_of_view_range")  # of the page of `mjsim play`
 TRIAL_OPTIONS = tuple(
     name
     for name in SETTINGS
-    if name not in ("objects", "assistance", "user", "live", "behaviour", *PAGE_SETTINGS)
+    if name not in ("objects", "assistance", "user", "live", "behaviour", "trial_number", *PAGE_SETTINGS)
 )
 _TYPES = typing.get_type_hints(TrialConfig)
 

@@ -202,6 +202,10 @@ def read_people_study(path: Path) -> Study:
     own = design.trials[0].story
     usual = None if own or STORY not in settings.phases else story_file(settings.language)
     trials = [_of_a_person(trial, settings.phases, usual) for trial in design.trials]
+    if any(trial.trial_number > 1 for trial in trials):
+        raise ConfigError(
+            f"{path}: trials_per_person is for simulated people; a visit of a person has one task"
+        )
     cells = [Cell(tuple(group)) for _, group in itertools.groupby(trials, _without_seeds)]
     for name in ("house", "story", "training_assistance"):
         if len(values := {getattr(cell.trials[0], name) for cell in cells}) > 1:

@@ -45,6 +45,8 @@ class StartEvent(LoggedEvent, frozen=True, forbid_unknown_fields=False):
         assistance: Assistance condition.
         house: House name, or path of its catalogue.
         time_limit: Simulated time after which the trial ends, s.
+        rooms: How many rooms the house has; None in older records.
+        area_m2: Area of their floor, m2; None in older records.
     """
 
     format: int
@@ -59,6 +61,8 @@ class StartEvent(LoggedEvent, frozen=True, forbid_unknown_fields=False):
     assistance: str
     house: str
     time_limit: Seconds
+    rooms: Count | None = None
+    area_m2: float | None = None
 
 
 class ParticipantEvent(LoggedEvent, frozen=True):

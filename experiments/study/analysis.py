@@ -6,12 +6,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.analysis.comparison import Interval, mean_interval
 from experiments.analysis.statistics.anova import EFFECTS, Values, brown_forsythe, one_way, two_way, welch
+from experiments.analysis.statistics.by_house import HouseDifference, differences_by_house
 from experiments.analysis.statistics.diagnostics import diagnose
 from experiments.analysis.statistics.effects import FTest
-from experiments.analysis.statistics.mixed import MixedModel, WaldTest, mixed_model
+from experiments.analysis.statistics.mixed import MIN_LEVELS, MixedModel, WaldTest, mixed_model
 from experiments.analysis.statistics.mixtures import fit_mixtures
 from experiments.analysis.statistics.models import Chi2Test, OrdinalModel, ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
@@ -22,6 +24,7 @@ from experiments.study.measures import LIKERT_PREFIX, Measures
 from experiments.study.table import StudyTable
 
 ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
+MIXED, ROOMS, BY_HOUSE = "mixed model", "rooms", "by house"
 STRICT = "nd_strict_2n"  # holds how many visits deviated, as its denominator is known
 
 
@@ -105,6 +108,7 @@ def analyse(table: StudyTable, measures: Measures) -> Analysis:
                 work = partial(compare_pairs, table.groups(name, objects), measures.equivalence.pair)
                 results.append(_attempt(name, "pairs", objects, work))
         if name in measures.objective:
+            results.append(_attempt(name, BY_HOUSE, None, partial(_by_house, table, name)))
             results.append(_attempt(name, "diagnostics", None, partial(diagnose, cells_of(table, name))))
     results += [more for r in results for more in _sensitivity(r, measures)]
     results += _acceptance(table)
@@ -121,7 +125,10 @@ def test_results(table: StudyTable, measures: Measures) -> list[Result]:
         if len(table.levels()) > 1 and not answers:
             results += two_way_tests(table, name)
         if name in measures.objective:
-            results.append(_attempt(name, "mixed model", None, partial(_mixed, table, name)))
+            results.append(_attempt(name, MIXED, None, partial(_mixed, table, name)))
+            if len(set(table.numbers(ROOMS).tolist())) > 1:
+                work = partial(_mixed, table, name, ROOMS)
+                results.append(_attempt(name, f"{MIXED}, {ROOMS}", None, work))
     return results
 
 
@@ -184,12 +191,41 @@ def cells_of(table: StudyTable, name: str) -> dict[str, Values]:
     return {f"{c}, {n}": v for n in table.levels() for c, v in table.groups(name, n).items()}
 
 
-def _mixed(table: StudyTable, name: str) -> Any:
-    known = ~np.isnan(table.columns[name])
-    if len(set(table.assistance[known].tolist())) < 2:
+def _mixed(table: StudyTable, name: str, covariate: str | None = None) -> Any:
+    values, known = table.columns[name], ~np.isnan(table.columns[name])
+    if covariate is not None:
+        known &= ~np.isnan(table.numbers(covariate))
+    here = table.take(np.flatnonzero(known))
+    if len(set(here.assistance.tolist())) < 2:
         raise StatisticsError("there is only one assistance condition")
-    return mixed_model(
-        table.columns[name][known], table.assistance[known], table.objects[known], table.houses[known]
+    with_covariate = None if covariate is None else (covariate, here.numbers(covariate))
+    return mixed_model(values[known], here.assistance, here.objects, _random_factors(here), with_covariate)
+
+
+def _random_factors(table: StudyTable) -> dict[str, NDArray[Any]]:
+    """The house, and what repeats besides: people with several trials, their order, conditions within a house."""
+    rows, houses = len(table.rows), len(set(table.houses.tolist()))
+    found: dict[str, NDArray[Any]] = {}
+    if MIN_LEVELS <= len(set(table.people.tolist())) < rows:
+        found["person"] = table.people
+        trials = table.numbers("trial_number")
+        if (
+            len(set(trials.tolist())) > 2 and not np.isnan(trials).any()
+        ):  # two levels say nothing of a variance
+            found["trial_number"] = trials
+    if houses >= MIN_LEVELS or not found:
+        found["house"] = table.houses
+        both = np.char.add(np.char.add(table.houses, "/"), table.assistance)
+        if houses < len(set(both.tolist())) < rows:
+            found["house x assistance"] = both
+    return found
+
+
+def _by_house(table: StudyTable, name: str) -> list[HouseDifference]:
+    known = ~np.isnan(table.columns[name])
+    here = table.take(np.flatnonzero(known))
+    return differences_by_house(
+        table.columns[name][known], here.assistance, here.objects, here.houses, here.conditions()
     )
 
 

@@ -55,6 +55,8 @@ def people_table(table: StudyTable) -> pa.Table:
         **{name: [row.get(name) for row in table.rows] for name in ("user", "participant", "house", *SEEDS)},
         "assistance": table.assistance,
         "objects": table.objects,
+        **{name: table.numbers(name) for name in ("trial_number", "rooms", "area_m2")},
+        "objects_per_m2": table.densities(),
         **table.columns,
     }
     found = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})

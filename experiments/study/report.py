@@ -3,13 +3,25 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import numpy as np
+
 from experiments.analysis.page import Block, Paragraph, Table, freedom, p_value, page, shown, table
 from experiments.analysis.statistics.effects import FTest
 from experiments.analysis.statistics.mixed import MixedModel
 from experiments.analysis.statistics.models import OrdinalModel
 from experiments.errors import ExperimentError
 from experiments.record.origin import RECORDED, REHEARSED
-from experiments.study.analysis import ONE_WAY, STRICT, TWO_WAY, Analysis, Result, tests_of
+from experiments.study.analysis import (
+    BY_HOUSE,
+    MIXED,
+    ONE_WAY,
+    ROOMS,
+    STRICT,
+    TWO_WAY,
+    Analysis,
+    Result,
+    tests_of,
+)
 from experiments.study.assumptions import assumptions, specification_curve
 from experiments.study.figures import answers, by_condition, interactions, variances
 from experiments.study.measures import LIKERT_PREFIX
@@ -52,7 +64,8 @@ def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
         ("Readings and analyses of each measure", _curves(analysis)),
         ("Pairs of conditions", _pairs(analysis)),
         ("Kinds of people by acceptance", _mixtures(analysis)),
-        ("Houses as a random factor", _mixed(analysis)),
+        ("Houses", _houses(analysis)),
+        ("People and houses as random factors", _mixed(analysis)),
         ("Sensitivity of such a study", _power(analysis)),
         ("Optimal and walked paths", _paths(analysis, folder)),
         ("What could not be computed", _missing(analysis)),
@@ -213,41 +226,57 @@ def _mixtures(analysis: Analysis) -> tuple[Block, ...]:
     return (about, Table(head, rows)) if rows else ()
 
 
-def _mixed(analysis: Analysis) -> tuple[Block, ...]:
-    models = {r.measure: r.value for r in analysis.results if isinstance(r.value, MixedModel)}
-    rows = [
-        (
-            _labels(analysis)[measure],
-            effect,
-            t.statistic,
-            freedom(t),
-            p_value(t.p),
-            m.house_variance,
-            m.residual_variance,
-            m.houses,
-        )
-        for measure, m in models.items()
+def _mixed(analysis: Analysis) -> Iterator[Block]:
+    labels = _labels(analysis)
+    models = [(r, r.value) for r in analysis.results if isinstance(r.value, MixedModel)]
+    tests = [
+        (labels[r.measure], r.kind, effect, t.statistic, freedom(t), p_value(t.p))
+        for r, m in models
         for effect, t in m.tests.items()
+    ]
+    yield table(("measure", "model", "effect", "Wald F", "df", "p"), tests)
+    shares = [
+        (labels[r.measure], name, factor.levels, factor.variance, factor.share, factor.interval)
+        for r, m in models
+        if r.kind == MIXED
+        for name, factor in m.random.items()
     ]
     head = (
         "measure",
-        "effect",
-        "Wald F",
-        "df",
-        "p",
-        "variance of houses (unit²)",
-        "of people in a house (unit²)",
-        "houses",
+        "random factor",
+        "levels",
+        "variance (unit²)",
+        "share of the variance",
+        "95 % interval",
     )
-    said = [
-        Paragraph(
-            f"{_labels(analysis)[measure]}: {m.share:.0%} of the variance within conditions is between houses "
-            f"(95 % interval {m.interval[0]:.0%} to {m.interval[1]:.0%}, {m.houses} houses); "
-            "the rest is between people in a house."
+    yield table(head, shares)
+    if shares:
+        yield Paragraph(
+            "Shares are of the variance within conditions; the rest is between trials. House x assistance is how much "
+            "the differences between conditions themselves differ from house to house."
         )
-        for measure, m in models.items()
+
+
+def _houses(analysis: Analysis) -> Iterator[Block]:
+    """Homes by their rooms, and differences between conditions for other homes."""
+    found, labels = analysis.table, _labels(analysis)
+    rooms, area, density = found.numbers(ROOMS), found.numbers("area_m2"), found.densities()
+    rows = []
+    for count in sorted(set(rooms[~np.isnan(rooms)].tolist())):
+        homes = found.take(np.flatnonzero(rooms == count))
+        means = (homes.groups(name).get(c) for name in labels for c in found.conditions())
+        about = len(set(homes.houses.tolist())), len(homes.rows)
+        sizes = float(np.mean(area[rooms == count])), float(np.mean(density[rooms == count]))
+        rows.append((int(count), *about, *sizes, *("" if v is None else float(v.mean()) for v in means)))
+    means_head = (f"{label}: {c}" for label in labels.values() for c in found.conditions())
+    yield table(("rooms", "houses", "trials", "m²", "objects per m²", *means_head), rows)
+    pairs = [
+        (labels[r.measure], f"{d.second} - {d.first}", d.difference, d.interval)
+        for r in analysis.results
+        if r.kind == BY_HOUSE and r.value
+        for d in r.value
     ]
-    return (*said, Table(head, rows))
+    yield table(("measure", "pair", "difference", "95 % interval, houses drawn again"), pairs)
 
 
 def _power(analysis: Analysis) -> tuple[Block, ...]:

@@ -46,6 +46,7 @@ class StudyTable:
     assistance: NDArray[Any]  # assistance condition of each, (n,)
     objects: NDArray[np.int64]  # number of objects of each, (n,)
     houses: NDArray[Any]  # name of the disorganized house of each, (n,)
+    people: NDArray[Any]  # who it is, (n,): the same name in several rows for a person with several trials
     # measures and answers by short name, (n,) each; NaN where unknown
     columns: Mapping[str, NDArray[np.float64]]
     sources: Mapping[str, str]  # column of the file by short name
@@ -71,6 +72,7 @@ class StudyTable:
             assistance=self.assistance[people],
             objects=self.objects[people],
             houses=self.houses[people],
+            people=self.people[people],
             columns={name: values[people] for name, values in self.columns.items()},
         )
 
@@ -89,6 +91,15 @@ class StudyTable:
             for row, usual in told
         ]
         return np.array([usual if made is None else made for made, usual in whole])
+
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """A further column of numbers, (n,); NaN where it is not known."""
+        told = (row.get(name) for row in self.rows)
+        return np.array([np.nan if value is None else value for value in told], float)
+
+    def densities(self) -> NDArray[np.float64]:
+        """Objects per square metre of the floor, (n,); NaN where the area is not known."""
+        return np.asarray(self.objects / self.numbers("area_m2"))
 
     def absent(self) -> list[str]:
         """A line that names those who are left out, if any."""
@@ -181,6 +192,7 @@ def study_table(
         np.array([str(row["assistance"]) for row in rows]),
         np.array([row["objects"] for row in rows]),
         np.array([f"{row.get('house')}/{row.get('house_seed')}" for row in rows]),
+        np.array([_person(row, k) for k, row in kept.items()]),
         columns,
         sources,
         origin,
@@ -287,9 +299,21 @@ def _notes(rows: Sequence[Mapping[str, Any]], measures: Measures) -> list[str]:
             "The same people are in several cells. These tests treat them as different people, which costs power; "
             "`mjsim compare` pairs them."
         )
+    trials = Counter((_person(row, k), row["assistance"], row["objects"]) for k, row in enumerate(rows))
+    if len(trials) < len(rows):
+        notes.append(
+            "People have several trials in a cell. Only the mixed models and the intervals by house know that; all "
+            "other tests and intervals take each trial for another person, and are too sure."
+        )
     if confounded := confounded_rows(rows):
         notes.append(confounded[0].upper() + confounded[1:] + ".")
     return notes
+
+
+def _person(row: Mapping[str, Any], number: int) -> str:
+    """Who a row is about; a row that does not say it is somebody else."""
+    told = row.get("participant"), row.get("person_seed")
+    return f"{row['user']}/{next((name for name in told if name is not None), f'row {number}')}"
 
 
 def _person_and_cell(row: Mapping[str, Any]) -> tuple[Any, Any]:

@@ -1,6 +1,7 @@
 """Which trials a batch consists of: a full factorial of options, or the cells of a TOML file (docs/designs.md)."""
 
 import itertools
+import math
 import re
 import tomllib
 from collections import Counter
@@ -85,32 +86,50 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
     house_seeds: _Seeds = None
     person_seeds: _Seeds = None
     order_seeds: _Seeds = None
+    trials_per_person: Annotated[int, msgspec.Meta(ge=1)] = 1
     houses: str | list[str] | None = (
         None  # names, or seeds of generated ones such as "generated:0:200?rooms=5"
     )
 
     def each(self) -> list[dict[str, Any]]:
-        """The three seeds of every person, and the house; lists are gone through again for more people."""
+        """The three seeds of every trial, and the house; lists are gone through again for more people.
+
+        Further trials of a person are in houses, or with house seeds, that lie evenly further on in these lists: a home
+        that comes first for one person comes second for another.
+        """
         lists: dict[str, list[Any]] = {
             name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None
         }
         if self.houses is not None:
             lists["houses"] = house_names(self.houses)
-        longest = max((len(seeds) for seeds in lists.values()), default=0)
+        trials = self.trials_per_person
+        shared = {name: trials if name in ("houses", "house_seeds") else 1 for name in lists}
+        longest = max((math.ceil(len(seeds) / shared[name]) for name, seeds in lists.items()), default=0)
         people = longest if self.people is None else self.people
         if people == 0:
             raise ConfigError("people must be given, or seeds for each of them")
         if people < longest or people > MAX_NUMBERS:
             raise ConfigError(f"people is {people}, but there are seeds for {longest}")
         everyone = lists.pop("seeds", list(range(people)))
-        by_name = {name: lists.get(f"{name}s", everyone) for name in SEEDS}
+        by_name: dict[str, list[Any]] = {name: lists.get(f"{name}s", everyone) for name in SEEDS}
         if "houses" in lists:
             by_name["house"] = lists["houses"]
-        return [{name: seeds[k % len(seeds)] for name, seeds in by_name.items()} for k in range(people)]
+        places = {name: by_name[name] for name in ("house", "house_seed") if name in by_name}
+        if trials > max(map(len, places.values())):
+            raise ConfigError(
+                f"trials_per_person is {trials}; give each of them a house or a house seed of its own"
+            )
+        steps = {name: len(places[name]) // trials if name in places else 0 for name in by_name}
+        return [
+            {name: v[(k + steps[name] * trial) % len(v)] for name, v in by_name.items()}
+            | {"trial_number": trial + 1}
+            for k in range(people)
+            for trial in range(trials)
+        ]
 
 
 _SEEDS = ("seeds", *(f"{name}s" for name in SEEDS))
-_IN_A_CELL = {*SETTINGS, "people", "houses", *_SEEDS} - {"live", *SEEDS}
+_IN_A_CELL = {*SETTINGS, "people", "houses", "trials_per_person", *_SEEDS} - {"live", "trial_number", *SEEDS}
 
 
 class _File(msgspec.Struct, forbid_unknown_fields=True):

@@ -41,6 +41,8 @@ def trial_columns() -> Columns:
         if name not in ("person", "behaviour")
     }
     found["fingerprint"] = ("str", "Hash of the settings and of all else that the trial depends on.")
+    found["rooms"] = ("int", "How many rooms the house has.")
+    found["area_m2"] = ("float", "Area of their floor, m2.")
     found["simulated"] = ("bool", "Whether the participant is simulated, that is, any but `human`.")
     person = described(PersonParameters, leave_out=set(GROUPS))
     found |= {f"person_{name}": about for name, about in person.items()}

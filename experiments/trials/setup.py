@@ -175,4 +175,6 @@ def _log_start(config: TrialConfig, house: House, world: World, order: list[str]
         inputs=inputs,
         episode_sha256=hashlib.sha256(episode).hexdigest(),
         order=order,
+        rooms=len(house.catalogue.rooms),
+        area_m2=round(house.rooms.area, 2),
     )

@@ -97,6 +97,14 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             metavar="N",
         ),
     ] = POINTS
+    trial_number: Annotated[
+        int,
+        _about(
+            "Which of the person's trials it is, from 1; `trials_per_person` of a design counts them "
+            "(docs/designs.md).",
+            metavar="N",
+        ),
+    ] = 1
     capacity: Annotated[
         int, _about("Objects carried at most; with 1, in the right hand.", choices=CAPACITIES)
     ] = CAPACITY
@@ -195,6 +203,8 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             raise ConfigError(f"no fidelity {self.fidelity!r}; choose one of {', '.join(FIDELITIES)}")
         if self.draw not in DRAWN_BY:
             raise ConfigError(f"no draw {self.draw!r}; choose one of {', '.join(DRAWN_BY)}")
+        if self.trial_number < 1:
+            raise ConfigError(f"trial_number is {self.trial_number}; a person's trials are counted from 1")
         if self.points < 1:
             raise ConfigError(f"points is {self.points}; a house needs at least 1")
         if self.episode is None and not 1 <= self.objects <= self.points:
@@ -254,7 +264,9 @@ DEFAULTS: dict[str, Any] = {f.name: f.default for f in msgspec.structs.fields(Tr
 PATHS = tuple(name for name, about in SETTINGS.items() if (about.extra or {}).get("path"))
 # What may differ by accident between the conditions of a comparison.
 CONFOUNDERS = tuple(
-    name for name in SETTINGS if name not in ("assistance", "live", "regret", "episode", *SEEDS)
+    name
+    for name in SETTINGS
+    if name not in ("assistance", "live", "regret", "episode", "trial_number", *SEEDS)
 )
 
 

@@ -33,7 +33,7 @@ def p_values(values, rng):
     two = {f"Type {'I' * kind}": two_way(values, assistance, objects, kind) for kind in (2, 3)}
     two |= {"HC3": hc3(values, assistance, objects), "Welch-James": welch_james(values, assistance, objects)}
     shifted = values + rng.normal(0, 0.5, 7)[HOUSES]
-    two["mixed"] = mixed_model(shifted, assistance, objects, HOUSES).tests
+    two["mixed"] = mixed_model(shifted, assistance, objects, {"house": HOUSES}).tests
     yield from ((f"{name}, {effect}", t.p) for name, tests in two.items() for effect, t in tests.items())
     pairs = compare_pairs(six, BOUND)
     yield from ((n, min(getattr(p, n) for p in pairs)) for n in ("tukey_p", "games_howell_p", "holm_p"))

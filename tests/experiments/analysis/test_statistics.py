@@ -15,6 +15,7 @@ from statsmodels.stats.anova import anova_lm
 from study_people import SIZES
 
 from experiments.analysis.statistics.anova import brown_forsythe, cells_of, one_way, two_way, welch
+from experiments.analysis.statistics.by_house import differences_by_house
 from experiments.analysis.statistics.effects import FTest, hedges_g
 from experiments.analysis.statistics.mixed import mixed_model
 from experiments.analysis.statistics.mixtures import fit_mixtures
@@ -238,8 +239,8 @@ def test_the_mixed_model_by_dense_matrices(spread):
         covariance = np.linalg.inv(x.T @ inverse @ x)
         return inverse - inverse @ x @ covariance @ x.T @ inverse, covariance, inverse
 
-    model = mixed_model(y, first, second, house)
-    variances = np.array([model.house_variance, model.residual_variance])
+    model = mixed_model(y, first, second, {"house": house})
+    variances = np.array([model.random["house"].variance, model.residual_variance])
     p, covariance, inverse = projection(variances)
     slopes = [np.trace(p @ v) - y @ p @ v @ p @ y for v in parts]
     assert slopes[1] == pytest.approx(0, abs=1e-6)
@@ -274,10 +275,10 @@ def test_the_mixed_model_of_a_published_example():
     table = [[12, 15, 12, 10], [10, 14, 13, 12], [7, 14, 13, 9], [7, 11, 10, 9], [8, 11, 8, 7]]
     table += [[9, 11, 11, 10], [8, 12, 12, 11], [7, 11, 8, 7], [9, 13, 10, 8]]
     values, stools, people = np.array(table, float).ravel(), np.tile([*"abcd"], 9), np.repeat(np.arange(9), 4)
-    model = mixed_model(values, stools, np.full(36, 6), people)
+    model = mixed_model(values, stools, np.full(36, 6), {"person": people})
     test = model.tests["assistance"]
     assert (round(test.statistic, 4), test.df1, round(test.df2, 6)) == (22.3556, 3, 24)
-    deviations = math.sqrt(model.house_variance), math.sqrt(model.residual_variance)
+    deviations = math.sqrt(model.random["person"].variance), math.sqrt(model.residual_variance)
     assert deviations == pytest.approx((1.332465, 1.100295), abs=5e-7)
 
 
@@ -287,9 +288,9 @@ def test_the_interval_of_the_share_of_houses_holds_the_true_one(share):
     houses, condition = np.repeat(np.arange(20), 6), np.tile([*"ab"], 60)
     for _ in range(200):
         values = rng.normal(0, math.sqrt(share), 20)[houses] + rng.normal(0, math.sqrt(1 - share), 120)
-        model = mixed_model(values, condition, np.full(120, 6), houses)
-        low, high = model.interval
-        assert 0 <= low <= model.share <= high <= 1
+        house = mixed_model(values, condition, np.full(120, 6), {"house": houses}).random["house"]
+        low, high = house.interval
+        assert 0 <= low <= house.share <= high <= 1
         held += low <= share <= high
     assert 0.91 <= held / 200 <= (1.0 if share == 0 else 0.99)
 
@@ -302,7 +303,28 @@ def test_houses_that_are_people_or_cells_are_refused(people, message):
     values = np.random.default_rng(0).normal(size=people)
     houses = np.arange(people) % 8
     with pytest.raises(StatisticsError, match=message):
-        mixed_model(values, np.where(houses % 2, "a", "b"), houses // 2, houses)
+        mixed_model(values, np.where(houses % 2, "a", "b"), houses // 2, {"house": houses})
+
+
+@pytest.mark.parametrize("spread", [0.0, 3.0])
+def test_the_interval_by_house_leaves_out_what_all_conditions_of_a_house_share(spread):
+    """Where each house has one trial of each condition, it is as wide as that of the differences within houses."""
+    rng, houses = np.random.default_rng(5), np.repeat(np.arange(60), 2)
+    condition, values = np.tile([*"ab"], 60), rng.normal(size=120) + rng.normal(0, spread, 60)[houses]
+    (found,) = differences_by_house(values, condition, np.full(120, 6), houses, ["a", "b"])
+    pairs = values[1::2] - values[::2]
+    assert found.difference == pytest.approx(pairs.mean())
+    half = 1.96 * pairs.std() / math.sqrt(60)
+    assert np.array(found.interval) == pytest.approx(pairs.mean() + np.array([-half, half]), abs=0.12 * half)
+    with pytest.raises(StatisticsError, match="houses cannot be drawn again from 2; 5 are needed"):
+        differences_by_house(values[:4], condition[:4], np.full(4, 6), houses[:4], ["a", "b"])
+
+
+def test_factors_that_the_design_cannot_tell_apart_are_refused():
+    rng, people = np.random.default_rng(0), np.repeat(np.arange(20), 4)
+    condition, levels = np.tile([*"ab"], 40), np.full(80, 6)
+    with pytest.raises(StatisticsError, match="cannot tell the variances of the random factors apart"):
+        mixed_model(rng.normal(size=80), condition, levels, {"person": people, "house": people})
 
 
 def test_power_by_simulation_and_its_inverse():

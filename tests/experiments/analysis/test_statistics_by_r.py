@@ -67,11 +67,26 @@ def of_mixtures():
 
 
 def mixed():
-    return mixed_model(y, condition, objects, houses)
+    return mixed_model(y, condition, objects, {"house": houses})
 
 
 def variances():
-    return [mixed().house_variance, mixed().residual_variance]
+    return [mixed().random["house"].variance, mixed().residual_variance]
+
+
+def crossed():
+    with (BY_R / "crossed.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    values, shown, house = (np.array([row[name] for row in rows]) for name in ("y", "assistance", "house"))
+    factors = {name: np.array([row[name] for row in rows]) for name in ("person", "house", "trial_number")}
+    factors["pair"] = np.char.add(house, shown)
+    return mixed_model(values.astype(float), shown, np.full(len(rows), 6), factors)
+
+
+def crossed_variances():
+    model = crossed()
+    found = {name: factor.variance for name, factor in model.random.items()}
+    return found | {"Residual": model.residual_variance}
 
 
 OURS = {
@@ -94,10 +109,18 @@ OURS = {
     "ordinal": of_answers,
     "mixed": lambda: effects(mixed().tests),
     "mixed_variances": variances,
+    "crossed": lambda: f_test(crossed().tests["assistance"]),
+    "crossed_variances": crossed_variances,
     "mixtures": of_mixtures,
 }
 # lmer climbs to 1e-8 of the variances; Shapiro and Wilk's coefficients are approximations of six digits.
-TOLERANCES = {"mixed": 1e-6, "mixed_variances": 1e-6, "diagnostics": 1e-6}
+TOLERANCES = {
+    "mixed": 1e-6,
+    "mixed_variances": 1e-6,
+    "crossed": 1e-5,
+    "crossed_variances": 1e-5,
+    "diagnostics": 1e-6,
+}
 
 
 def assert_equal(ours, theirs, tolerance, where):

@@ -334,3 +334,33 @@ def test_the_power_command(tmp_path, capsys):
     told = capsys.readouterr().out
     assert f"{found['per_cell']} [90 % interval" in told
     assert "left out, as not everything was delivered: 4" in told
+
+
+def test_people_with_several_trials_in_several_homes(tmp_path):
+    """Crossed factors, their shares, homes by rooms, and a note on the tests that know nothing of it."""
+    rows = made_up_people({(name, 6): 24 for name in ("none", "optimal")})
+    for k, row in enumerate(rows):
+        person, trial = divmod(k, 3)
+        home = (person % 8 + 3 * trial) % 8
+        row |= {"house": f"home {home}", "house_seed": 0, "person_seed": person, "order_seed": person}
+        row |= {
+            "trial_number": trial + 1,
+            "rooms": 1 + home // 2,
+            "area_m2": 40.0 + home,
+            "fingerprint": f"{k}",
+        }
+    write_tables(tmp_path, rows)
+    assert main(["study", "analyze", str(tmp_path)]) == 0
+    results = json.loads((tmp_path / "analysis/stats.json").read_text())["results"]
+    (model,) = (r["value"] for r in results if (r["measure"], r["kind"]) == ("deviations", "mixed model"))
+    assert list(model["random"]) == ["person", "trial_number", "house", "house x assistance"]
+    for factor in model["random"].values():
+        assert 0 <= factor["interval"][0] <= factor["share"] <= factor["interval"][1] <= 1
+    (rooms,) = (
+        r["value"] for r in results if (r["measure"], r["kind"]) == ("deviations", "mixed model, rooms")
+    )
+    assert list(rooms["tests"]) == ["assistance", "rooms", "rooms x assistance"]
+    people = pyarrow.csv.read_csv(tmp_path / "analysis/people.csv").to_pylist()
+    assert people[3]["objects_per_m2"] == pytest.approx(6 / people[3]["area_m2"])
+    report = (tmp_path / "analysis/report.html").read_text()
+    assert "People have several trials in a cell" in report and "houses drawn again" in report

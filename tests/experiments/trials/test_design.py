@@ -6,7 +6,7 @@ import pytest
 from sessions import prepared
 
 from experiments.errors import ConfigError
-from experiments.study.simulate import study_path
+from experiments.study.simulate import read_study, study_path
 from experiments.trials.design import numbers, read_design
 from experiments.trials.setup import trial_episode
 from experiments.trials.trial_config import TrialConfig
@@ -177,3 +177,18 @@ def test_the_person_seed_reaches_the_participant(house, monkeypatch):
 def test_unusable_configurations(options, fault):
     with pytest.raises(ConfigError, match=fault):
         TrialConfig(**{"objects": 6, "assistance": "none", **options})
+
+
+def test_trials_of_a_person_are_in_homes_that_come_as_often_first_as_last(tmp_path):
+    cell = "[[cells]]\nobjects = 4\nassistance = 'none'\nhouse_seeds = 0\nhouses = 'generated:0:8'\nseeds = '{}'\n{}"
+    trials = design(tmp_path, cell.format("0:8", "trials_per_person = 4"))
+    assert [trial.trial_number for trial in trials] == [1, 2, 3, 4] * 8
+    assert all(len({t.house for t in trials if t.person_seed == person}) == 4 for person in range(8))
+    assert len({(trial.house, trial.trial_number) for trial in trials}) == 32
+    assert len(design(tmp_path, cell.format("0:2", "trials_per_person = 4"))) == 8
+    some = read_study(tmp_path / "design.toml", 1).trials
+    assert {t.house for t in some} == {t.house for t in trials if t.person_seed == 0}
+    with pytest.raises(
+        ConfigError, match="trials_per_person is 9; give each of them a house or a house seed"
+    ):
+        design(tmp_path, cell.format("0:8", "trials_per_person = 9"))

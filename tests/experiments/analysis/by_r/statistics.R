@@ -146,6 +146,17 @@ out$mixed <- lapply(list(assistance = c("a", 2, 3), objects = c("b", 4, 5), inte
 })
 out$mixed_variances <- as.data.frame(VarCorr(mixed))$vcov
 
+# Crossed random factors: people with four trials each, in twenty houses.
+crossed <- read.csv("crossed.csv")
+crossed$a <- factor(crossed$assistance)
+contrasts(crossed$a) <- contr.sum(3)
+crossed$pair <- interaction(crossed$house, crossed$a)
+crossed_fit <- lmer(y ~ a + (1 | person) + (1 | house) + (1 | pair) + (1 | trial_number), crossed, control = tight)
+table <- anova(crossed_fit, type = 3, ddf = "Satterthwaite")
+out$crossed <- f_test(table["a", "F value"], table["a", "NumDF"], table["a", "DenDF"])
+components <- as.data.frame(VarCorr(crossed_fit))
+out$crossed_variances <- as.list(setNames(components$vcov, components$grp))
+
 # Kinds of people: mixtures of beta-binomials, without the number of orders of the visits.
 loss <- function(par, k) {
   w <- exp(c(par[seq_len(k - 1)], 0)); w <- w / sum(w)
