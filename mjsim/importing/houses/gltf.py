@@ -1,6 +1,5 @@
 """Scenes of one mesh file (glTF, GLB, OBJ, ...), and Habitat's scene_instance.json that composes several."""
 
-import json
 import math
 import re
 from collections.abc import Iterator
@@ -23,6 +22,7 @@ from mjsim.importing.houses.values import (
     Piece,
     SourceScene,
     left_out,
+    numbers,
 )
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import UNITS, ImportDecision
@@ -88,7 +88,7 @@ def _stage_up(path: Path) -> str | None:
 
 
 def _is_z_up(config: dict[str, Any]) -> bool:
-    return int(np.argmax(np.abs(_numbers(config.get("up", [0, 1, 0]), 3, Path("stage_config.json"))))) == 2
+    return int(np.argmax(np.abs(numbers(config.get("up", [0, 1, 0]), 3, Path("stage_config.json"))))) == 2
 
 
 class _Habitat:
@@ -109,9 +109,7 @@ class _Habitat:
         for region in _read(file).get("region_annotations") or []:
             text = str(region.get("name", "room")).partition(":")[0]
             key = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_") or "room"
-            loop = np.array([_numbers(point, 3, file) for point in region.get("poly_loop", [])]).reshape(
-                -1, 3
-            )
+            loop = np.array([numbers(point, 3, file) for point in region.get("poly_loop", [])]).reshape(-1, 3)
             try:
                 boxes = boxes_of(np.column_stack((loop[:, 0], -loop[:, 2])))
             except ValueError as error:
@@ -142,9 +140,9 @@ class _Habitat:
             return
         frame = np.eye(4)
         if (rotation := item.get("rotation")) is not None:
-            frame = quaternion_matrix(_numbers(rotation, 4, self._path))
-        frame[:3, 3] = _numbers(item.get("translation", [0, 0, 0]), 3, self._path)
-        scale = _numbers(config.get("scale", [1, 1, 1]), 3, config_file or self._path)
+            frame = quaternion_matrix(numbers(rotation, 4, self._path))
+        frame[:3, 3] = numbers(item.get("translation", [0, 0, 0]), 3, self._path)
+        scale = numbers(config.get("scale", [1, 1, 1]), 3, config_file or self._path)
         scale = scale * float(item.get("uniform_scale", 1.0))
         upright = np.eye(4)
         if _is_z_up(config):  # z is up in the mesh; Habitat turns it so that y is
@@ -181,16 +179,4 @@ def _read(path: Path) -> dict[str, Any]:
         raise AssetError(f"cannot read {path}: {error}; is it complete?") from error
     if not isinstance(found, dict):
         raise AssetError(f"{path} holds no JSON object; export it again")
-    return found
-
-
-def _numbers(values: Any, count: int, path: Path) -> Floats:
-    try:
-        found = np.array(values, np.float64)
-    except (TypeError, ValueError):
-        found = np.empty(0)
-    if found.shape != (count,) or not np.isfinite(found).all():
-        raise AssetError(
-            f"{path} has {json.dumps(values)[:60]} where {count} numbers should stand; correct it"
-        )
     return found

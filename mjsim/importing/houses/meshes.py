@@ -66,7 +66,7 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, S
                 continue
             if key not in known:
                 known[key] = surface_of(mesh, linear=suffix in GLTF, side=TEXTURE_SIDE)
-            parts.append((_readable(node), known[key].moved(whole @ place)))
+            parts.append((str(node), known[key].moved(whole @ place)))
     if not parts:
         raise AssetError(f"{path} has no triangles; export it as a mesh of triangles")
     if (count := sum(len(surface) for _, surface in parts)) > MAX_TRIANGLES:
@@ -104,7 +104,3 @@ def _collada_frame(path: Path) -> Floats:
 def _elements(path: Path) -> Iterator[tuple[str, ET.Element]]:
     for _, element in ET.iterparse(path):
         yield element.tag.rpartition("}")[2], element
-
-
-def _readable(node: str) -> str:
-    return str(node)

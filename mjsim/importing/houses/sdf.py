@@ -14,7 +14,7 @@ from trimesh.transformations import compose_matrix
 from mjsim.errors import AssetError
 from mjsim.files import read_text
 from mjsim.importing.houses.meshes import primitive, read_parts
-from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene, left_out
+from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene, left_out, numbers
 from mjsim.importing.reading import PLAIN
 from mjsim.importing.surface import Floats, Surface
 from mjsim.importing.values import ImportDecision
@@ -151,7 +151,7 @@ class _Reader:
                     raise
                 self._meshes[file] = []
                 self.missing.files.append(file.name)
-        scale = _numbers(shape.findtext("scale") or "1 1 1", 3, self._path)
+        scale = numbers((shape.findtext("scale") or "1 1 1").split(), 3, self._path)
         yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
 
     def _find(self, uri: str, folder: Path | None) -> Path | None:
@@ -224,7 +224,7 @@ def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, dept
         return frame
     if attributes.get("rotation_format", "euler_rpy") != "euler_rpy":
         raise AssetError(f"{path} has a <pose> with {dict(attributes)}; write it as 'x y z roll pitch yaw'")
-    values = _numbers(pose.text or "", 6, path)
+    values = numbers((pose.text or "").split(), 6, path)
     if _is_true(pose.get("degrees")):
         values[3:] = np.deg2rad(values[3:])
     return np.asarray(frame @ compose_matrix(translate=values[:3], angles=values[3:]))
@@ -234,7 +234,7 @@ def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
     """A box, cylinder, ..., around the origin; None for what is not known."""
 
     def number(name: str, count: int = 1) -> Floats:
-        return _numbers(shape.findtext(name) or "", count, path)
+        return numbers((shape.findtext(name) or "").split(), count, path)
 
     if shape.tag == "box":
         return trimesh.creation.box(number("size", 3))
@@ -258,16 +258,6 @@ def _colour(element: ET.Element) -> Floats:
         if len(words) >= 3:
             return np.clip([float(word) for word in words[:3]], 0.0, 1.0)
     return np.array(PLAIN)
-
-
-def _numbers(text: str, count: int, path: Path) -> Floats:
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) != count or not np.isfinite(values).all():
-        raise AssetError(f"{path} has {text.strip()!r:.60} where {count} numbers should stand; correct it")
-    return values
 
 
 def _is_true(text: str | None) -> bool:

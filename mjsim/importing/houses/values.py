@@ -2,7 +2,11 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from mjsim.errors import AssetError
 from mjsim.importing.surface import Floats, Surface
 from mjsim.importing.values import ImportDecision
 
@@ -81,6 +85,17 @@ class Missing:
 def left_out(what: str, why: str) -> ImportDecision:
     """A line of the report about something that the house lacks."""
     return ImportDecision("left out", what, why)
+
+
+def numbers(values: Any, count: int, path: Path) -> Floats:
+    """So many numbers of a file, (count,); `AssetError` where they are none or not finite."""
+    try:
+        found = np.array(values, np.float64)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (count,) or not np.isfinite(found).all():
+        raise AssetError(f"{path} has {str(values)[:60]!r} where {count} numbers should stand; correct it")
+    return found
 
 
 def moved(pieces: list[Piece], transform: Floats) -> list[Piece]:
