@@ -15,7 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from benchmarks.support.play_server import PATIENCE
-from experiments.web.protocol import BEAT_PERIOD, FRAME_HEAD, MAX_INPUTS
+from experiments.web.protocol import BEAT_PERIOD, FRAME_HEAD, MAX_INPUTS, MAX_STEPS_AHEAD
 
 STEP = 0.04  # s of a control step
 # A text frame of 126 bytes, masked with zeros, that ends early.
@@ -107,6 +107,7 @@ class SimulatedBrowser:
         self._step: int | None = (
             None  # the next control step of a client that draws; None while the clock stands
         )
+        self._newest = 0  # step of the last snapshot
         self._made: list[dict[str, Any]] = []  # inputs for control steps that were not promised yet
         self._link, self._rng = link or Link(), np.random.default_rng(seed)
         self._changed = asyncio.Condition()
@@ -263,6 +264,10 @@ class SimulatedBrowser:
             await asyncio.sleep(STEP)
             due = time.perf_counter()
             while self._step is not None:
+                if self._step >= self._newest + MAX_STEPS_AHEAD:  # the server would refuse it
+                    await asyncio.sleep(STEP)
+                    due = time.perf_counter()
+                    continue
                 self._step += 1
                 if self._step % self._batch == 0:
                     made, self._made = self._made, []
@@ -315,7 +320,8 @@ class SimulatedBrowser:
         self.last[content["type"]] = content
         if content["type"] == "snapshot":
             self.frames.append(SeenFrame(time.perf_counter(), content["input"], 0))
-            self._step = content["step"] if self._step is None else self._step
+            self._newest = content["step"]
+            self._step = self._newest if self._step is None else self._step
         if content["type"] == "state" and content["phase"] != "running":
             self._step = None
             if content["reason"] == "silent":

@@ -4,13 +4,14 @@ import asyncio
 import logging
 import time
 from collections import deque
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
 import msgspec
 
 from experiments.web import protocol
+from experiments.web.controls import Input
 from experiments.web.protocol import (
     Beat,
     Display,
@@ -92,6 +93,7 @@ class PlayedSession:
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
         self._taken = self._step = 0  # number of the last input that is safe, and the next control step
+        self._lost = False  # whether a worker died, and the browser may not know it yet
         self._came: deque[tuple[int, float]] = deque(
             maxlen=MAX_AHEAD
         )  # inputs that are not safe yet, and when
@@ -109,7 +111,7 @@ class PlayedSession:
             self.browser.send(protocol.Replaced())
             self.browser.close(protocol.REPLACED, "the session is open elsewhere")
             self._pause("taken over")
-        self.browser, self.heard = browser, time.monotonic()
+        self.browser, self.heard, self._lost = browser, time.monotonic(), False
         self.take(view)
         if self._task is None:
             self._task = asyncio.create_task(self._run())
@@ -138,7 +140,7 @@ class PlayedSession:
         match message:
             case View():
                 self._view = message
-            case Inputs() if self.state.phase is LOADING:
+            case Inputs(inputs) if self.state.phase is LOADING or self._lacks_some_before(inputs):
                 return None  # the browser keeps them, and sends them again
             case Inputs(inputs):
                 if (error := self._input_error(message)) is not None:
@@ -154,7 +156,7 @@ class PlayedSession:
             case Leave() if wait := self.visit.wait(self._minimum):
                 return Error("too early", f"this phase can be ended in {wait:.0f} s")
             case Run():
-                self.state = self.state.after(Trigger.RUN)
+                self._lost, self.state = False, self.state.after(Trigger.RUN)
             case Pause(reason):
                 self._pause(reason)
                 return None
@@ -169,6 +171,13 @@ class PlayedSession:
             task.cancel()
             with suppress(asyncio.CancelledError):
                 await task
+
+    def _lacks_some_before(self, inputs: Sequence[Input]) -> bool:
+        """Whether a browser that does not know yet that a worker died sends what follows inputs lost with it.
+
+        To take these would acknowledge the lost ones, and the browser would not send them again.
+        """
+        return self._lost and len(inputs) > 0 and inputs[0].number > self.state.input + 1
 
     def _input_error(self, message: Inputs) -> Error | None:
         numbers = [new.number for new in message.inputs]
@@ -273,6 +282,7 @@ class PlayedSession:
             LOG.warning("session %s: its worker died", visit.name[:12])
             self._meter.worker_lost()
             self._came.clear()
+            self._lost = True
             opening = msgspec.structs.replace(opening, restarted=True)
             self._discard_worker()
             crashes += 1

@@ -29,12 +29,13 @@ from experiments.procedure.comprehension import Question
 from experiments.record.phases import PHASES
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
-from experiments.web.protocol import Frame, Open, Pause, Snapshot, Taken
+from experiments.web.protocol import Frame, Inputs, Open, Pause, Snapshot, State, Taken
 from experiments.web.server.app import PlayConfig, PlayServer
 from experiments.web.server.guards import Guards, allowed_hosts
 from experiments.web.server.played_session import MAX_CRASHES
 from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
 from experiments.web.server.visits import VISIT, Visits, token_hash
+from experiments.web.state import PAUSED
 
 TASK = TrialConfig(objects=6, assistance="optimal", seed=0, user="human", live=True).settings()
 GAIT, SPEEDS = protocol.Gait(*[1.0] * 22), protocol.Speeds(1.0, 1.0, 1.0)
@@ -512,6 +513,22 @@ def test_a_worker_that_died_is_named_to_the_next(client, pool):
         pool.workers[0].die()
         until_phase(socket, "ready")
     assert [worker.told[0].restarted for worker in pool.workers] == [False, True]
+
+
+def test_inputs_that_follow_others_lost_with_a_worker_are_not_taken_before_these(client, pool):
+    with connected(client, new_visit(client)) as socket:
+        started(socket)
+        socket.send_json(inputs(1))
+        until(socket, "taken")
+        pool.workers[0].die()
+        until_phase(socket, "ready")
+        pool.workers[1].say(State(PAUSED, "interrupted", input=1))
+        until_phase(socket, "paused")
+        socket.send_json(inputs(3))  # sent before the page knew
+        socket.send_json(inputs(2, 3))
+        assert until(socket, "taken")[-1]["input"] == 3
+    told = [[new.number for new in said.inputs] for said in pool.workers[1].told if isinstance(said, Inputs)]
+    assert told == [[2, 3]]
 
 
 def test_a_second_page_takes_over_by_asking_and_the_first_is_told(client, monkeypatch):
