@@ -32,7 +32,7 @@ from experiments.web.server.visits import Visits, token_hash
 MINIMUM = 1.0  # s; the longest that the dry run waits in a phase
 TASK_TIME = 1.0  # s that the task lasts
 PLACES = 10  # in place of each one, so that there is one for everybody who is made up
-PATIENCE = 180.0  # s for a trial, the compiling of kernels included
+PATIENCE = 400.0  # s for a trial or an answer, the compiling of kernels on a loaded machine included
 STUDY_IDS = ("STUDY_ID", "projectId", "hitId")  # as platforms call it
 
 Photograph = Callable[[str, str], Awaitable[None]]  # takes a name and a URL
@@ -66,7 +66,7 @@ async def dry_run(
     app = StudyServer(procedure, recruiter, pool, Serving(b"dry run", workers=1)).app("127.0.0.1")
     async with serving(app) as base:
         headers = {"Origin": base}
-        async with httpx.AsyncClient(base_url=base, headers=headers, timeout=60.0) as client:
+        async with httpx.AsyncClient(base_url=base, headers=headers, timeout=PATIENCE) as client:
             return await _DryRun(procedure, recruiter, folder, client, photograph).walk()
 
 

@@ -21,9 +21,9 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 SIZES = {"desk": (1280, 800), "phone": (390, 844)}  # px of the page
 MAX_HEIGHT = 6000  # px of a picture
 SETTLE = 1.5  # s that a page has to fill itself
-LOADING = 20.0  # s that a trial has to load
+LOADING = 120.0  # s that a trial has to load
 LOADED = "!document.querySelector('#play') || !!document.querySelector('#panel-actions button')"
-START = 30.0  # s that the browser has to start
+START = 120.0  # s that the browser has to start, on a loaded machine
 
 
 def browser() -> str | None:
