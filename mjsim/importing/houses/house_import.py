@@ -46,6 +46,7 @@ _UPWARD = 0.2  # share of level surfaces that face up, from where on only these 
 _FLAT = 0.95  # cosine of the slope of a floor
 _FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself
 _FAR = 200.0  # m; what spans more is in no unit of a house
+_MOST = 0.9  # share of the pieces that are near each other, from where on the others are left out
 _FEW = 4  # things that stand about, fewer than which are no house where there are no walls
 _DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # m: thickness at most, width and height of a door leaf
 
@@ -133,15 +134,16 @@ def _converted(
 ) -> tuple[ImportedHouse, list[ImportDecision]]:
     if (count := sum(len(piece.surface) for piece in scene.pieces)) > MAX_TRIANGLES:
         raise AssetError(f"has {count:,} triangles; reduce it to {MAX_TRIANGLES:,} or fewer")
-    level, ceiling = _levels(scene.pieces) if options.floor is None else (options.floor, np.inf)
-    pieces = moved(list(scene.pieces), translation_matrix([0, 0, -level]))
+    near, far = _near(scene.pieces)
+    level, ceiling = _levels(near) if options.floor is None else (options.floor, np.inf)
+    pieces = moved(near, translation_matrix([0, 0, -level]))
     decisions = [
         ImportDecision("source", source.name, f"{scene.kind}, {_counted(len(pieces), 'shape')}"),
         ImportDecision(
             "floor", f"z = {level:.3f} m", "the lowest large level area" if options.floor is None else "given"
         ),
     ]
-    decisions += scene.notes
+    decisions += [*scene.notes, *far]
     pieces, notes = _kept(pieces, ceiling - level)
     decisions += notes
     _check_span(pieces)
@@ -206,6 +208,17 @@ def _converted(
         ),
     ]
     return house, decisions
+
+
+def _near(pieces: Sequence[Piece]) -> tuple[list[Piece], list[ImportDecision]]:
+    """Pieces without the few that lie far off, such as what fell through the floor of a simulation."""
+    middles = np.array([piece.surface.corners.mean(axis=(0, 1)) for piece in pieces])
+    near = np.abs(middles - np.median(middles, axis=0)).max(axis=1) < _FAR
+    if near.all() or near.mean() < _MOST:
+        return list(pieces), []
+    names = sorted({piece.name for piece, is_near in zip(pieces, near, strict=True) if not is_near})
+    kept = [piece for piece, is_near in zip(pieces, near, strict=True) if is_near]
+    return kept, [left_out(", ".join(names[:6]), f"more than {_FAR:g} m away")]
 
 
 def _levels(pieces: Sequence[Piece]) -> tuple[float, float]:

@@ -32,7 +32,11 @@ def imported(tmp_path, source, **options):
 @pytest.fixture(scope="module")
 def flat(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flat")
-    return imported(folder, write_sdf(folder))
+    lost = (
+        "<model name='lost'><pose>1 1 -7e8 0 0 0</pose><link name='l'><visual name='v'><geometry><box>"
+        "<size>1 1 1</size></box></geometry></visual></link></model>"
+    )
+    return imported(folder, write_sdf(folder, extra=lost))
 
 
 def test_an_sdf_world_becomes_a_house(flat):
@@ -50,6 +54,11 @@ def test_a_door_between_rooms_stands_open(flat):
     decisions, catalogue = flat
     assert decisions["doors"] == "1 open: door_1"
     assert compiled_house(catalogue).navigable.is_navigable((4.0, 2.5))
+
+
+def test_what_fell_through_the_floor_is_left_out(flat):
+    decisions, _ = flat
+    assert decisions["left out"] == "lost: more than 200 m away"
 
 
 def test_loose_things_of_the_size_of_a_hand_are_left_out_and_named(flat):
