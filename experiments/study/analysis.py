@@ -199,10 +199,10 @@ def _mixed(table: StudyTable, name: str, covariate: str | None = None) -> Any:
     if len(set(here.assistance.tolist())) < 2:
         raise StatisticsError("there is only one assistance condition")
     with_covariate = None if covariate is None else (covariate, here.numbers(covariate))
-    return mixed_model(values[known], here.assistance, here.objects, _random_factors(here), with_covariate)
+    return mixed_model(values[known], here.assistance, here.objects, random_factors(here), with_covariate)
 
 
-def _random_factors(table: StudyTable) -> dict[str, NDArray[Any]]:
+def random_factors(table: StudyTable) -> dict[str, NDArray[Any]]:
     """The house, and what repeats besides: people with several trials, their order, conditions within a house."""
     rows, houses = len(table.rows), len(set(table.houses.tolist()))
     found: dict[str, NDArray[Any]] = {}

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from experiments.cli.options import add_command, add_force
+from experiments.cli.options import add_command, add_force, int_list
 from experiments.cli.requirements import require_extra
 
 DESCRIPTION = """\
@@ -42,6 +42,22 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--minutes", type=float, default=25.0, metavar="M", help="that a person takes")
     parser.add_argument("--dropout", type=float, default=0.15, metavar="P", help="share who do not finish")
     parser.add_argument(
+        "--homes",
+        type=int_list,
+        metavar="N,..",
+        help="instead, the power with each of these numbers of homes; people of the pool have trials in several "
+        "homes (trials_per_person)",
+    )
+    parser.add_argument(
+        "--people",
+        type=int_list,
+        default="10,20,50,100",
+        metavar="N,..",
+        help="with --homes: of each condition",
+    )
+    parser.add_argument("--trials", type=int, default=1, metavar="N", help="with --homes: of each person")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="with --homes: picture to write, PNG")
+    parser.add_argument(
         "--seed", type=int, default=0, metavar="S", help="seed of what is drawn from the pool"
     )
     parser.add_argument("--out", type=Path, metavar="FILE", help="JSON file to write")
@@ -65,6 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--seed {arguments.seed} must not be negative")
     if arguments.out is not None:
         check_file(arguments.out, replace=arguments.force)
+    if arguments.homes is not None:
+        return _homes(arguments)
     wanted = Wanted(
         arguments.measure,
         arguments.effect,
@@ -82,6 +100,37 @@ def run(arguments: argparse.Namespace) -> int:
         print(line)
     if arguments.out is not None:
         write_json(arguments.out, {**asdict(wanted), **asdict(cost), **asdict(found)})
+    return 0
+
+
+def _homes(arguments: argparse.Namespace) -> int:
+    """Power by numbers of homes and people."""
+    from experiments.record.files import write_json
+    from experiments.record.run_directory import check_file
+    from experiments.study.homes_power import draw, homes_power
+    from experiments.study.measures import read_measures
+    from experiments.study.table import read_study
+
+    if arguments.plot is not None:
+        check_file(arguments.plot, replace=arguments.force)
+    found = homes_power(
+        read_study(arguments.pool, read_measures()),
+        arguments.measure,
+        arguments.homes,
+        arguments.people,
+        arguments.trials,
+        difference=arguments.difference,
+        alpha=arguments.alpha,
+    )
+    print(f"{found.origin}: the people that this follows from.")
+    print(f"power to find the effect of assistance on {found.column}, {found.trials} trials of each person")
+    print(f"{'homes':>8}" + "".join(f"{f'{n} people':>12}" for n in found.people))
+    for homes, powers in zip(found.homes, found.power, strict=True):
+        print(f"{homes:>8}" + "".join(f"{power:>12.3f}" for power in powers))
+    if arguments.plot is not None:
+        draw(arguments.plot, found, arguments.measure)
+    if arguments.out is not None:
+        write_json(arguments.out, asdict(found))
     return 0
 
 
