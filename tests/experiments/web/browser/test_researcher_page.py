@@ -1,6 +1,8 @@
-"""The researcher's page in a browser: no fault for axe-core, by keys alone, and without scripts but for watching."""
+"""The researcher's page in browsers: no fault for axe-core, by keys alone, and without scripts but for watching."""
 
 import json
+import os
+from contextlib import contextmanager
 
 import pytest
 from scripted_workers import hello
@@ -10,6 +12,8 @@ from websockets.sync.client import connect
 from tests.experiments.web.browser.test_accessibility import DESK, PHONE, violations
 
 pytestmark = pytest.mark.slow
+BROWSERS = ["chromium", "firefox"] if "MJSIM_ALL_CONDITIONS" in os.environ else ["chromium"]
+TITLE = "document.querySelector('h1')?.textContent"
 
 
 @pytest.fixture
@@ -30,12 +34,29 @@ def log_in(page, site):
     page.get_by_role("heading", name="Overview").wait_for()
 
 
-@pytest.mark.parametrize("look", [DESK, PHONE])
-def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look):
+def consented(site):
+    """Link of somebody whose next phase is the task."""
     with site.client() as client:
         link = site.begin(client)
         client.post(link, data={"phase": "consent", "agree": "yes"})
         assert phase_of(client, link) == "task"
+    return link
+
+
+@contextmanager
+def reading(site, link):
+    """Socket of somebody who reads the instructions of the task."""
+    address = site.url.replace("http", "ws", 1).rstrip("/") + link
+    with connect(address, origin=site.url.rstrip("/"), close_timeout=1) as socket:
+        socket.send(json.dumps(hello("task")))
+        while json.loads(socket.recv(timeout=60)).get("phase") != "ready":
+            pass
+        yield socket
+
+
+@pytest.mark.parametrize("look", [DESK, PHONE])
+def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look):
+    link = consented(site)
     page = chromium.new_context(**look).new_page()
     page.goto(site.researcher_url)
     found = violations(page)
@@ -52,11 +73,7 @@ def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look):
         page.get_by_role("link", name=name).press("Enter")
         page.get_by_role("heading", name=name).wait_for()
         found += violations(page)
-    address = site.url.replace("http", "ws", 1).rstrip("/") + link
-    with connect(address, origin=site.url.rstrip("/"), close_timeout=1) as socket:
-        socket.send(json.dumps(hello("task")))
-        while json.loads(socket.recv(timeout=60)).get("phase") != "ready":
-            pass
+    with reading(site, link) as socket:
         page.goto(f"{site.researcher_url}people/1")
         found += violations(page)
         page.get_by_role("link", name="Watch").press("Enter")
@@ -71,13 +88,26 @@ def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look):
     assert found == []
 
 
-def test_numbers_change_by_themselves_and_all_works_without_scripts(site, chromium):
-    page = chromium.new_page()
-    log_in(page, site)
-    assert page.locator("#statuses dd").first.inner_text() == "0"
-    with site.client() as client:
-        site.begin(client)
-    page.locator("#statuses dd").first.get_by_text("1").wait_for()
+@pytest.mark.parametrize("browser", BROWSERS)
+def test_numbers_change_by_themselves_and_a_session_is_watched(site, request, browser):
+    page = request.getfixturevalue(f"{browser}_page")
+    page.goto(site.researcher_url)
+    page.wait_for(f"{TITLE} === 'Log in'")
+    for key in (*"owner", "Tab", *PASSWORD, "Enter"):
+        page.hold(key)
+    page.wait_for(f"{TITLE} === 'Overview'")
+    counted = "[...document.querySelectorAll('#statuses dd')].some((count) => count.textContent === '1')"
+    assert not page.evaluate(counted)
+    link = consented(site)
+    page.wait_for(counted)
+    with reading(site, link):
+        page.goto(f"{site.researcher_url}people/1/watch")
+        page.wait_for("document.body.textContent.includes('reads the instructions')")
+    assert page.faults == []
+
+
+def test_all_works_without_scripts(site, chromium):
+    consented(site)
     plain = chromium.new_context(java_script_enabled=False).new_page()
     log_in(plain, site)
     plain.get_by_role("button", name="Pause").press("Enter")
