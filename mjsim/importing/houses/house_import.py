@@ -27,6 +27,7 @@ from mjsim.importing.houses.rooms import find_rooms, read_rooms, words_of
 from mjsim.importing.houses.sdf import SUFFIXES as SDF
 from mjsim.importing.houses.sdf import read_sdf
 from mjsim.importing.houses.solids import HIGH, LOW, Solids, make_solids
+from mjsim.importing.houses.storey import FAR, counted, floor_and_ceiling, near_pieces, of_one_storey
 from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, left_out, moved
 from mjsim.importing.houses.writer import ImportedHouse, set_points, write_house
 from mjsim.importing.model_writer import write_png
@@ -35,18 +36,10 @@ from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.validation.findings import Finding, errors
-from mjsim.model.validation.object_rules import SIZE
 from mjsim.model.validation.report import Report, check_house_name
 
 REPORT, PICTURE = "report.json", "preview.png"
-_STOREY = 2.1  # m above a floor, from where on another floor is another storey
-_LEVEL = 0.4  # share of the largest level that a floor has at least
-_BIN, _STEP = 0.02, 0.3  # m: resolution of heights; what lies on the lowest area within a step is the floor
-_UPWARD = 0.2  # share of level surfaces that face up, from where on only these count
-_FLAT = 0.95  # cosine of the slope of a floor
 _FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself
-_FAR = 200.0  # m; what spans more is in no unit of a house
-_MOST = 0.9  # share of the pieces that are near each other, from where on the others are left out
 _FEW = 4  # things that stand about, fewer than which are no house where there are no walls
 _DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # m: thickness at most, width and height of a door leaf
 
@@ -134,17 +127,17 @@ def _converted(
 ) -> tuple[ImportedHouse, list[ImportDecision]]:
     if (count := sum(len(piece.surface) for piece in scene.pieces)) > MAX_TRIANGLES:
         raise AssetError(f"has {count:,} triangles; reduce it to {MAX_TRIANGLES:,} or fewer")
-    near, far = _near(scene.pieces)
-    level, ceiling = _levels(near) if options.floor is None else (options.floor, np.inf)
+    near, far = near_pieces(scene.pieces)
+    level, ceiling = floor_and_ceiling(near) if options.floor is None else (options.floor, np.inf)
     pieces = moved(near, translation_matrix([0, 0, -level]))
     decisions = [
-        ImportDecision("source", source.name, f"{scene.kind}, {_counted(len(pieces), 'shape')}"),
+        ImportDecision("source", source.name, f"{scene.kind}, {counted(len(pieces), 'shape')}"),
         ImportDecision(
             "floor", f"z = {level:.3f} m", "the lowest large level area" if options.floor is None else "given"
         ),
     ]
     decisions += [*scene.notes, *far]
-    pieces, notes = _kept(pieces, ceiling - level)
+    pieces, notes = of_one_storey(pieces, ceiling - level)
     decisions += notes
     _check_span(pieces)
     doors = [piece for piece in pieces if _is_door(piece)]
@@ -186,7 +179,7 @@ def _converted(
     decisions += [
         ImportDecision(
             "collision",
-            f"{_counted(len(solids.solids), 'convex geom')}",
+            f"{counted(len(solids.solids), 'convex geom')}",
             f"{solids.boxes} boxes, {solids.hulls} hulls, {solids.voxels} boxes of {100 * solids.pitch:g} cm voxels",
         ),
         ImportDecision(
@@ -200,7 +193,7 @@ def _converted(
             ", ".join(f"{b.key} in {b.room}" for b in bins),
             "of the source" if bins is given_bins else "against walls, ways stay open",
         ),
-        ImportDecision("look", _counted(triangles, "triangle"), f"{len(looks)} meshes, {pictures} pictures"),
+        ImportDecision("look", counted(triangles, "triangle"), f"{len(looks)} meshes, {pictures} pictures"),
         ImportDecision(
             "drawn floor",
             "of the source" if house.floor_seen else "added",
@@ -210,83 +203,12 @@ def _converted(
     return house, decisions
 
 
-def _near(pieces: Sequence[Piece]) -> tuple[list[Piece], list[ImportDecision]]:
-    """Pieces without the few that lie far off, such as what fell through the floor of a simulation."""
-    middles = np.array([piece.surface.corners.mean(axis=(0, 1)) for piece in pieces])
-    near = np.abs(middles - np.median(middles, axis=0)).max(axis=1) < _FAR
-    if near.all() or near.mean() < _MOST:
-        return list(pieces), []
-    names = sorted({piece.name for piece, is_near in zip(pieces, near, strict=True) if not is_near})
-    kept = [piece for piece, is_near in zip(pieces, near, strict=True) if is_near]
-    return kept, [left_out(", ".join(names[:6]), f"more than {_FAR:g} m away")]
-
-
-def _levels(pieces: Sequence[Piece]) -> tuple[float, float]:
-    """Height of the floor, and of the floor of the storey above it, m; infinite where there is none."""
-    corners = np.concatenate([p.surface.corners for p in pieces])
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    area = np.linalg.norm(normals, axis=1)
-    flat = np.abs(normals[:, 2]) > _FLAT * np.maximum(area, 1e-12)
-    upward = flat & (normals[:, 2] > 0)
-    if area[upward].sum() > _UPWARD * area[flat].sum():
-        flat = upward  # of a slab, what one stands on
-    heights = corners[flat, :, 2].mean(axis=1)
-    if not len(heights):
-        raise AssetError("has no level surface; is it a house, and which way is up (--up)?")
-    bins = np.round(heights / _BIN).astype(int)
-    first = bins.min()
-    total = np.bincount(bins - first, area[flat])
-    wide = np.convolve(total, np.ones(3))[1:-1]
-    levels = np.flatnonzero(wide >= _LEVEL * wide.max())
-    near_ground = levels[levels <= levels[0] + round(_STEP / _BIN)]  # ground, slab and floor are often layers
-    lowest = near_ground[np.argmax(total[near_ground])] if np.ptp(near_ground) <= 2 else near_ground[-1]
-    if (lowest + first) * _BIN >= corners[:, :, 2].max() - LOW:  # walls without a floor: these are their tops
-        return float(corners[:, :, 2].min()), np.inf
-    near = np.abs(bins - first - lowest) <= 1
-    order = np.argsort(heights[near])
-    share = np.cumsum(area[flat][near][order])
-    floor = float(heights[near][order][np.searchsorted(share, share[-1] / 2)])  # the median of the area
-    above = [height for height in (levels + first) * _BIN if height > floor + _STOREY]
-    return floor, (min(above) if above else np.inf)
-
-
-def _kept(pieces: list[Piece], ceiling: float) -> tuple[list[Piece], list[ImportDecision]]:
-    """Pieces without what a hand carries, and without what is above a height, m, or below the floor."""
-    kept, loose = [], []
-    dropped = 0
-    for piece in pieces:
-        corners = piece.surface.corners
-        longest = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-        if piece.loose and longest <= SIZE[1]:
-            loose.append(piece.name)
-            continue
-        stays = (corners[:, :, 2].min(axis=1) <= ceiling + 0.05) & (corners[:, :, 2].max(axis=1) > -0.3)
-        dropped += int((~stays).sum())
-        if stays.any():
-            kept.append(Piece(piece.name, piece.surface.select(stays), piece.seen, piece.solid))
-    notes = []
-    if loose:
-        names = sorted(set(loose))
-        notes.append(
-            ImportDecision(
-                "loose things",
-                f"{len(names)} left out",
-                f"{', '.join(names[:6])}{', ...' if len(names) > 6 else ''}: use mjsim import object for those",
-            )
-        )
-    if dropped:
-        notes.append(
-            ImportDecision("other storeys", f"{_counted(dropped, 'triangle')} left out", "one storey is kept")
-        )
-    return kept, notes
-
-
 def _check_span(pieces: Sequence[Piece]) -> None:
     """`AssetError` where what stands there is far larger than a house: in voxels it would not fit the memory."""
     standing = [p.surface.corners.reshape(-1, 3) for p in pieces if p.solid]
     high = [corners for corners in standing if corners[:, 2].max() > LOW and corners[:, 2].min() < HIGH]
     sides = np.ptp(np.concatenate(high)[:, :2], axis=0) if high else np.zeros(2)
-    if sides.max() > _FAR:
+    if sides.max() > FAR:
         raise too_large(sides)
 
 
@@ -327,7 +249,3 @@ def _write_picture(catalogue: Path, out: Path) -> ImportDecision | None:
     except (RenderError, AssetError) as error:
         return ImportDecision("picture", "none", str(error))
     return None
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number:,} {what}{'' if number == 1 else 's'}"
