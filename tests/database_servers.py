@@ -2,16 +2,16 @@
 
 import os
 import pwd
-import random
 import shutil
 import signal
-import socket
 import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
+
+from benchmarks.support.ports import free_ports, listens
 
 PLACES = [
     *os.get_exec_path(),
@@ -50,7 +50,7 @@ class Server:
         """Start it, again if what was killed is still going, until it answers."""
         port = int(self.url.rpartition(":")[2])
         end = time.monotonic() + PATIENCE_S
-        while not (self._running() and _answers(port) and not subprocess.run(self._ready).returncode):
+        while not (self._running() and listens(port) and not subprocess.run(self._ready).returncode):
             if time.monotonic() > end:
                 raise RuntimeError(
                     f"{self._command[0]} does not start:\n{(self._folder / 'log').read_text()}"
@@ -90,7 +90,7 @@ class Server:
 def mariadb(place: Path | None = None) -> Iterator[Server]:
     """A running MariaDB, with its data in a new folder at a place."""
     with _folder("mysql", place) as (folder, user):
-        port = _free_port()
+        (port,) = free_ports(1)
         data = f"--datadir={folder / 'data'}"
         _run([_program("mariadb-install-db"), "--no-defaults", data, "--skip-test-db"], folder, user)
         (folder / "init.sql").write_text(
@@ -111,7 +111,7 @@ def mariadb(place: Path | None = None) -> Iterator[Server]:
 def postgresql(place: Path | None = None) -> Iterator[Server]:
     """A running PostgreSQL, with its data in a new folder at a place."""
     with _folder("postgres", place) as (folder, user):
-        port = _free_port()
+        (port,) = free_ports(1)
         data = str(folder / "data")
         _run([_program("initdb"), "-D", data, "-A", "trust", "-U", "study", "-E", "UTF8"], folder, user)
         command = [_program("postgres"), "-D", data, "-p", str(port), "-c", "listen_addresses=127.0.0.1"]
@@ -150,19 +150,6 @@ def _running(server: Server) -> Iterator[Server]:
         yield server
     finally:
         server.stop()
-
-
-def _answers(port: int) -> bool:
-    with closing(socket.socket()) as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
-
-
-def _free_port() -> int:
-    """A port that no client gets: a server that is started again must find it free."""
-    while True:
-        port = random.randrange(15_000, 32_000)  # Linux gives clients those from 32768
-        if not _answers(port):
-            return port
 
 
 def _run(command: list[str], folder: Path, user: str | None) -> None:

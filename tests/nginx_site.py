@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.support.play_hostile import NGINX, listens
+from benchmarks.support.play_hostile import NGINX
 from benchmarks.support.play_server import PATIENCE
+from benchmarks.support.ports import listens
 
 DEPLOY = Path(__file__).parents[1] / "deploy"
 STUDY = """

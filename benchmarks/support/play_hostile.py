@@ -4,11 +4,10 @@ import asyncio
 import json
 import multiprocessing
 import shutil
-import socket
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from websockets.exceptions import WebSocketException
 
 from benchmarks.support.play_browser import SimulatedBrowser
 from benchmarks.support.play_server import PATIENCE, TASK_ALONE, PlayProcess
+from benchmarks.support.ports import free_ports, listens
 from experiments.record.phases import TASK
 from experiments.web.protocol import MAX_INPUTS
 
@@ -70,21 +70,6 @@ def _nginx(folder: Path, port: int, server: int) -> Iterator[None]:
     finally:
         process.terminate()
         process.wait()
-
-
-def listens(port: int) -> bool:
-    """Whether a port of this machine takes connections."""
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
-
-
-def free_ports(number: int) -> list[int]:
-    """Ports of this machine that are free now."""
-    with ExitStack() as stack:
-        probes = [stack.enter_context(socket.socket()) for _ in range(number)]
-        for probe in probes:
-            probe.bind(("127.0.0.1", 0))
-        return [int(probe.getsockname()[1]) for probe in probes]
 
 
 async def _watch(server: PlayProcess, number: int, seconds: float) -> dict[str, Any]:

@@ -18,8 +18,8 @@ from scripted_workers import hello
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from benchmarks.support.play_hostile import free_ports
 from benchmarks.support.play_server import PATIENCE
+from benchmarks.support.ports import free_ports
 from experiments.cli.main import parser
 
 

@@ -12,8 +12,8 @@ from scripted_workers import hello
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from benchmarks.support.play_hostile import free_ports
 from benchmarks.support.play_server import PATIENCE, PlayProcess
+from benchmarks.support.ports import free_ports
 from experiments.people.store import Store, utc_now
 from experiments.people.store.hosts import SILENT
 from experiments.web.server.visits import token_hash

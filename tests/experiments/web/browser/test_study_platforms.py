@@ -13,8 +13,9 @@ from contextlib import nullcontext
 import pytest
 from nginx_site import make_certificate, nginx_before
 
-from benchmarks.support.play_hostile import NGINX, free_ports, listens
+from benchmarks.support.play_hostile import NGINX
 from benchmarks.support.play_server import PATIENCE
+from benchmarks.support.ports import free_ports, listens
 from tests.experiments.people.platforms.emulator import SECRET
 from tests.experiments.people.platforms.external_question import ExternalQuestion
 from tests.experiments.people.platforms.prolific import STUDY as PROLIFIC_STUDY
