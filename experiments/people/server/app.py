@@ -27,7 +27,7 @@ from experiments.people.server.keys import Keys
 from experiments.people.server.pages import StudyPages
 from experiments.people.server.procedure import Now, Procedure
 from experiments.people.server.trials import Trials
-from experiments.people.store import Person
+from experiments.people.store import Assignment, Person
 from experiments.web.server.form import sent_form
 from experiments.web.server.guards import Guards, Network, allowed_hosts
 from experiments.web.server.meter import Meter
@@ -226,14 +226,20 @@ class StudyServer:
         return self._pages.phase(request, now, identity, refused)
 
     async def _played(self, request: Request, now: Now) -> Response:
-        visit = await self._procedure.visit(now.person, request.path_params["token"])
-        if visit is None:
-            person = await self._procedure.turn_away(now.person)
-            return self._pages.left(request, person)
-        if (queued := self._trials.queued(visit)) is not None:
-            await self._store.beat(now.person.id)  # who waits is there
+        token, person = request.path_params["token"], now.person
+        begun = self._procedure.visits.find(token)  # a small file, read once: a thread would take longer
+        here = begun or await self._procedure.assign(person)
+        if here is None:
+            return self._pages.left(request, await self._procedure.turn_away(person))
+        if (queued := self._trials.queued(person.token_hash)) is not None:
+            if begun:
+                await self._store.beat(
+                    person.id
+                )  # who waits is there; to be assigned a place says so as well
             return self._pages.queue(request, now, queued)
-        return self._trials.page(request, visit)
+        if isinstance(here, Assignment):
+            here = await self._procedure.begin_playing(person, here, token)
+        return self._trials.page(request, here)
 
     async def _out_of_order(self, request: Request, error: Exception) -> Response:
         LOG.error("%s", error)

@@ -103,19 +103,18 @@ class Procedure:
         if drafts := current.drafts(sent):
             await self.store.save_answers(now.person.id, phase, drafts)
 
-    async def visit(self, person: Person, token: str) -> Visit | None:
-        """The visit in which a person plays, begun with the first phase that is played; None if all cells are full."""
-        visit = self.visits.find(token)  # a small file, read once: a thread would take longer
-        if visit is not None:
-            return visit
-        assignment = await self._assign(person)
-        if assignment is None:
-            return None
+    async def assign(self, person: Person) -> Assignment | None:
+        """The place of a person who has not begun to play; a sign of life as well. None if all cells are full."""
+        trials = (cell.trials for cell in self.study.cells)
+        quotas = [CellQuota(len(each), [trial.house_seed for trial in each]) for each in trials]
+        rule = self.study.settings.assignment
+        return await self.store.assign(person.id, quotas, rule, self._rng, abandoned_after=self._away)
+
+    async def begin_playing(self, person: Person, place: Assignment, token: str) -> Visit:
+        """Start the visit in which a person plays, with the first phase that is played."""
         ended = await self._before_playing(person)
-        trials = self._trials(assignment)
         played = [name for name in self._names if name in PLAYED]
-        await asyncio.to_thread(self.visits.create, played, trials, ended, token)
-        return self.visits.find(token)
+        return await asyncio.to_thread(self.visits.create, token, played, self._trials(place), ended)
 
     async def withdraw(self, person: Person, *, delete: bool) -> None:
         """Let a person leave."""
@@ -137,12 +136,6 @@ class Procedure:
     @property
     def _away(self) -> datetime.timedelta:
         return datetime.timedelta(seconds=self.study.settings.limits.abandoned_after)
-
-    async def _assign(self, person: Person) -> Assignment | None:
-        trials = (cell.trials for cell in self.study.cells)
-        quotas = [CellQuota(len(each), [trial.house_seed for trial in each]) for each in trials]
-        rule = self.study.settings.assignment
-        return await self.store.assign(person.id, quotas, rule, self._rng, abandoned_after=self._away)
 
     def _trials(self, place: Assignment) -> Mapping[str, dict[str, Any]]:
         task = msgspec.structs.replace(

@@ -71,11 +71,11 @@ class Trials:
         self._usual = 60.0 * settings.minutes  # of the whole study, until trials have ended
         self._sockets: Counter[int] = Counter()  # by person
 
-    def queued(self, visit: Visit) -> Queued | None:
-        """Where a visit is in the queue; None if its trial may run."""
+    def queued(self, visit: str) -> Queued | None:
+        """Where a visit is in the queue, by its name; None if its trial may run."""
         wait = self._limit.expected_wait(self._limit.waiting + 1, self._usual)
         refresh = min(max(REFRESH[0], wait / 10.0), REFRESH[1])
-        position = self._limit.ask(visit.name, PATIENCE * refresh)
+        position = self._limit.ask(visit, PATIENCE * refresh)
         if position is None:
             return None
         return Queued(position, self._limit.expected_wait(position, self._usual), refresh)

@@ -32,7 +32,7 @@ from experiments.web.server.readings import Readings
 from experiments.web.server.scene_files import scene_route
 from experiments.web.server.sessions import Sessions
 from experiments.web.server.static_files import static_routes
-from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, following, token_hash
+from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, following, new_token, token_hash
 from mjsim.scene_export.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.play")
@@ -152,8 +152,9 @@ class PlayServer:
             return self._story_page(request, opened if reading else self._readings.open(), after, note)
         ended = [self._ended(reading)] if STORY in self._config.phases else []
         trials = await run_in_threadpool(self._trials, after)
-        token = await run_in_threadpool(self._visits.create, phases, trials, ended)
-        LOG.info("session %s begins", token_hash(token)[:12])
+        token = new_token()
+        visit = await run_in_threadpool(self._visits.create, token, phases, trials, ended)
+        LOG.info("session %s begins", visit.name[:12])
         return RedirectResponse(f"/play/{token}", 303)
 
     def _trials(self, after: str) -> Mapping[str, dict[str, Any]]:

@@ -28,6 +28,7 @@ _templates = Jinja2Templates(CLIENT / "templates")
 _templates.env.filters["duration"] = _duration
 _templates.env.globals.update(modules=_modules, static=static_url)
 _templates.env.trim_blocks = True
+_templates.env.auto_reload = False  # would look at the file for each page
 
 
 def page(request: Request, name: str, status: int = 200, **values: Any) -> Response:

@@ -147,25 +147,24 @@ class Visits:
 
     def create(
         self,
+        token: str,
         phases: Sequence[str],
         trials: Mapping[str, dict[str, Any]],
         ended: Sequence[Ended] = (),
-        token: str | None = None,
-    ) -> str:
-        """Start a visit with the phases to come, settings of their trials, and phases that are over; its token.
+    ) -> Visit:
+        """Start a visit with the phases to come, settings of their trials, and phases that are over.
 
         Where there is a visit with `token`, it stays as it is.
         """
-        token = token or new_token()
         folder = self.folder / token_hash(token)
-        if self.named(folder.name) is not None:
-            return token
+        if (known := self.named(folder.name)) is not None:
+            return known
         folder.mkdir(0o700, exist_ok=True)
         visit = Visit(folder, _Stored(phases[0], list(phases), dict(trials), list(ended)))
         visit._save()
         sync_folder(self.folder)
         self._known[visit.name] = visit
-        return token
+        return visit
 
     def remove(self, name: str) -> None:
         """Delete a visit with all that was played in it."""

@@ -34,7 +34,7 @@ from experiments.web.server.app import PlayConfig, PlayServer
 from experiments.web.server.guards import Guards, allowed_hosts
 from experiments.web.server.played_session import MAX_CRASHES
 from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
-from experiments.web.server.visits import VISIT, Visits, token_hash
+from experiments.web.server.visits import VISIT, Visits, new_token, token_hash
 from experiments.web.state import PAUSED
 
 TASK = TrialConfig(objects=6, assistance="optimal", seed=0, user="human", live=True).settings()
@@ -666,9 +666,9 @@ def test_a_closed_page_keeps_no_place_from_those_who_wait(tmp_path, monkeypatch,
 
 
 def test_a_damaged_visit_is_named_in_the_log_only(client, tmp_path, caplog):
-    token = Visits(tmp_path).create(["training", "task"], TRIALS)
-    path = tmp_path / token_hash(token) / VISIT
-    path.write_text("{")
+    token = new_token()
+    visit = Visits(tmp_path).create(token, ["training", "task"], TRIALS)
+    (tmp_path / visit.name / VISIT).write_text("{")
     answer = client.get(f"/play/{token}")
     assert answer.status_code == 500 and str(tmp_path) not in answer.text
     assert "is damaged" in caplog.text
