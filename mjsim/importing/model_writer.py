@@ -116,7 +116,7 @@ def look_lines(look: Look) -> Iterator[str]:
 
 def write_png(path: Path, rgb: NDArray[np.uint8]) -> None:
     """Write a picture, RGB, shape (height, width, 3)."""
-    done, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    done, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 4])
     if not done:
         raise AssetError(f"the picture {path} cannot be encoded as PNG")
     path.write_bytes(data.tobytes())

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from mjsim.errors import AssetError
@@ -33,6 +34,9 @@ _HOMES = {
 }
 # Turns about z and the way that the back then points.
 _TURNS = ((0.0, (0, 1)), (math.pi, (0, -1)), (math.pi / 2, (-1, 0)), (-math.pi / 2, (1, 0)))
+
+
+Span = tuple[int, int]  # cells from, to, the end not included
 
 
 @dataclass(frozen=True)
@@ -109,44 +113,40 @@ def _choices(plan: Plan, room: Mask, size: _Size, rng: np.random.Generator) -> l
     """Places in a room with the back to a wall, in random order."""
     free = plan.free & room
     standing = plan.walkable & room
-    found = []
+    walls = (plan.walls & ~plan.doors) | ~plan.indoors  # where the shell closes it
+    ahead = round(_STAND / CELL)
+    found: list[_Choice] = []
     for yaw, back in _TURNS:
-        along = back[0] != 0  # whether the depth lies along x
-        sides = np.ceil(np.array([size.width + 2 * _ASIDE, size.depth]) / CELL).astype(int)
-        nx, ny = (sides[::-1] if along else sides).tolist()
-        clear = _all(free, nx, ny)
-        walls = (plan.walls & ~plan.doors) | ~plan.indoors  # where the shell closes it
+        sides = np.ceil(np.array([size.width + 2 * _ASIDE, size.depth]) / CELL).astype(int).tolist()
+        spans = [(0, side) for side in (sides[::-1] if back[0] else sides)]
+        edge = [_last(span, way) for span, way in zip(spans, back, strict=True)]
+        before = [_beyond(span, -way, ahead) for span, way in zip(spans, back, strict=True)]
         behind = np.zeros_like(walls)
         for step in range(1, round(_WALL / CELL) + 1):
             behind |= _shifted(walls, back, step)  # cells with a wall that near behind them
-        ahead = round(_STAND / CELL)
-        for i, j in np.argwhere(clear).tolist():
-            cells = (slice(i, i + nx), slice(j, j + ny))
-            edge = (slice(i + nx - 1, i + nx) if back[0] > 0 else slice(i, i + 1), cells[1]) if along else (
-                cells[0], slice(j + ny - 1, j + ny) if back[1] > 0 else slice(j, j + 1)
-            )  # fmt: skip
-            if not behind[edge].all():
-                continue
-            before = _before(cells, back, ahead)
-            if (
-                before[0].start < 0
-                or before[1].start < 0
-                or not free[before].all()
-                or not standing[before].any()
-            ):
-                continue
-            found.append(_Choice(cells, before, yaw, back))
+        fits = _all(free, spans) & _all(behind, edge) & _all(free, before) & (_count(standing, before) > 0)
+        found += [
+            _Choice(_at(spans, place), _at(before, place), yaw, back) for place in np.argwhere(fits).tolist()
+        ]
     order = rng.permutation(len(found))[:_TRIES]
     return [found[k] for k in order]
 
 
-def _before(cells: tuple[slice, slice], back: tuple[int, int], ahead: int) -> tuple[slice, slice]:
-    """Cells before a bin, on the side away from its back."""
-    x, y = cells
-    if back[0]:
-        x = slice(x.start - ahead, x.start) if back[0] > 0 else slice(x.stop, x.stop + ahead)
-    else:
-        y = slice(y.start - ahead, y.start) if back[1] > 0 else slice(y.stop, y.stop + ahead)
+def _last(span: Span, way: int) -> Span:
+    """The last cell of a span on a way, up or down; all of it across."""
+    start, stop = span
+    return {1: (stop - 1, stop), 0: span, -1: (start, start + 1)}[way]
+
+
+def _beyond(span: Span, way: int, cells: int) -> Span:
+    """So many cells beyond a span on a way, up or down; the span itself across."""
+    start, stop = span
+    return {1: (stop, stop + cells), 0: span, -1: (start - cells, start)}[way]
+
+
+def _at(spans: Sequence[Span], place: Sequence[int]) -> tuple[slice, slice]:
+    """Spans as cells of the grid, seen from a place."""
+    x, y = (slice(at + start, at + stop) for at, (start, stop) in zip(place, spans, strict=True))
     return x, y
 
 
@@ -185,13 +185,20 @@ def _origin(plan: Plan, size: _Size, choice: _Choice) -> tuple[float, float, flo
     return float(middle[0] - cos * x + sin * y), float(middle[1] - sin * x - cos * y), choice.yaw
 
 
-def _all(mask: Mask, nx: int, ny: int) -> Mask:
-    """Cells that are the first of nx by ny cells of a mask."""
+def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
+    """How many cells of a mask are within two spans, seen from each cell."""
     total = np.pad(np.cumsum(np.cumsum(mask, axis=0), axis=1), ((1, 0), (1, 0)))
-    sums = total[nx:, ny:] - total[:-nx, ny:] - total[nx:, :-ny] + total[:-nx, :-ny]
-    found = np.zeros_like(mask)
-    found[: sums.shape[0], : sums.shape[1]] = sums == nx * ny
-    return found
+    (a, b), (c, d) = (
+        [np.clip(np.arange(side) + end, 0, side) for end in span]
+        for side, span in zip(mask.shape, spans, strict=True)
+    )
+    return np.asarray(total[b][:, d] - total[a][:, d] - total[b][:, c] + total[a][:, c])
+
+
+def _all(mask: Mask, spans: Sequence[Span]) -> Mask:
+    """Cells from which all cells within two spans are in a mask."""
+    (a, b), (c, d) = spans
+    return np.asarray(_count(mask, spans) == (b - a) * (d - c))
 
 
 def _shifted(mask: Mask, by: tuple[int, int], steps: int) -> Mask:
