@@ -25,7 +25,8 @@ DELAY = 0.2  # s that the first messages of a bad connection take
 CUTS = 3  # of a bad connection in a trial
 TRIES = 20  # connections to a trial, or sendings of a form, before somebody gives up
 QUEUED = 'http-equiv="refresh"'  # of the page of somebody who waits for a place
-PAUSE = 0.5  # s between two of them
+QUEUE_PAUSE = 3.0  # s between two looks at it
+PAUSE = 0.5  # s before the next connection to a trial
 
 
 @dataclass
@@ -94,7 +95,7 @@ class Person:
         while tries < TRIES:
             page = await self._get(self.rehearsed.link)
             if QUEUED in page.text:
-                await asyncio.sleep(PAUSE)
+                await asyncio.sleep(QUEUE_PAUSE)
                 continue
             found = SHOWN.search(page.text)
             if found is None:

@@ -24,7 +24,6 @@ SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "serve
 WORKERS = "20"  # trials at a time; in a hurry, they need not be on time
 END_TIMEOUT = 60.0  # s that the server has to end
 HTTP_TIMEOUT = 120.0  # s
-KEEP_ALIVE = 2.0  # s, less than the server keeps a connection
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -136,7 +135,8 @@ async def _send(
     parameters = {name: own.get(name, "") for name in platform.parameters}
     phases = {phase.name: phase for phase in phases_of_study(study)}
     house = House.load(study.cells[0].trial(0).house)
-    limits = httpx.Limits(max_connections=None, keepalive_expiry=KEEP_ALIVE)
+    # Each request on a connection of its own: a pool looks at all that it keeps before each one.
+    limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
     async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
         around = Surroundings(
             base, client, phases, house, parameters, study.settings.minimum, settings.factor

@@ -66,9 +66,9 @@ def preload(name: str) -> None:
         _begin(scene_files, loaded)
         with get_context("fork").Pool(1) as drawing:
             drawn = drawing.apply_async(render_pictures, (loaded.catalogue,))
-            warmup.plan()
-            warmup.act(loaded)
+            warmup.compile_kernels(loaded)  # a little of each trial also leaves hashes and versions in memory
             _pictures[name] = drawn.get(DRAWING_TIMEOUT)
+        encoded_pictures(name, False)
     gc.freeze()  # collecting garbage would copy what is shared
 
 
