@@ -63,8 +63,8 @@ def _mjcf(item: ImportedObject, key: str, label: str, source: str) -> str:
     corner = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return _MJCF.format(
         key=key,
-        label=_comment(label),
-        source=_comment(source),
+        label=comment(label),
+        source=comment(source),
         friction=_ROLLING if item.rolls else "1 0.02 0.002",
         assets="\n".join(f"    {line}" for line in _assets(item, key)),
         centre=_numbers(weight.centre),
@@ -126,6 +126,6 @@ def _numbers(values: Floats) -> str:
     return " ".join(f"{value:.6g}" for value in np.round(values, 7) + 0.0)
 
 
-def _comment(text: str) -> str:
+def comment(text: str) -> str:
     """Text as it may stand in an XML comment."""
     return text.replace("--", "- -").replace("&", "and").replace("<", "(").replace(">", ")")

@@ -12,7 +12,8 @@ from trimesh.transformations import quaternion_matrix, scale_matrix
 
 from mjsim.errors import AssetError
 from mjsim.files import read_json, read_text
-from mjsim.importing.houses.meshes import GLTF, Y_TO_Z, read_parts
+from mjsim.importing.houses.meshes import GLTF, SUFFIXES, Y_TO_Z, read_parts
+from mjsim.importing.houses.plan import MAX_SIDE, unit_of
 from mjsim.importing.houses.rooms import boxes_of
 from mjsim.importing.houses.values import (
     Bin,
@@ -30,8 +31,6 @@ from mjsim.importing.values import UNITS, ImportDecision
 INSTANCE = ".scene_instance.json"
 SEMANTICS = ".semantic_config.json"
 RECEPTACLE = "mjsim_receptacle"  # of a template's user_defined: the key of a bin of ours
-_SIDE = (3.0, 60.0)  # m, longest sides that houses have
-_MESHES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".dae")
 
 
 def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
@@ -50,8 +49,8 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
     elif known and given == ("z" if path.suffix.lower() in GLTF else "y"):
         frame = np.linalg.inv(Y_TO_Z) if up == "z" else Y_TO_Z
     unit, longest = options.units, float(sides.max())
-    if unit is None and (not known or longest > _SIDE[1]):  # many glTF files are not in metres
-        unit = next((u for u, m in UNITS.items() if _SIDE[0] <= longest * m <= _SIDE[1]), "m")
+    if unit is None and (not known or longest > MAX_SIDE):  # many glTF files are not in metres
+        unit = unit_of(longest) or "m"
         notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
     frame = scale_matrix(UNITS[unit or "m"] * options.scale) @ frame
     pieces = tuple(Piece(name, surface.moved(frame)) for name, surface in parts)
@@ -98,7 +97,7 @@ class _Habitat:
         self.bins: list[Bin] = []
         root = path.resolve().parent.parent
         self._files = {
-            p.name: p for p in sorted(root.rglob("*")) if p.name.endswith(("_config.json", *_MESHES))
+            p.name: p for p in sorted(root.rglob("*")) if p.name.endswith(("_config.json", *SUFFIXES))
         }
 
     def rooms(self, name: str) -> tuple[NamedRoom, ...]:
@@ -169,7 +168,7 @@ class _Habitat:
         """The file of an asset, beside its template or elsewhere in the data set; None where it is not there."""
         mesh = (config or self._path).parent / asset
         found = mesh if mesh.is_file() else self._files.get(Path(asset).name)
-        return found if found and found.name.endswith(_MESHES) else None
+        return found if found and found.name.endswith(SUFFIXES) else None
 
 
 def _read(path: Path) -> dict[str, Any]:

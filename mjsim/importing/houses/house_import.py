@@ -61,7 +61,7 @@ def import_house(
     try:
         house, decisions = _converted(scene, source, options, label)
     except AssetError as error:
-        raise AssetError(f"{source}: {error}{_without(scene)}") from error
+        raise AssetError(f"{source}: {_without(scene)}{error}") from error
     out.parent.mkdir(parents=True, exist_ok=True)
     with work_folder(out.parent) as work:
         new = work / "new"
@@ -91,7 +91,7 @@ def import_house(
 def _without(scene: SourceScene) -> str:
     """What may be why a house cannot be made: what the scene lacks."""
     lacking = [note for note in scene.notes if note.choice.endswith(" missing")]
-    return "".join(f"; {note.choice}, and left out: {note.reason}" for note in lacking)
+    return "".join(f"{note.choice} ({note.reason}), and what is left " for note in lacking)
 
 
 def _refusal(found: Sequence[Finding]) -> str:

@@ -16,7 +16,7 @@ from mjsim.importing.values import UNITS
 
 CELL = 0.05  # m
 BODY = 0.27  # m, radius of a person with a little air
-MAX_SIDE = 60.0  # m, of a house
+MIN_SIDE, MAX_SIDE = 3.0, 60.0  # m, longest sides that houses have
 _MAX_AREA = 1500.0  # m^2 that can be walked on
 _BAND = (0.05, 1.8)  # m, heights at which a person bumps into things
 _WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # m; what is at all these heights is a wall
@@ -123,18 +123,26 @@ def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) ->
         )
     if plan.area < 1.0:
         raise AssetError(
-            "leaves nowhere to walk: its walls enclose no floor, or what stands there fills it; "
-            "is the unit right (--units), and which way is up (--up)?"
+            f"leaves nowhere to walk on {_metres(high - low)}: its walls enclose no floor, or what stands there fills "
+            "it; is the size right (--units, --scale), and which way is up (--up)?"
         )
     return plan
 
 
 def too_large(sides: Floats) -> AssetError:
     """The error about a scene with such sides (2,), m, with the unit in which it would be a house."""
-    said = " x ".join(f"{side:.4g}" for side in sides)
-    unit = next((u for u, metres in UNITS.items() if 3.0 <= sides.max() * metres <= MAX_SIDE), None)
+    unit = unit_of(float(sides.max()))
     advice = "give its unit by --units, or --scale" if unit is None else f"try --units {unit}"
-    return AssetError(f"spans {said} m, and houses have at most {MAX_SIDE:g} m; {advice}")
+    return AssetError(f"spans {_metres(sides)}, and houses have at most {MAX_SIDE:g} m; {advice}")
+
+
+def unit_of(longest: float) -> str | None:
+    """The unit in which a longest side is that of a house; None without any."""
+    return next((unit for unit, metres in UNITS.items() if MIN_SIDE <= longest * metres <= MAX_SIDE), None)
+
+
+def _metres(sides: Floats) -> str:
+    return " x ".join(f"{side:.3g}" for side in sides) + " m"
 
 
 def clearance(free: Mask) -> Floats:

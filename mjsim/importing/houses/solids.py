@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import trimesh
@@ -75,7 +76,8 @@ def make_solids(pieces: Iterable[Piece]) -> Solids:
     boxes: list[Solid] = []
     for pitch in _PITCHES:
         made = (solid for name, mesh in rest for solid in _few_voxels(name, mesh, pitch))
-        boxes = [solid for solid in made if solid.high[2] > LOW]
+        enough = None if pitch == _PITCHES[-1] else max(BUDGET - len(simple), 0) + 1
+        boxes = list(islice((solid for solid in made if solid.high[2] > LOW), enough))
         if len(simple) + len(boxes) <= BUDGET:
             break
     hulls = sum(solid.hull is not None for solid in simple)

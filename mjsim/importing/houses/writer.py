@@ -15,7 +15,7 @@ from mjsim.importing.houses.plan import Plan
 from mjsim.importing.houses.rooms import Rooms
 from mjsim.importing.houses.solids import Solid
 from mjsim.importing.houses.values import Bin
-from mjsim.importing.model_writer import look_lines, write_png
+from mjsim.importing.model_writer import comment, look_lines, write_png
 from mjsim.importing.surface import Floats
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
@@ -48,7 +48,7 @@ def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Pat
     (folder / MESHES).mkdir()
     lines = [
         f"<mujoco model={quoteattr(_name(house.label))}>",
-        f"  <!-- {_comment(house.label)}, imported from {_comment(house.source)}; conventions in docs/models.md. -->",
+        f"  <!-- {comment(house.label)}, imported from {comment(house.source)}; conventions in docs/models.md. -->",
         f'  <compiler angle="radian" meshdir="{MESHES}" texturedir="{MESHES}"/>',
         '  <visual><headlight ambient="0.5 0.5 0.5" diffuse="0.05 0.05 0.05" specular="0 0 0"/></visual>',
         "  <default>",
@@ -195,10 +195,6 @@ def _relative(path: Path) -> str:
     root = models_root().resolve()
     resolved = path.resolve()
     return str(resolved.relative_to(root)) if resolved.is_relative_to(root) else str(resolved)
-
-
-def _comment(text: str) -> str:
-    return text.replace("--", "- -").replace("&", "and").replace("<", "(").replace(">", ")")
 
 
 def _name(text: str) -> str:

@@ -278,6 +278,15 @@ def test_what_is_missing_is_left_out_if_the_user_says_so(tmp_path, broken):
     assert ("table.obj" if broken else "model://chair") in decisions["left out"]
 
 
+def test_what_is_missing_is_the_first_cause_of_a_refusal(tmp_path):
+    shape = "<visual name='v'><geometry><box><size>1 1 .01</size></box></geometry></visual>"
+    box = f"<model name='b'><link name='l'>{shape}</link></model>"
+    source = tmp_path / "bare.world"
+    source.write_text(f"<sdf version='1.6'><world name='a'>{INCLUDE}{box}</world></sdf>")
+    with pytest.raises(AssetError, match=r"1 missing \(model://chair\), and what is left has no walls"):
+        import_house(source, tmp_path / "out", HouseOptions(skip_missing=True))
+
+
 def test_a_folder_that_is_there_is_kept(tmp_path):
     source, out = write_sdf(tmp_path), tmp_path / "mine"
     out.mkdir()
@@ -320,7 +329,7 @@ def test_a_damaged_scene_is_refused_by_its_cause(tmp_path, write, damage, reason
 @pytest.mark.parametrize(
     ("mesh", "options", "reason"),
     [
-        (trimesh.creation.box((0.5, 0.5, 0.9)), {}, "nowhere to walk"),
+        (trimesh.creation.box((0.5, 0.5, 0.9)), {}, "nowhere to walk on 0.5 x 0.9 m.*--scale"),
         (trimesh.creation.box((9, 0.02, 9)), {}, "no walls and no furniture"),
         (trimesh.creation.box((900, 700, 3)), {"units": "m"}, "spans 900 x 3 m.*--units cm"),
         (trimesh.creation.box((8, 0.01, 5)), {"up": "z"}, "nowhere|level"),
