@@ -1,18 +1,19 @@
 // @ts-nocheck: types of node are not installed
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
-import { mkdtempSync, readFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { execPath } from "node:process";
 import { gzipSync } from "node:zlib";
-import { expect, test } from "vitest";
+import { expect, onTestFinished, test } from "vitest";
 
 const folder = join("static", "vendor");
 const bundle = readFileSync(join(folder, "three.js"));
 
 test("the bundle of three.js is what the packages of package-lock.json give", () => {
   const fresh = mkdtempSync(join(tmpdir(), "bundle-"));
+  onTestFinished(() => rmSync(fresh, { recursive: true }));
   execFileSync(execPath, ["bundle.js", fresh]);
   expect(readFileSync(join(fresh, "three.js")).equals(bundle)).toBe(true);
 });
