@@ -38,6 +38,7 @@ def save_record(
 
     Raises:
         RecordError: The folder cannot be written, and the record is kept elsewhere; the message says where.
+        OSError: The folder cannot be written, and the record is that of a journal, which still holds it.
     """
     metrics = {
         **measure(record.events, record.trajectory),
@@ -48,6 +49,8 @@ def save_record(
     try:
         _write(folder, record, metrics)
     except OSError as error:
+        if record.participant is not None:  # of a journal, which keeps it
+            raise
         shutil.rmtree(folder, ignore_errors=True)
         metrics["frames_sha256"] = None
         kept = _save_elsewhere(out, record, metrics)
@@ -59,8 +62,9 @@ def _write(folder: Path, record: Record, metrics: dict[str, Any]) -> None:
     record.episode.save(folder / records.EPISODE)
     with replacing(folder / records.EVENTS) as path:
         path.write_bytes(record.log)
-    save_arrays(folder / records.TRAJECTORY, record.trajectory)
-    save_arrays(folder / records.RECORDING, record.recording)
+    played = record.participant is not None  # for many minutes; a batch has many short trials
+    save_arrays(folder / records.TRAJECTORY, record.trajectory, small=played)
+    save_arrays(folder / records.RECORDING, record.recording, small=played)
     write_json(folder / records.PLAN, record.plans)
     write_json(folder / records.METRICS, metrics)  # a run directory with metrics is complete
     write_checksums(folder, records.FILES)

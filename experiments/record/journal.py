@@ -140,7 +140,7 @@ def read_entries(path: Path) -> tuple[Header | Entry, ...]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk."""
+    """Wait until the names in a folder, or the content of a file, are on the disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -145,7 +145,7 @@ class Open(WireMessage, frozen=True):
     """Open a session in a worker: its journal's folder, its run directory, settings, earlier phases of the visit.
 
     `restarted` tells that the worker before has died, `as_inputs_come` that control steps are taken as soon as their
-    inputs are promised, faster than real time, as in a rehearsal.
+    inputs are promised, faster than real time, as in a rehearsal, and `floor_plan` that one of the task is drawn.
     """
 
     folder: str
@@ -154,6 +154,7 @@ class Open(WireMessage, frozen=True):
     before: list[dict[str, Any]] = []
     restarted: bool = False
     as_inputs_come: bool = False
+    floor_plan: bool = True
 
 
 class State(WireMessage, frozen=True):

@@ -67,7 +67,9 @@ class Trials:
         self._minimum = {name: 0.0 if name in settings.optional else NEVER for name in PLAYED}
         capacity = Capacity(usable_cores()) if workers is None else None
         self._limit = SessionLimit(workers or (capacity.measure({}, ()) if capacity else 1))
-        self.sessions = Sessions(pool, self._limit, settings.limits.idle, self._minimum, meter, capacity)
+        self.sessions = Sessions(
+            pool, self._limit, settings.limits.idle, self._minimum, meter, capacity, floor_plans=False
+        )
         self._usual = 60.0 * settings.minutes  # of the whole study, until trials have ended
         self._sockets: Counter[int] = Counter()  # by person
 

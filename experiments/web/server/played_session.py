@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 import msgspec
 
+from experiments.record.phases import TASK
 from experiments.web import protocol
 from experiments.web.controls import Input
 from experiments.web.protocol import (
@@ -79,9 +80,10 @@ class PlayedSession:
         meter: Meter | None = None,
         *,
         as_inputs_come: bool = False,
+        floor_plan: bool = True,
     ) -> None:
         self.visit, self._minimum, self._scenes = visit, minimum, scenes
-        self._as_inputs_come = as_inputs_come
+        self._as_inputs_come, self._floor_plan = as_inputs_come, floor_plan
         self._meter = meter or Meter()
         self.browser: Browser | None = None
         self.heard = time.monotonic()
@@ -250,6 +252,7 @@ class PlayedSession:
             visit.settings(trial),
             visit.before(trial),
             as_inputs_come=self._as_inputs_come,
+            floor_plan=self._floor_plan and trial == TASK,
         )
         while crashes < MAX_CRASHES:
             self._set(State())
@@ -297,9 +300,7 @@ class PlayedSession:
         visit = self.visit
         metrics = visit.metrics(trial)
         visit.finish(trial, metrics.get("completion_time_s", 0.0), metrics["ended"])
-        LOG.info(
-            "session %s: %s is over (%s): %s", visit.name[:12], trial, metrics["ended"], visit.run(trial)
-        )
+        LOG.info("session %s: %s is over (%s)", visit.name[:12], trial, metrics["ended"])
 
     def _discard_worker(self) -> None:
         if self._worker is not None:

@@ -20,7 +20,7 @@ MAX_AWAY = 20.0  # s that a place is kept without a page while others wait
 class Sessions:
     """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back.
 
-    With a `capacity`, the limit follows what the machine holds.
+    With a `capacity`, the limit follows what the machine holds. `floor_plans` adds one to the run of each task.
     """
 
     def __init__(
@@ -31,9 +31,11 @@ class Sessions:
         minimum: Mapping[str, float],
         meter: Meter | None = None,
         capacity: Capacity | None = None,
+        *,
+        floor_plans: bool = True,
     ) -> None:
         self._pool, self._limit, self._idle, self._minimum = pool, limit, idle, minimum
-        self._meter, self._capacity = meter, capacity
+        self._meter, self._capacity, self._floor_plans = meter, capacity, floor_plans
         self._sessions: dict[str, PlayedSession] = {}
         self._scenes: dict[str, str] = {}  # by house, of those that a worker has named
 
@@ -48,6 +50,7 @@ class Sessions:
                 self._scenes,
                 self._meter,
                 as_inputs_come=as_inputs_come,
+                floor_plan=self._floor_plans,
             )
         return self._sessions[visit.name]
 

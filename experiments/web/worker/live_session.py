@@ -1,21 +1,24 @@
 """A session with a person: stepped from outside, journalled step by step, and resumed after a crash."""
 
 import json
+import logging
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from experiments.errors import RecordError
+from experiments.errors import RecordError, ReplayError
 from experiments.house import House
 from experiments.participants.base import Percept
 from experiments.procedure.familiarise import Familiarisation
 from experiments.record.export import save_record
-from experiments.record.journal import JOURNAL, Entry, Header, Journal, read_entries
-from experiments.record.reader import read_journal
-from experiments.record.records import EventLog
+from experiments.record.journal import JOURNAL, Entry, Header, Journal, read_entries, sync_folder
+from experiments.record.reader import read_journal, read_run, same_record
+from experiments.record.records import TOPDOWN, EventLog
 from experiments.record.run_directory import is_run, run_directory
+from experiments.record.verify import checksum_mismatches
 from experiments.replay.log_source import LogSource
 from experiments.session.endings import INTERRUPTED
 from experiments.session.viewer import Viewer
@@ -37,7 +40,8 @@ from mjsim.options import WorldOptions
 from mjsim.world import World
 from planner.service import Mode, Planner
 
-MAX_JOURNAL = 512 * 1024**2  # bytes, some seven hours, after which a session ends
+LOG = logging.getLogger("mjsim.play")
+MAX_JOURNAL = 512 * 1024**2  # bytes after which a session ends: about 7 h with 6 objects, 3 h with 24
 
 
 class PersonState(msgspec.Struct):
@@ -233,23 +237,55 @@ def journal_of(run: Path) -> Path | None:
     return next((folder for folder in folders if (folder / JOURNAL).is_file()), None)
 
 
-def save_run(folder: Path, run: Path, house: House | None = None) -> None:
+def save_run(folder: Path, run: Path, house: House | None = None, *, floor_plan: bool = True) -> None:
     """Make the run directory of a session, also of an unfinished one, and then its floor plan.
 
     Args:
         folder: Of the journal.
-        run: The run directory; where it exists, only the floor plan is made.
+        run: The run directory; what exists of it is not made again.
         house: The house of the trial; None to load it.
+        floor_plan: Whether to draw one.
 
     Raises:
         RecordError: There is no journal, it holds no control step, or the run directory cannot be made.
+        ReplayError: The run directory that exists cannot be read.
         OSError: The journal cannot be read.
     """
-    record = read_journal(read_entries(folder / JOURNAL))
+    if is_run(run) and ((run / TOPDOWN).is_file() or not floor_plan):
+        return
+    record = read_run(run) if is_run(run) else read_journal(read_entries(folder / JOURNAL))
     if not record.steps:
         raise RecordError("nothing was played")
     if not is_run(run):
         with run_directory(run) as work:
             save_record(work, run, record, wall=float(record.trajectory["time"][-1]))
-    house = (house or House.load(record.start["house"])).for_person(record.person)
-    draw_floor_plan(run, house, record)
+    if floor_plan:
+        house = (house or House.load(record.start["house"])).for_person(record.person)
+        draw_floor_plan(run, house, record)
+
+
+def remove_journal(folder: Path, run: Path) -> None:
+    """Delete the journal of a session that is over, once its run directory holds the same record on the disk.
+
+    A journal that differs from its run directory, or cannot be compared with it, is kept, and a warning is logged.
+    """
+    if not (folder / JOURNAL).is_file():
+        return
+    try:
+        with Journal(folder / JOURNAL) as journal:
+            saved = read_run(run)
+            faults = [mismatch.message for mismatch in checksum_mismatches(run, saved)]
+            if journal.entries and not same_record(saved, read_journal(journal.entries)):
+                faults.append("the run directory differs from the journal")
+            if faults:
+                LOG.warning("%s is kept: %s", folder / JOURNAL, faults[0])
+                return
+            for path in (*run.iterdir(), run, run.parent):
+                sync_folder(path)
+            (folder / JOURNAL).unlink()
+    except (RecordError, ReplayError, OSError) as error:
+        LOG.warning("%s is kept: %s", folder / JOURNAL, error)
+        return
+    with suppress(OSError):  # another trial has a journal
+        folder.rmdir()
+        folder.parent.rmdir()

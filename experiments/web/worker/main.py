@@ -11,7 +11,7 @@ from queue import SimpleQueue
 import msgspec
 
 from experiments.blame import describe
-from experiments.record import records
+from experiments.house import House
 from experiments.record.run_directory import is_run
 from experiments.session.endings import INTERRUPTED
 from experiments.trials.trial_config import TrialConfig
@@ -36,7 +36,13 @@ from experiments.web.worker import houses
 from experiments.web.worker.clock import Clock
 from experiments.web.worker.control import SessionControl
 from experiments.web.worker.drawing import Drawer
-from experiments.web.worker.live_session import LiveSession, is_over, open_journal, save_run
+from experiments.web.worker.live_session import (
+    LiveSession,
+    is_over,
+    open_journal,
+    remove_journal,
+    save_run,
+)
 from experiments.web.worker.viewer import BrowserViewer
 
 
@@ -100,10 +106,20 @@ class Worker:
                 self._viewer.drawer.note_seen(frame)
 
     def _serve(self, opened: Open, control: SessionControl) -> None:
-        config, viewer = TrialConfig.of(opened.config), self._viewer
+        config = TrialConfig.of(opened.config)
         folder, run, house = Path(opened.folder), Path(opened.run), houses.house(config.house)
-        with open_journal(folder) as journal:
-            if not is_over(journal):
+        if not is_run(run):
+            self._play(opened, control, config, house)
+        save_run(folder, run, house, floor_plan=opened.floor_plan)
+        remove_journal(folder, run)
+        control.apply(Trigger.END)
+        self._send(Saved())
+
+    def _play(self, opened: Open, control: SessionControl, config: TrialConfig, house: House) -> None:
+        """Start or resume the session, and return when it is over."""
+        viewer = self._viewer
+        with open_journal(Path(opened.folder)) as journal:
+            if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have saved it by now
                 live = LiveSession(journal, house, config, viewer, before=opened.before)
                 pictures = partial(houses.encoded_pictures, config.house, "minimap" in config.assistance)
                 with closing(Drawer(live.scene, pictures, self._send, control)) as drawer:
@@ -120,7 +136,3 @@ class Worker:
                     reason = clock.run()
                     viewer.live = viewer.drawer = None
                 live.end(reason)
-        if not (is_run(run) and (run / records.TOPDOWN).is_file()):
-            save_run(folder, run, house)
-        control.apply(Trigger.END)
-        self._send(Saved())

@@ -1,18 +1,31 @@
 """A session with a person continues after a crash as if there had been none, and leaves a run that replays."""
 
 import itertools
+import os
 import shutil
+import socket
+from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
 
-from experiments.record.files import read_json
-from experiments.record.records import METRICS, TOPDOWN
+from experiments.record.checksums import CHECKSUMS, write_checksums
+from experiments.record.files import read_arrays, read_json, save_arrays
+from experiments.record.records import EVENTS, FILES, METRICS, TOPDOWN, TRAJECTORY
 from experiments.replay.replay import replay
 from experiments.trials.trial_config import TrialConfig
+from experiments.web import protocol
 from experiments.web.controls import Input
-from experiments.web.worker.live_session import LiveSession, journal_of, open_journal, save_run
+from experiments.web.protocol import Open, Saved
+from experiments.web.worker.live_session import (
+    LiveSession,
+    journal_of,
+    open_journal,
+    remove_journal,
+    save_run,
+)
+from experiments.web.worker.main import Worker
 
 pytestmark = pytest.mark.usefixtures("frequent_checkpoints")
 CONFIG = TrialConfig(objects=6, assistance="guided", seed=3, user="human", live=True, fidelity="event")
@@ -108,3 +121,102 @@ def test_a_journal_that_is_full_ends_the_session(tmp_path, house, monkeypatch):
     monkeypatch.setattr("experiments.web.worker.live_session.MAX_JOURNAL", 100)
     assert session.end_reason == "interrupted"
     crash(session)
+
+
+@pytest.fixture(scope="module")
+def saved(house, tmp_path_factory):
+    """The journal and the run directory of a session that is over."""
+    folder = tmp_path_factory.mktemp("saved")
+    session = play(folder / "journals" / "task", house, wandering(4, 60), config=CONFIG)
+    session.end("interrupted")
+    session._journal.close()
+    save_run(folder / "journals" / "task", folder / "task", house)
+    return folder
+
+
+@pytest.fixture
+def visit(saved, tmp_path):
+    return shutil.copytree(saved, tmp_path / "visit")
+
+
+def test_a_journal_is_deleted_once_its_run_is_on_the_disk(visit, monkeypatch):
+    journal, synced = visit / "journals" / "task", set()
+    fsync, unlink = os.fsync, os.unlink
+
+    def sync(file):
+        synced.add(str(Path(f"/proc/self/fd/{file}").readlink()))
+        fsync(file)
+
+    def remove(path, **options):
+        if os.fspath(path).endswith("journal.bin"):
+            run = visit / "task"
+            assert synced >= {str(path) for path in (run, visit, *run.iterdir())}, "a power cut would lose it"
+        unlink(path, **options)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    monkeypatch.setattr(os, "unlink", remove)
+    remove_journal(journal, visit / "task")
+    assert not (visit / "journals").exists()
+    assert journal_of(visit / "task") is None
+    assert replay(visit / "task").steps == 60
+    remove_journal(journal, visit / "task")  # as after a kill right after it was deleted
+
+
+def _shorten(run):
+    """A run that is consistent in itself, but lacks a control step."""
+    arrays = read_arrays(run / TRAJECTORY)
+    save_arrays(run / TRAJECTORY, {name: array[:-1] for name, array in arrays.items()})
+    write_checksums(run, FILES)
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda run: shutil.rmtree(run),
+        lambda run: (run / EVENTS).write_bytes(b""),  # as a power cut may leave it
+        lambda run: (run / METRICS).write_text("{}"),
+        lambda run: (run / CHECKSUMS).unlink(),
+        _shorten,
+    ],
+)
+def test_a_journal_whose_run_does_not_hold_all_of_it_is_kept(visit, harm, caplog):
+    journal = visit / "journals" / "task"
+    before = (journal / "journal.bin").read_bytes()
+    harm(visit / "task")
+    remove_journal(journal, visit / "task")
+    assert (journal / "journal.bin").read_bytes() == before
+    assert "journal.bin is kept: " in caplog.text
+
+
+@pytest.mark.parametrize("stage", ["saved", "drawn", "deleted"])
+def test_a_worker_killed_while_it_saves_leaves_a_session_that_is_over(visit, house, monkeypatch, stage):
+    """The next worker ends what was begun; it starts no new session where the journal is deleted already."""
+    journal, run = visit / "journals" / "task", visit / "task"
+    trajectory = (run / TRAJECTORY).read_bytes()
+    if stage == "saved":
+        (run / TOPDOWN).unlink()
+        write_checksums(run, FILES)
+    if stage == "deleted":
+        remove_journal(journal, run)
+    monkeypatch.setattr("experiments.web.worker.houses.house", lambda _: house)
+    here, there = socket.socketpair()
+    with here, there:
+        worker = Worker(here)
+        worker._serve(Open(str(journal), str(run), CONFIG.settings(), []), worker._control)
+        sent = there.recv(1 << 20)
+    assert sent.endswith(protocol.packed(Saved())) and not (visit / "journals").exists()
+    assert (run / TRAJECTORY).read_bytes() == trajectory and (run / TOPDOWN).is_file()
+
+
+def test_a_run_that_cannot_be_written_stays_in_the_journal_alone(visit, house, monkeypatch):
+    """Nothing of a participant is written to the temporary folder, where it would not be found again."""
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    shutil.rmtree(visit / "task")
+    monkeypatch.setattr("experiments.record.export.save_arrays", full)
+    monkeypatch.setattr("experiments.record.export._save_elsewhere", lambda *_: pytest.fail("kept elsewhere"))
+    with pytest.raises(OSError, match="No space left"):
+        save_run(visit / "journals" / "task", visit / "task", house)
+    assert not (visit / "task").exists() and (visit / "journals" / "task" / "journal.bin").is_file()
