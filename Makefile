@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 WORKERS ?= auto
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow check check-client format site wheel-check assets pictures data-dictionary client-protocol clean
+.PHONY: help demo test test-slow check check-client format site wheel-check constraints assets pictures data-dictionary client-protocol clean
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -42,6 +42,9 @@ site: $(READY) ## Build the site of the documents into site/; any warning is an 
 wheel-check: $(READY) ## Build the wheel and use it in an empty environment
 	PYTHON=$(BIN)/python .ci/wheel-check
 
+constraints: $(READY) ## Renew constraints.txt: the newest version of everything, for all supported Pythons
+	.ci/renew-constraints
+
 assets: $(READY) ## Make textures and meshes under models/ anew
 	$(BIN)/python -m tools.authoring
 
@@ -60,12 +63,13 @@ client-protocol: $(READY) ## Make the client's copy of the protocol anew from th
 clean: ## Remove the environment, caches and runs
 	rm -rf $(VENV) runs dist build site .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
-$(READY): pyproject.toml .ci/system-libraries
+$(READY): pyproject.toml constraints.txt .ci/system-libraries
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "Python 3.11 or newer is needed, $(PYTHON) is $$($(PYTHON) --version); name another with PYTHON=..."; exit 1; }
 	PYTHON=$(PYTHON) .ci/system-libraries
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --editable '.[dev]'
+	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/pip install --quiet --constraint constraints.txt --no-deps dm-control
 	$(BIN)/python -m experiments.trials.warmup
 	@touch $@
