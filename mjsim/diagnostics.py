@@ -1,7 +1,9 @@
-"""What this machine offers to the simulator: versions, conflicting packages, and what OpenGL draws with."""
+"""Report on this machine: versions, conflicting packages, and what OpenGL draws with."""
 
+import importlib
 import platform
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -15,7 +17,22 @@ if TYPE_CHECKING:
     from mjsim.render.context import GlInfo
 
 VENDOR_FOLDER = Path("/usr/share/glvnd/egl_vendor.d")
-DISTRIBUTIONS = ("mujoco", "dm-control", "numpy", "ortools", "opencv-python-headless", "pyopengl")
+DM_CONTROL = "dm-control"
+MODULES = {
+    "mujoco": "mujoco",
+    DM_CONTROL: "dm_control.mujoco",
+    "numpy": "numpy",
+    "scipy": "scipy.sparse",
+    "numba": "numba",
+    "shapely": "shapely",
+    "ortools": "ortools",
+    "opencv-python-headless": "cv2",
+    "pyopengl": "OpenGL",
+}  # distribution -> module that fails to import if it does not fit the others
+# dm-control requires labmaze, which has no wheels for newer Pythons and which it needs for mazes only.
+WITHOUT_LABMAZE = (3, 13)
+INSTALL_DM_CONTROL = "pip install --no-deps dm-control"
+_REINSTALL = "its version does not fit the others; reinstall with pip install --upgrade mjsim"
 
 
 @dataclass(frozen=True)
@@ -25,6 +42,7 @@ class EnvironmentReport:
     python: str  # version of the interpreter
     platform: str  # operating system and processor
     versions: Mapping[str, str | None]  # distribution -> version, or None where it is not installed
+    broken: Mapping[str, str]  # distribution -> error with which it fails to import
     hidden: tuple[str, ...]  # what to do about packages of ours that other software hides
     cache: str  # where compiled code is kept, and how much there is
     egl_vendors: tuple[str, ...]  # names of the EGL vendor files found
@@ -34,13 +52,18 @@ class EnvironmentReport:
 
     @property
     def usable(self) -> bool:
-        """Whether everything needed is installed, nothing of it is hidden, and frames can be drawn."""
-        return self.gl is not None and None not in self.versions.values() and not self.hidden
+        """True if everything that trials need is installed and can be imported, and frames can be drawn."""
+        missing = {name for name, version in self.versions.items() if version is None}
+        if sys.version_info >= WITHOUT_LABMAZE:
+            missing.discard(DM_CONTROL)  # trials do not need it
+        return self.gl is not None and not (missing or self.broken or self.hidden)
 
     def lines(self) -> tuple[str, ...]:
         """The report as lines of text, advice last."""
         rows = [f"python {self.python} on {self.platform}"]
-        rows += [f"{name} {version or 'not installed'}" for name, version in self.versions.items()]
+        for name, version in self.versions.items():
+            fault = f", cannot be imported ({self.broken[name]})" if name in self.broken else ""
+            rows.append(f"{name} {version or 'not installed'}{fault}")
         rows.append(f"compiled code: {self.cache}")
         rows.append(f"EGL vendor files: {', '.join(self.egl_vendors) or 'none'}")
         if self.gl is None:
@@ -64,18 +87,25 @@ def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport
         problem = str(error)
     except Exception as error:
         problem = f"{type(error).__name__}: {' '.join(str(error).split())}"
-    versions = {name: _version(name) for name in DISTRIBUTIONS}
+    versions = {name: _version(name) for name in MODULES}
+    installed = [name for name, version in versions.items() if version is not None]
+    broken = {name: fault for name in installed if (fault := _import_error(MODULES[name]))}
     vendors = egl_vendors(vendor_folder)
     return EnvironmentReport(
         python=platform.python_version(),
         platform=f"{platform.system()} {platform.machine()}",
         versions=versions,
+        broken=broken,
         hidden=tuple(message for name in PACKAGES if (message := hidden_package(name))),
         cache=_cache(),
         egl_vendors=vendors,
         gl=gl,
         problem=problem,
-        advice=(*shared_names(), *advise(versions, vendors, gl)),
+        advice=(
+            *shared_names(),
+            *(f"{name} is broken: {_REINSTALL}" for name in broken),
+            *advise(versions, vendors, gl),
+        ),
     )
 
 
@@ -96,12 +126,14 @@ def egl_vendors(folder: Path = VENDOR_FOLDER) -> tuple[str, ...]:
 
 
 def advise(
-    versions: Mapping[str, str | None], vendors: tuple[str, ...], gl: "GlInfo | None"
+    versions: Mapping[str, str | None],
+    vendors: tuple[str, ...],
+    gl: "GlInfo | None",
+    broken: Iterable[str] = (),
 ) -> tuple[str, ...]:
-    """What to do about missing distributions, a missing OpenGL or an unused GPU."""
-    steps = [
-        f"{name} is missing: pip install {name}" for name, version in versions.items() if version is None
-    ]
+    """Advise on missing or broken distributions, a missing OpenGL or an unused GPU."""
+    steps = [_how_to_install(name) for name, version in versions.items() if version is None]
+    steps += [f"{name} is broken: {_REINSTALL}" for name in broken]
     if gl is None and chosen_gl() not in (*BACKENDS, *DISABLED):
         steps.append(f"no frame can be drawn: unset {VARIABLE}, or set it to {' or '.join(BACKENDS)}")
     elif gl is None:
@@ -120,6 +152,20 @@ def advise(
             "install the driver's libnvidia-gl package"
         )
     return tuple(steps)
+
+
+def _how_to_install(name: str) -> str:
+    if name == DM_CONTROL and sys.version_info >= WITHOUT_LABMAZE:
+        return f"{name} is missing, which only the native viewer and the Physics adapter need: {INSTALL_DM_CONTROL}"
+    return f"{name} is missing: pip install {name}"
+
+
+def _import_error(module: str) -> str | None:
+    try:
+        importlib.import_module(module)
+    except Exception as error:  # libraries built for another numpy raise many types
+        return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    return None
 
 
 def _version(distribution: str) -> str | None:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from mjsim.diagnostics import INSTALL_DM_CONTROL
+from mjsim.environments.errors import ViewerError
 from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.navigable import NavigablePoints
@@ -51,9 +53,16 @@ class CompiledEpisode:
 
 
 def dm_control_physics(world: World) -> Any:
-    """A `dm_control.mujoco.Physics` that shares the state of a world; treat it as read-only."""
+    """Wrap the state of a world as a `dm_control.mujoco.Physics`; treat it as read-only.
+
+    Raises:
+        ViewerError: dm-control is not installed.
+    """
     # Importing dm_control fixes the OpenGL backend of the process, so do it only on demand.
-    from dm_control import mujoco as dm_mujoco
+    try:
+        from dm_control import mujoco as dm_mujoco
+    except ModuleNotFoundError as error:
+        raise ViewerError(f"dm-control is not installed ({error}): {INSTALL_DM_CONTROL}") from error
 
     return dm_mujoco.Physics(dm_mujoco.wrapper.MjData(world.data))
 

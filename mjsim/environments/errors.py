@@ -12,4 +12,4 @@ class EnvironmentStateError(MjsimError):
 
 
 class ViewerError(MjsimError):
-    """No window could be opened."""
+    """No window could be opened, or dm-control is not installed."""

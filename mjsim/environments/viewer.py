@@ -5,6 +5,7 @@ import time
 import warnings
 from typing import Any
 
+from mjsim.diagnostics import INSTALL_DM_CONTROL
 from mjsim.environments.episodes import dm_control_physics
 from mjsim.environments.errors import ViewerError
 from mjsim.world import World
@@ -100,6 +101,8 @@ def _load() -> tuple[Any, Any, Any, Any]:
     try:
         from dm_control import _render
         from dm_control.viewer import gui, renderer, viewer
+    except ModuleNotFoundError as error:
+        raise ViewerError(f"dm-control is not installed ({error}): {INSTALL_DM_CONTROL}") from error
     except Exception as error:  # a missing library surfaces as ImportError, AttributeError or OSError
         raise ViewerError(f"dm_control's viewer cannot be loaded ({error!r}); {_REMEDY}") from error
     return gui, _render, viewer, renderer

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.trials.compile_notice import NOTICE
+from experiments.trials.compile_notice import NOT_KEPT, NOTICE
 from mjsim import kernels, sources
 
 CALLEE = "from mjsim.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
@@ -86,12 +86,18 @@ def test_kernels_work_where_nothing_can_be_cached(tmp_path):
     assert kernels.kernel(function)(2) == 3
 
 
-def test_compiling_is_announced_once():
-    """Nobody may take a first command for one that hangs."""
-    script = (
-        "import numba; from experiments.trials.compile_notice import announce_compiling; announce_compiling()\n"
-        "f = numba.njit(lambda x: x + 1); print(f(1), f(1.5))"
+@pytest.mark.parametrize("kept", [True, False])
+def test_compiling_is_announced_once(tmp_path, kept):
+    """No user may take a first command for one that hangs, or an unwritable cache for a cost that is paid once."""
+    source, cache = tmp_path / "script.py", tmp_path / "cache" if kept else Path("/proc/self/nowhere")
+    source.write_text(
+        "from experiments.trials.compile_notice import announce_compiling\n"
+        "from mjsim.kernels import kernel\n\n\n"
+        "@kernel\ndef after(x):\n    return x + 1\n\n\n"
+        "announce_compiling()\nprint(after(1), after(1.5))\n"
     )
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    paths = os.pathsep.join((str(Path(__file__).parents[2]), *sys.path))
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": paths}
+    run = subprocess.run([sys.executable, source], env=environment, capture_output=True, text=True)
     assert run.stdout.strip() == "2 2.5"
-    assert run.stderr == f"mjsim: {NOTICE}\n"
+    assert run.stderr == f"mjsim: {NOTICE if kept else NOT_KEPT.format(folder=cache)}\n"

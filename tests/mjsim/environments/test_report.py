@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjsim import diagnostics
 from mjsim.diagnostics import advise, egl_vendors, environment_report
 from mjsim.render.context import GlInfo, is_software
 
@@ -75,6 +76,26 @@ def test_missing_distribution_makes_the_report_unusable():
     report = dataclasses.replace(environment_report(), versions={"mujoco": None})
     assert not report.usable
     assert "mujoco not installed" in report.lines()
+
+
+def test_dm_control_may_be_missing_where_it_cannot_be_installed_like_the_others(monkeypatch):
+    report = dataclasses.replace(environment_report(), versions={"dm-control": None})
+    monkeypatch.setattr(diagnostics, "WITHOUT_LABMAZE", (3, 0))
+    assert report.usable
+    assert advise(report.versions, (), GPU)[0].endswith("pip install --no-deps dm-control")
+    monkeypatch.setattr(diagnostics, "WITHOUT_LABMAZE", (4, 0))
+    assert not report.usable
+    assert advise(report.versions, (), GPU) == ("dm-control is missing: pip install dm-control",)
+
+
+def test_doctor_imports_what_it_lists(tmp_path):
+    """Shapely before 2.0.6 is installed next to numpy 2 without complaint and cannot be imported."""
+    (tmp_path / "shapely").mkdir()
+    (tmp_path / "shapely" / "__init__.py").write_text("raise AttributeError('_ARRAY_API not found')")
+    done = _command_line("doctor", f"{tmp_path}:{CHECKOUT}")
+    assert done.returncode == 1
+    assert ", cannot be imported (AttributeError: _ARRAY_API not found)" in done.stdout
+    assert "shapely is broken" in done.stdout
 
 
 def _install_fake(folder, package):

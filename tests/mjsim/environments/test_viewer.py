@@ -1,5 +1,7 @@
 """The window, driven step by step, with stand-ins for dm_control's parts so that no display is needed."""
 
+import subprocess
+import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -114,3 +116,30 @@ def test_a_window_that_cannot_be_made_is_named(parts, monkeypatch):
     monkeypatch.setattr(viewer, "_load", lambda: modules)
     with pytest.raises(ViewerError, match="Failed to create window"):
         viewer.InteractiveViewer()
+
+
+WITHOUT_LABMAZE = """
+import sys
+sys.modules["labmaze"] = None  # cannot be imported, as on Python 3.13 and newer
+from dm_control import mujoco
+from dm_control.viewer import gui, renderer, viewer
+ball = "<body><freejoint/><geom size='1'/></body>"
+physics = mujoco.Physics.from_xml_string(f"<mujoco><worldbody>{ball}</worldbody></mujoco>")
+physics.step()
+print(physics.data.time)
+"""
+
+
+def test_the_viewer_and_the_adapter_need_no_labmaze():
+    """dm-control is installed without it where it has no wheels."""
+    done = subprocess.run([sys.executable, "-c", WITHOUT_LABMAZE], capture_output=True, text=True)
+    assert done.stdout == "0.002\n", done.stderr
+
+
+def test_without_dm_control_an_error_says_how_to_install_it(monkeypatch, worlds):
+    monkeypatch.setitem(sys.modules, "dm_control", None)
+    monkeypatch.setattr(viewer, "_check_display", lambda: None)
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    for attempt in (lambda: viewer.dm_control_physics(worlds[0]), viewer.InteractiveViewer):
+        with pytest.raises(ViewerError, match="pip install --no-deps dm-control"):
+            attempt()
