@@ -6,7 +6,7 @@ READY  := $(VENV)/.ready
 WORKERS ?= auto
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow check check-client format site wheel-check constraints assets pictures data-dictionary client-protocol clean
+.PHONY: help demo test test-slow check check-client format site wheel-check compatibility constraints assets pictures data-dictionary client-protocol clean
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -41,6 +41,9 @@ site: $(READY) ## Build the site of the documents into site/; any warning is an 
 
 wheel-check: $(READY) ## Build the wheel and use it in an empty environment
 	PYTHON=$(BIN)/python .ci/wheel-check
+
+compatibility: $(READY) ## Try the wheel on every Python from 3.11 to 3.14 that is here, with the lowest and the newest versions
+	.ci/compatibility
 
 constraints: $(READY) ## Renew constraints.txt: the newest version of everything, for all supported Pythons
 	.ci/renew-constraints

@@ -5,6 +5,8 @@ import importlib.util
 import inspect
 import json
 import math
+import os
+import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,6 +15,7 @@ from experiments.cli.options import add_command, add_force, int_list
 from experiments.errors import ConfigError
 
 FOLDER = Path(__file__).resolve().parent
+BUSY = 0.5  # load average per core above which wall times are not to be trusted
 
 DESCRIPTION = """\
 Run a benchmark of the source checkout and print what it measured, as ratios where possible, so that the figures hold on
@@ -146,6 +149,12 @@ def run(arguments: argparse.Namespace) -> int:
     given = options(module, arguments)
     if arguments.picture is not None:
         check_file(arguments.picture, replace=arguments.force)
+    if (load := os.getloadavg()[0] / (os.cpu_count() or 1)) > BUSY:
+        print(
+            f"mjsim: {load:.1f} processes per core were running in the last minute; where wall time is measured, "
+            "figures will be too low: repeat this on an idle machine",
+            file=sys.stderr,
+        )
     result = module.measure(**given)
     if arguments.picture is not None:
         module.picture(result, arguments.picture)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from benchmarks import houses, play
+from benchmarks import _command, houses, play
 from benchmarks._command import benchmark, benchmark_names
 from benchmarks.support import home_figures, play_load
 from benchmarks.support.play_browser import SeenFrame, SimulatedBrowser
@@ -36,6 +36,17 @@ def test_a_module_that_measures_nothing_is_refused(tmp_path):
     assert list(benchmark("good", tmp_path).lines({"n": 1})) == ["1"]
     with pytest.raises(ConfigError, match=r"empty\.py is no benchmark"):
         benchmark("empty", tmp_path)
+
+
+@pytest.mark.parametrize("load", [0.1, 3.0])
+def test_on_a_busy_machine_a_line_says_that_wall_times_are_too_low(monkeypatch, capsys, load):
+    empty = SimpleNamespace(measure=dict, lines=lambda _: ["done"])
+    monkeypatch.setattr(_command, "benchmark", lambda _: empty)
+    monkeypatch.setattr(os, "getloadavg", lambda: (load * (os.cpu_count() or 1), 0.0, 0.0))
+    assert main(["bench", "empty"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out == "done\n"
+    assert ("3.0 processes per core were running" in printed.err) == (load == 3.0)
 
 
 def test_a_session_without_a_frame_has_a_width_of_nothing():
