@@ -7,6 +7,7 @@ removed, once it is a day old, by the next process that writes into the same fol
 import contextlib
 import ctypes
 import errno
+import functools
 import json
 import os
 import select
@@ -89,7 +90,7 @@ def replacing(path: Path) -> Iterator[Path]:
     if path.exists() and not path.is_file():
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
-    remove_leftovers(path.parent)
+    _tidy(path.parent, _today())
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f"{WORK}{os.getpid()}-", suffix=path.suffix)
     os.close(handle)
     temporary = Path(name)
@@ -108,7 +109,7 @@ def replacing(path: Path) -> Iterator[Path]:
 @contextmanager
 def work_folder(parent: Path) -> Iterator[Path]:
     """Yield a new folder in the existing folder `parent`; it is removed afterwards unless it was moved."""
-    remove_leftovers(parent)
+    _tidy(parent, _today())
     folder = Path(tempfile.mkdtemp(dir=parent, prefix=f"{WORK}{os.getpid()}-"))
     try:
         yield folder
@@ -124,6 +125,16 @@ def remove_work(folder: Path, process: int) -> None:
     """Remove from `folder` the work of a process that has ended."""
     if folder.is_dir():
         remove_leftovers(folder, 0.0, f"{WORK}{process}-")
+
+
+@functools.lru_cache(maxsize=64)
+def _tidy(folder: Path, _day: int) -> None:
+    """Remove the leftovers in a folder; once a day per process, as a batch writes many trials into one folder."""
+    remove_leftovers(folder)
+
+
+def _today() -> int:
+    return int(time.time() // MAX_AGE)
 
 
 def remove_leftovers(folder: Path, max_age: float = MAX_AGE, prefix: str = WORK) -> None:

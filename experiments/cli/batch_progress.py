@@ -47,7 +47,7 @@ def run_with_progress(
 
     failed = 0
     columns = (
-        TextColumn(what),
+        TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
@@ -56,6 +56,7 @@ def run_with_progress(
     )
     with progress_bars(error_console(), *columns) as bars:
         bar = bars.add_task(what, total=None)
+        reading = bars.add_task("reading finished trials", total=None, visible=False)
 
         def show(progress: BatchProgress) -> None:
             nonlocal failed
@@ -67,5 +68,16 @@ def run_with_progress(
         def note(line: str) -> None:
             bars.console.print(line, style="yellow", soft_wrap=True)
 
-        rows = run_batch(design, out, workers=workers, executor=executor, on_progress=show, on_note=note)
+        def show_reading(number: int, total: int) -> None:
+            bars.update(reading, total=total, completed=number, visible=number < total)
+
+        rows = run_batch(
+            design,
+            out,
+            workers=workers,
+            executor=executor,
+            on_progress=show,
+            on_note=note,
+            on_read=show_reading,
+        )
     return rows, failed

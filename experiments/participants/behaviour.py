@@ -4,12 +4,15 @@ A model says in its factory's attribute `behaviour` which parameters it has. A d
 distributions in a cell's table `behaviour`; what it does not name is as the model says.
 """
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from experiments.errors import ConfigError
-from experiments.participants.distribution import Distributions, distribution
+from experiments.participants.distribution import Distribution, Distributions, converted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,6 +26,11 @@ class Parameter:
     lowest: float  # smallest value that makes sense
     highest: float  # largest value that makes sense
     unit: str  # of the value; empty for a plain number, `probability` for one from 0 to 1
+
+    @functools.cached_property
+    def spread(self) -> Distribution:
+        """The distribution that `usual` describes, converted once, as that takes longer than to draw from it."""
+        return converted(self.usual)
 
     def check(self, name: str, value: float) -> None:
         """Raise a ConfigError if a value is out of range."""
@@ -51,10 +59,10 @@ def quantiles(
             raise ConfigError(f"{of} has no {name!r}; {has}")
     values = {}
     for share, (name, parameter) in zip(shares, parameters.items(), strict=True):
-        spread = described.get(name) or distribution(name, parameter.usual)
         try:
+            spread = described.get(name) or parameter.spread
             values[name] = spread.quantile(share, parameter.lowest, parameter.highest)
-        except ConfigError as error:
+        except (msgspec.ValidationError, ConfigError) as error:
             raise ConfigError(f"{name}: {error}") from error
     return values
 

@@ -139,11 +139,16 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
 def distribution(name: str, given: object) -> Distribution:
     """The distribution that a number or a table such as `{"normal": [1.2, 0.2], "min": 0.8}` describes."""
     try:
-        if isinstance(given, Mapping):
-            return msgspec.convert(given, Distribution)
-        return Distribution(constant=msgspec.convert(given, float))
+        return converted(given)
     except (msgspec.ValidationError, ConfigError) as error:
         raise ConfigError(f"{name}: {error}") from error
+
+
+def converted(given: object) -> Distribution:
+    """As `distribution`, with errors that name no value: a ConfigError, or a ValidationError of msgspec."""
+    if isinstance(given, Mapping):
+        return msgspec.convert(given, Distribution)
+    return Distribution(constant=msgspec.convert(given, float))
 
 
 class Distributions(Mapping[str, Distribution]):

@@ -13,6 +13,7 @@ from experiments.record.checksums import CHECKSUMS, write_checksums
 from mjsim.files import exchange, work_folder
 
 SHOWN_NAMES = 3  # of what is in the way
+SAMPLE = 100  # number of folders in a batch that are looked into; looking into all takes long over a network
 TRIALS = "trials"  # folder of a batch
 VISIT = "visit.json"  # in the folder of each visit of `mjsim play`
 
@@ -23,14 +24,16 @@ def is_run(directory: Path) -> bool:
 
 
 def is_batch(directory: Path) -> bool:
-    """Whether `directory` is the folder of a batch: its trials are runs, and nothing else lies among them."""
+    """Whether `directory` is the folder of a batch: it holds folders only, and a sample of them holds runs."""
     trials = directory / TRIALS
     if not trials.is_dir():
         return False
-    inside = [path for path in trials.iterdir() if not path.name.startswith(".")]
+    with os.scandir(trials) as entries:
+        inside = [entry for entry in entries if not entry.name.startswith(".")]
     if not inside:  # a batch that was killed before its first trial was done has no table either
         return not list(directory.glob(f"{TRIALS}.*"))
-    return all(is_run(path) for path in inside)
+    sample = (Path(entry) for entry in inside[:SAMPLE])
+    return all(entry.is_dir() for entry in inside) and all(is_run(p) or not p.exists() for p in sample)
 
 
 def visit_folders(directory: Path) -> list[Path]:

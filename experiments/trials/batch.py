@@ -15,12 +15,13 @@ from experiments.house import House
 from experiments.record.run_directory import TRIALS, check_batch_folder
 from experiments.session.signals import signals_postponed
 from experiments.trials.batch_checks import check_trials
-from experiments.trials.batch_folder import folder_notes, read_trials, trial_key
+from experiments.trials.batch_folder import StoredTrial, folder_notes, read_trial, trial_key
 from experiments.trials.batch_plan import BatchPlan, plan_batch
 from experiments.trials.design import Design, confounded
 from experiments.trials.table import write_tables
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import SEEDS, TrialConfig
+from experiments.trials.trial_reader import OnRead, TrialReader
 from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor
 from mjsim.files import remove_leftovers
 from mjsim.model.house import MAX_HOUSES
@@ -47,6 +48,7 @@ def run_batch(
     executor: str = PROCESSES,
     on_progress: Callable[[BatchProgress], None] = lambda _: None,
     on_note: Callable[[str], None] = lambda _: None,
+    on_read: OnRead = lambda *_: None,
 ) -> list[Mapping[str, Any]]:
     """Run every trial of the design that `out` does not hold yet, then write the tables.
 
@@ -57,6 +59,7 @@ def run_batch(
         executor: Who runs them: `processes` of this machine, or a `ray` cluster whose machines share the folder.
         on_progress: Called at the start and after every trial.
         on_note: Called with lines that a user should read: what is run again, what the tables leave out.
+        on_read: Called after each finished trial that is read, with the numbers of trials read and to be read.
 
     Returns:
         A row for every trial of the folder, those of the design first, in the design's order.
@@ -82,44 +85,51 @@ def run_batch(
     check_batch_folder(out)
     inputs = check_trials(design.trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
-    plan = plan_batch(design.trials, inputs, out)
+    reader = TrialReader(out, workers=workers, on_read=on_read)
+    plan = plan_batch(design.trials, inputs, out, reader)
     for line in filter(None, (*plan.notes, confounded(design.trials))):
         note(line)
     try:
-        _run_missing(plan, workers, executor, on_progress)
+        _run_missing(plan, workers, executor, on_progress, reader)
     finally:
         with signals_postponed() as signals:
             signals.save()
             remove_leftovers(out / TRIALS)
-            rows = _write_rows(design.trials, out, note)
+            rows = _write_rows(design.trials, out, note, reader)
     return rows
 
 
 def _run_missing(
-    plan: BatchPlan, workers: int, executor: str, on_progress: Callable[[BatchProgress], None]
+    plan: BatchPlan,
+    workers: int,
+    executor: str,
+    on_progress: Callable[[BatchProgress], None],
+    reader: TrialReader,
 ) -> None:
     done = len(plan.done)
     progress = BatchProgress(done=0, resumed=done, failed=0, total=done + len(plan.missing))
     on_progress(progress)
     if not plan.missing:
         return
-    for failure in _results(plan.missing, workers, executor):
-        field = "done" if failure is None else "failed"
+    for result in _results(plan.missing, workers, executor):
+        if isinstance(result, str):
+            field, failure = "failed", result
+        else:
+            field, failure = "done", None
+            reader.add(result)
         count = getattr(progress, field) + 1
         progress = dataclasses.replace(progress, failure=failure, **{field: count})
         on_progress(progress)
 
 
 def _write_rows(
-    trials: Sequence[TrialConfig], out: Path, on_note: Callable[[str], None]
+    trials: Sequence[TrialConfig], out: Path, on_note: Callable[[str], None], reader: TrialReader
 ) -> list[Mapping[str, Any]]:
     """Write the tables of all trials that the folder holds."""
-    found, unusable = read_trials(out)
+    found, unusable = reader.read()
     stored = [trial for trial in found if trial.complete]
     order = {trial_key(trial.settings()): number for number, trial in enumerate(trials)}
-    stored.sort(
-        key=lambda trial: (order.get(trial_key(trial.settings), len(order)), _sort_key(trial.settings))
-    )
+    stored.sort(key=lambda trial: (order.get(trial.key, len(order)), _sort_key(trial.settings)))
     for note in folder_notes(found, unusable):
         on_note(note)
     rows = [trial.row for trial in stored]
@@ -132,8 +142,8 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
     return [settings[name] for name in ("objects", "assistance", "user", "house", *SEEDS)]
 
 
-def _results(missing: Mapping[Path, TrialConfig], workers: int, executor: str) -> Iterator[str | None]:
-    """Yield None for each trial that succeeds, else what went wrong; those whose process may die go last and alone.
+def _results(missing: Mapping[Path, TrialConfig], workers: int, executor: str) -> Iterator[StoredTrial | str]:
+    """Yield each trial that succeeds, else what went wrong; those whose process may die go last and alone.
 
     Trials go house by house: making one takes longer than many a trial in it.
     """
@@ -160,9 +170,9 @@ def _died(path: Path) -> Path:
 
 def _together(
     pool: Executor, left: dict[Path, TrialConfig], alone: dict[Path, TrialConfig], workers: int
-) -> Iterator[str | None]:
+) -> Iterator[StoredTrial | str]:
     """Run the trials that are left, a few at a time; when a process dies, those in progress are moved to `alone`."""
-    running: dict[Future[str | None], tuple[Path, TrialConfig]] = {}
+    running: dict[Future[StoredTrial | str], tuple[Path, TrialConfig]] = {}
     whole = True
     while True:
         while whole and left and len(running) < workers * QUEUED_PER_WORKER:
@@ -181,10 +191,10 @@ def _together(
                 whole, alone[path] = False, config
                 _died(path).touch()
                 continue
-            failure = future.result() if error is None else _failure(error)
-            if failure is None and not path.exists():
-                failure = "its run directory is not here; all machines must share the folder of the batch"
-            yield None if failure is None else f"{path.name}: {failure}"
+            result = future.result() if error is None else _failure(error)
+            if not isinstance(result, str) and not path.exists():
+                result = "its run directory is not here; all machines must share the folder of the batch"
+            yield f"{path.name}: {result}" if isinstance(result, str) else result
 
 
 @functools.lru_cache(MAX_HOUSES)
@@ -195,13 +205,13 @@ def _house(name: str) -> House:
     return house
 
 
-def _run(config: TrialConfig, out: Path) -> str | None:
-    """Run a trial; None if it succeeds, else the error as text, because not every exception can be pickled."""
+def _run(config: TrialConfig, out: Path) -> StoredTrial | str:
+    """Run a trial and read it back. Return an error as text, because not every exception can be pickled."""
     try:
         run_trial(config, out, topdown=False, replace=True, house=_house(config.house))
+        return read_trial(out)
     except Exception as error:  # an error in one trial must not stop the others
         return _failure(error)
-    return None
 
 
 def _failure(error: BaseException) -> str:

@@ -52,8 +52,9 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
     ):
         house(name).sample_points(seed=seed, points=points)
     _check_people(trials, house)
-    for trial in {(t.house, t.user, t.assistance): t for t in reversed(trials) if _may_not_fit(t)}.values():
-        _begin(trial, house(trial.house))
+    for trial in {(t.house, t.user, t.assistance): t for t in reversed(trials)}.values():
+        if _may_not_fit(trial):
+            _begin(trial, house(trial.house))
     return [trial_inputs(trial, catalogue(trial.house)) for trial in trials]
 
 

@@ -3,10 +3,13 @@
 OUT/trials/NAME      one run directory per trial
 OUT/outdated/NAME    trials that were run again because something that they depend on has changed
 OUT/trials.parquet, OUT/trials.csv    one row per trial
+OUT/.rows.jsonl.gz   rows that were read (`trial_reader`)
 """
 
+import functools
 import hashlib
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +18,11 @@ from typing import Any
 
 from experiments.errors import RecordError
 from experiments.record import records
-from experiments.record.checksums import read_checksums, sha256_of
+from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.columns import HEALTH
 from experiments.record.files import read_arrays, read_json
 from experiments.record.metrics import CIRCUMSTANCES, measure
 from experiments.record.records import read_events
-from experiments.record.run_directory import TRIALS
 from experiments.session.endings import COMPLETE
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.fingerprint import Inputs
@@ -29,6 +31,10 @@ from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConf
 OUTDATED = "outdated"
 MAX_NAME = 120  # characters, without seeds and hash
 _SETTINGS = frozenset(SETTINGS)
+_CHECKED = (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING)
+
+# Size in bytes and modification time in ns of each file that `read_trial` reads; None for a file that is missing.
+Stamp = tuple[tuple[int, int] | None, ...]
 
 
 @dataclass(frozen=True)
@@ -40,16 +46,21 @@ class StoredTrial:
     inputs: Inputs  # what else it depended on
     row: Mapping[str, Any]  # what its log and trajectory say, as in `metrics.json`
     as_measured: bool  # whether `metrics.json` says the same
+    stamp: Stamp  # of its files before they were read
 
     @property
     def complete(self) -> bool:
         """Whether it was run to its end; one that failed or was interrupted is run again."""
         return self.row["ended"] in COMPLETE
 
-    def is_of(self, config: TrialConfig, inputs: Inputs) -> bool:
-        """Whether this is a trial of that configuration: in a house of the same content, or at the same place."""
-        same_house = self.inputs["house"] == inputs["house"] or self.settings["house"] == config.house
-        return same_house and trial_key(self.settings) == trial_key(config.settings())
+    @functools.cached_property
+    def key(self) -> str:
+        """Its `trial_key`."""
+        return trial_key(self.settings)
+
+    def is_in(self, house: str, inputs: Inputs) -> bool:
+        """Whether it took place in that house: in one of the same content, or at the same place."""
+        return self.inputs["house"] == inputs["house"] or self.settings["house"] == house
 
 
 def trial_key(settings: Mapping[str, Any]) -> str:
@@ -59,8 +70,9 @@ def trial_key(settings: Mapping[str, Any]) -> str:
 
 def read_trial(path: Path) -> StoredTrial:
     """Read a trial of a batch; what it says is worked out anew from its log and trajectory."""
+    stamp = stamp_of(path)
     sums = read_checksums(path)
-    for name in (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING):
+    for name in _CHECKED:
         if sums.get(name) != sha256_of(path / name):
             raise RecordError(f"{path / name} is not as written")
     start, *_ = events = read_events(path / records.EVENTS)
@@ -72,7 +84,7 @@ def read_trial(path: Path) -> StoredTrial:
     as_measured = all(told.get(name) == value for name, value in json.loads(json.dumps(row)).items())
     row |= {name: told.get(name) for name in CIRCUMSTANCES}
     settings = {name: start[name] for name in _SETTINGS}
-    return StoredTrial(path, settings, start["inputs"], row, as_measured)
+    return StoredTrial(path, settings, start["inputs"], row, as_measured, stamp)
 
 
 def _metrics(path: Path) -> Mapping[str, Any]:
@@ -83,15 +95,17 @@ def _metrics(path: Path) -> Mapping[str, Any]:
     return told if isinstance(told, dict) else {}
 
 
-def read_trials(out: Path) -> tuple[list[StoredTrial], dict[Path, str]]:
-    """Trials of a batch folder by name, and what is wrong with those that cannot be used."""
-    trials, unusable = [], {}
-    for path in sorted(p for p in (out / TRIALS).glob("[!.]*") if p.is_dir()):
-        try:
-            trials.append(read_trial(path))
-        except (RecordError, OSError, KeyError, TypeError, ValueError) as error:
-            unusable[path] = str(error)
-    return trials, unusable
+def stamp_of(path: Path) -> Stamp:
+    """Equal as long as no file that `read_trial` reads has changed."""
+    return tuple(_file_stamp(f"{path}/{name}") for name in (CHECKSUMS, records.METRICS, *_CHECKED))
+
+
+def _file_stamp(path: str) -> tuple[int, int] | None:
+    try:
+        found = os.stat(path)  # noqa: PTH116 - faster than Path, and called six times per trial
+    except OSError:
+        return None
+    return found.st_size, found.st_mtime_ns
 
 
 def put_aside(path: Path) -> None:

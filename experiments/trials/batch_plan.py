@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.record.run_directory import TRIALS
-from experiments.trials.batch_folder import OUTDATED, StoredTrial, put_aside, read_trials, trial_name
+from experiments.trials.batch_folder import OUTDATED, StoredTrial, put_aside, trial_key, trial_name
 from experiments.trials.design import counted
 from experiments.trials.fingerprint import Inputs, changes
 from experiments.trials.trial_config import TrialConfig
+from experiments.trials.trial_reader import TrialReader
 
 SHOWN = 3  # names or reasons in a line
 
@@ -23,16 +24,18 @@ class BatchPlan:
     notes: tuple[str, ...]  # lines that say what is done again, and why
 
 
-def plan_batch(trials: Sequence[TrialConfig], inputs: Sequence[Inputs], out: Path) -> BatchPlan:
+def plan_batch(
+    trials: Sequence[TrialConfig], inputs: Sequence[Inputs], out: Path, reader: TrialReader | None = None
+) -> BatchPlan:
     """Compare a design with what a folder holds, and put aside what is out of date."""
     wanted = dict(zip(trials, inputs, strict=True))
-    stored, unusable = read_trials(out)
-    by_seed: dict[tuple[int, int, int], list[StoredTrial]] = {}
+    stored, unusable = (reader or TrialReader(out)).read()
+    by_key: dict[str, list[StoredTrial]] = {}
     for found in stored:
-        by_seed.setdefault(_seeds(found.settings), []).append(found)
+        by_key.setdefault(found.key, []).append(found)
     done, missing, reasons = [], {}, Counter[str]()
     for trial, needed in wanted.items():
-        same = [s for s in by_seed.get(_seeds(trial.settings()), []) if s.is_of(trial, needed)]
+        same = [s for s in by_key.get(trial_key(trial.settings()), []) if s.is_in(trial.house, needed)]
         current = [s for s in same if s.complete and s.inputs == needed]
         path = out / TRIALS / trial_name(trial, needed)
         for old in same:
@@ -48,10 +51,6 @@ def plan_batch(trials: Sequence[TrialConfig], inputs: Sequence[Inputs], out: Pat
             put_aside(path)
         missing[path] = trial
     return BatchPlan(tuple(done), missing, tuple(_notes(reasons, out)))
-
-
-def _seeds(settings: Mapping[str, int]) -> tuple[int, int, int]:
-    return settings["house_seed"], settings["person_seed"], settings["order_seed"]
 
 
 def _why_again(trial: StoredTrial, inputs: Inputs) -> str:

@@ -52,6 +52,8 @@ def view_limits(text: str) -> tuple[float, float]:
 
 def drawn_person(described: Distributions, rng: "np.random.Generator") -> PersonParameters:
     """A person; a ConfigError where a name is unknown, or a value cannot be drawn."""
+    if not described:
+        return _DEFAULT
     return _person(draw(PARAMETERS, described, rng, "a person"))
 
 

@@ -34,8 +34,8 @@ from experiments.record.records import Event, read_events
 from experiments.record.run_directory import TRIALS
 from experiments.study.simulate import read_study, study_path
 from experiments.trials.batch import BatchProgress, run_batch
-from experiments.trials.batch_folder import read_trials
 from experiments.trials.design import Design
+from experiments.trials.trial_reader import read_trials
 from mjsim.files import replacing, write_text_atomically
 from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan

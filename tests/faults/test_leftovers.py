@@ -24,6 +24,16 @@ def test_work_is_removed_once_it_has_not_changed_for_a_day(name, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
 
 
+def test_a_process_looks_for_leftovers_once(tmp_path, monkeypatch):
+    """A batch writes thousands of trials into one folder, and listing it takes longer the more there are."""
+    searched = []
+    monkeypatch.setattr("mjsim.files.remove_leftovers", lambda folder: searched.append(folder))
+    for _ in range(3):
+        with work_folder(tmp_path):
+            pass
+    assert searched == [tmp_path]
+
+
 @pytest.mark.parametrize("failure", [OSError, KeyboardInterrupt])
 def test_work_that_fails_leaves_nothing(failure, tmp_path):
     for make in (lambda: work_folder(tmp_path), lambda: replacing(tmp_path / "house.xml")):

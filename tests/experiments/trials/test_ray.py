@@ -7,8 +7,8 @@ import pytest
 from experiments.record import records
 from experiments.record.run_directory import TRIALS
 from experiments.trials.batch import RAY, run_batch
-from experiments.trials.batch_folder import read_trials
 from experiments.trials.design import factorial
+from experiments.trials.trial_reader import read_trials
 
 ray = pytest.importorskip("ray")
 DESIGN = factorial(

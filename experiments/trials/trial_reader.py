@@ -1,0 +1,140 @@
+"""Reads the trials of a batch folder, each one once.
+
+Rows that were read are kept in OUT/.rows.jsonl.gz, with the size and modification time of each file behind them. A
+trial is read again after one of these files, or the code of mjsim, has changed. The file may be deleted at any time.
+"""
+
+import gzip
+import os
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from experiments.errors import RecordError
+from experiments.record.run_directory import TRIALS
+from experiments.trials.batch_folder import Stamp, StoredTrial, read_trial, stamp_of
+from experiments.trials.fingerprint import CODE
+from experiments.trials.workers import worker_pool
+from mjsim.files import replacing
+from mjsim.sources import source_digest
+
+ROWS = ".rows.jsonl.gz"
+POOL_FROM = 500  # number of unread trials from which starting processes to read them pays
+
+OnRead = Callable[[int, int], None]  # called with the numbers of trials that are read, and to be read
+
+
+class _KeptRow(msgspec.Struct, array_like=True, frozen=True, gc=False):
+    """A line of the file: a `StoredTrial` by the name of its folder."""
+
+    name: str
+    stamp: Stamp
+    settings: dict[str, Any]
+    inputs: dict[str, str]
+    row: dict[str, Any]
+    as_measured: bool
+
+
+_DECODER, _ENCODER = msgspec.json.Decoder(_KeptRow), msgspec.json.Encoder()
+
+
+class TrialReader:
+    """Reads the trials of a batch folder, and keeps what it has read in that folder."""
+
+    def __init__(self, out: Path, *, workers: int = 1, on_read: OnRead = lambda *_: None) -> None:
+        self._trials, self._file = out / TRIALS, out / ROWS
+        self._workers, self._on_read = workers, on_read
+        self._known = {row.name: self._trial(row) for row in _load(self._file)}
+        self._saved = dict(self._known)
+
+    def add(self, trial: StoredTrial) -> None:
+        """Take a trial that was read elsewhere."""
+        self._known[trial.path.name] = trial
+
+    def read(self) -> tuple[list[StoredTrial], dict[Path, str]]:
+        """Return the trials by name, and what is wrong with those that cannot be used."""
+        paths = self._paths()
+        self._known = {
+            path.name: trial
+            for path in paths
+            if (trial := self._known.get(path.name)) is not None and trial.stamp == stamp_of(path)
+        }
+        unusable = {}
+        try:
+            unread = [path for path in paths if path.name not in self._known]
+            for number, (path, result) in enumerate(self._results(unread), start=1):
+                if isinstance(result, str):
+                    unusable[path] = result
+                else:
+                    self.add(result)
+                self._on_read(number, len(unread))
+        finally:
+            self._save()
+        return [self._known[path.name] for path in paths if path not in unusable], unusable
+
+    def _paths(self) -> list[Path]:
+        with suppress(FileNotFoundError), os.scandir(self._trials) as entries:
+            names = sorted(e.name for e in entries if not e.name.startswith(".") and e.is_dir())
+            return [self._trials / name for name in names]
+        return []
+
+    def _results(self, unread: list[Path]) -> Iterator[tuple[Path, StoredTrial | str]]:
+        left = iter(unread)
+        if self._workers > 1 and len(unread) >= POOL_FROM:
+            with suppress(BrokenProcessPool), worker_pool(self._workers) as pool:
+                for result in pool.map(_read, unread, chunksize=20):
+                    yield next(left), result
+        for path in left:  # of a pool that broke, too
+            yield path, _read(path)
+
+    def _trial(self, row: _KeptRow) -> StoredTrial:
+        return StoredTrial(
+            self._trials / row.name, row.settings, row.inputs, row.row, row.as_measured, row.stamp
+        )
+
+    def _save(self) -> None:
+        """Keep the rows of complete trials; a folder that cannot be written is no reason to fail."""
+        kept = {name: trial for name, trial in self._known.items() if trial.complete}
+        if kept == self._saved:
+            return
+        with suppress(OSError), replacing(self._file) as path, gzip.open(path, "wb", compresslevel=1) as file:
+            file.write(_header())
+            for name, t in kept.items():
+                row = _KeptRow(name, t.stamp, dict(t.settings), dict(t.inputs), dict(t.row), t.as_measured)
+                file.write(_ENCODER.encode(row) + b"\n")
+        self._saved = kept
+
+
+def read_trials(out: Path) -> tuple[list[StoredTrial], Mapping[Path, str]]:
+    """Trials of a batch folder by name, and what is wrong with those that cannot be used."""
+    return TrialReader(out).read()
+
+
+def _header() -> bytes:
+    return f"{source_digest(*CODE)}\n".encode()
+
+
+def _load(file: Path) -> Iterable[_KeptRow]:
+    """Rows of a file; none if it is damaged, or if other code wrote it."""
+    if not file.is_file():
+        return []
+    try:
+        with gzip.open(file, "rb") as lines:
+            if lines.readline() == _header():
+                return [_DECODER.decode(line) for line in lines]
+    except (OSError, EOFError, zlib.error, msgspec.DecodeError, UnicodeDecodeError):
+        pass
+    return []
+
+
+def _read(path: Path) -> StoredTrial | str:
+    """Read a trial. Return what is wrong with one that cannot be used."""
+    try:
+        return read_trial(path)
+    except (RecordError, OSError, KeyError, TypeError, ValueError) as error:
+        return str(error)
