@@ -11,6 +11,7 @@ from typing import Any
 
 from experiments.cli.options import add_command, add_force
 from experiments.errors import RecordError, ReplayError
+from experiments.people.copies import note_derived
 from mjsim.files import write_text_atomically
 
 DESCRIPTION = """\
@@ -74,6 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{arguments.directory} is neither a run directory nor the folder of a batch or of `mjsim play`"
         )
     if arguments.out is not None:
+        note_derived(arguments.directory, "metrics", arguments.out)
         write_text_atomically(arguments.out, _text(rows, arguments.out.suffix))
     elif is_run(arguments.directory):
         sys.stdout.writelines(f"{name:<32} {_shown(value)}\n" for name, value in rows[0].items())

@@ -105,6 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
     from experiments.cli.terminal import error_console, progress_bars
+    from experiments.people.copies import note_derived
     from experiments.record.run_directory import check_file
     from experiments.replay.replay import ReplayFilm, replay
 
@@ -113,6 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.video.suffix != ".mp4":
             raise ConfigError(f"cannot film to {arguments.video}: name a file that ends in .mp4")
         check_file(arguments.video, replace=arguments.force)
+        note_derived(arguments.directory, "film", arguments.video)
         film = ReplayFilm(
             path=arguments.video,
             config=film_config(arguments) if arguments.size else None,

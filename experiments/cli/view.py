@@ -45,6 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from experiments.cli.replay import run_of
     from experiments.cli.terminal import error_console, progress_bars
+    from experiments.people.copies import note_derived
     from experiments.record.run_directory import check_file
     from experiments.web.view.page import view_page
     from mjsim.files import replacing
@@ -62,6 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
             on_progress=lambda done, total: bars.update(bar, completed=done, total=total),
         )
     path = arguments.out or Path(tempfile.mkdtemp(prefix="mjsim-view-")) / "run.html"
+    note_derived(arguments.directory, "page", path)
     with replacing(path) as temporary:
         temporary.write_text(page, "utf-8")
     print(path)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import ConfigError, RecordError, ReplayError
+from experiments.people.copies import INDEX
 from experiments.people.items import Item
 from experiments.people.store import Answer, Person, PhaseRow, Store, TrialRow
 from experiments.people.study_file import SURVEY, Study
@@ -96,7 +97,7 @@ def collect_visits(folder: Path) -> Collected:
     unusable: dict[str, str] = {}
     under_way = 0
     for visit in visit_folders(folder):
-        name = f"v{hashlib.sha256(visit.name.encode()).hexdigest()[:8]}"  # the folder's name is the hash of the link
+        name = visit_name(visit.name)
         if not is_run(visit / TASK):
             under_way += 1
             continue
@@ -108,8 +109,9 @@ def collect_visits(folder: Path) -> Collected:
 
 
 def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
-    """Write `trials.parquet`, `trials.csv` and `texts.csv` into a folder; their paths."""
+    """Write `trials.parquet`, `trials.csv` and `texts.csv` into a folder, and return their paths."""
     out.mkdir(parents=True, exist_ok=True)
+    (out / INDEX).touch()
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("participant", "item", "text"))
@@ -121,6 +123,11 @@ def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
 def person_name(person: Person) -> str:
     """The name of a person in tables: the number in the store."""
     return f"p{person.id:05d}"
+
+
+def visit_name(folder: str) -> str:
+    """The name in tables of a visit without a store, whose folder's name is the hash of its link."""
+    return f"v{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
 
 
 def person_number(name: str) -> int:

@@ -1,30 +1,43 @@
-"""Where copies of a study's data were written, so that somebody who is erased is erased there too."""
+"""Lists of what was written with a study's data, so that a person who is erased is erased there, too."""
 
+from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
-INDEX = "copies.jsonl"  # in the study's folder
+from mjsim.files import write_text_atomically
 
-Kind = Literal["backup", "export", "table"]
+INDEX = "copies.jsonl"  # in the study's folder, and in its tables and exports for what was made of those
+
+DATABASES = ("backup", "database")
+Kind = Literal["backup", "database", "export", "table", "analysis", "film", "page", "metrics"]
 
 
-class Copy(msgspec.Struct, frozen=True):
-    """A copy: what it is, where it was written, and when."""
+class Copy(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A copy: what it is, where it was written and when, and the part of the folder that it was made of."""
 
     kind: Kind
     path: str
     made: str
+    source: str = ""
 
 
-def note_copy(folder: Path, kind: Kind, path: Path) -> None:
-    """Remember a copy; call it before the copy is written."""
+def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
+    """Record a copy; call it before the copy is written."""
     made = datetime.now(UTC).isoformat(timespec="seconds")
-    line = msgspec.json.encode(Copy(kind, str(path.absolute()), made)) + b"\n"
+    line = msgspec.json.encode(Copy(kind, str(path.absolute()), made, source)) + b"\n"
     with (folder / INDEX).open("ab") as file:
         file.write(line)
+
+
+def note_derived(source: Path, kind: Kind, path: Path) -> None:
+    """Record what is made of a run or a table, if it is in a folder that lists its copies."""
+    source = source.absolute()
+    for folder in (source, *source.parents):
+        if (folder / INDEX).is_file():
+            return note_copy(folder, kind, path, str(source.relative_to(folder)))
 
 
 def copies(folder: Path) -> list[Copy]:
@@ -33,3 +46,11 @@ def copies(folder: Path) -> list[Copy]:
     lines = path.read_bytes().splitlines() if path.is_file() else []
     found = [msgspec.json.decode(line, type=Copy) for line in lines if line.endswith(b"}")]
     return list({copy.path: copy for copy in found}.values())
+
+
+def forget_copies(folder: Path, paths: Collection[str]) -> None:
+    """Remove copies that were deleted from the list."""
+    if not paths:
+        return
+    left = [copy for copy in copies(folder) if copy.path not in paths]
+    write_text_atomically(folder / INDEX, "".join(msgspec.json.encode(copy).decode() + "\n" for copy in left))

@@ -13,7 +13,7 @@ from typing import Any
 from experiments.errors import RecordError
 from experiments.people.codebook import Variable, codebook
 from experiments.people.collect import FREE, Collected, collect, harmless, person_name
-from experiments.people.copies import note_copy
+from experiments.people.copies import INDEX, note_copy
 from experiments.people.store import Answer, Person, Store, TrialRow
 from experiments.people.study_file import Study
 from experiments.record.files import write_json
@@ -78,6 +78,7 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
         for row in trials:
             shutil.copytree(folder / row.folder, made / RUNS / _name(row) / row.phase)
         made.chmod(0o755)
+        (made / INDEX).write_bytes((out / INDEX).read_bytes() if (out / INDEX).is_file() else b"")
         note_copy(folder, "export", out)
         if out.exists():
             exchange(made, out)
@@ -142,7 +143,7 @@ def _write(out: Path, study: Study, tables: Mapping[str, Table]) -> None:
     rows = [{"name": v.name, "description": v.description, "values": "; ".join(v.levels)} for v in variables]
     write_text_atomically(out / CODEBOOK, csv_text(rows))
     write_json(out / DESCRIPTION, _description(study, variables))
-    write_text_atomically(out / IGNORED, f"{RUNS}/\n{CODEBOOK.parent}/\n")
+    write_text_atomically(out / IGNORED, f"{RUNS}/\n{CODEBOOK.parent}/\n{INDEX}\n")
     write_text_atomically(out / README, _readme(study, short))
 
 
@@ -184,4 +185,5 @@ def _readme(study: Study, short: str) -> str:
 | journals of trials: `mjsim replay`, `mjsim view` | `runs/PERSON/PHASE/` |
 
 The folder follows Psych-DS. People are numbers; nothing in it comes from a recruiting platform.
+`{INDEX}` lists what was made of it on this computer; delete it before you publish the folder.
 """

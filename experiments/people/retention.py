@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import NoReturn
 
 from experiments.errors import StoreError
-from experiments.people.collect import person_name
-from experiments.people.copies import copies
-from experiments.people.erase import erase
-from experiments.people.store import Person, Store, rewrite_backup, utc_now
+from experiments.people.collect import person_name, visit_name
+from experiments.people.erase import change_databases, erase, remove_from_files
+from experiments.people.store import Person, Store, utc_now
 
 LOG = logging.getLogger("mjsim.study")
 WHO = "keep_days"  # in the audit log
@@ -91,7 +90,7 @@ async def _names(store: Store, people: Sequence[Person]) -> dict[int, str]:
 
 
 async def _forget(store: Store, visits: Path, people: Sequence[Person], names: Mapping[int, str]) -> None:
-    study, numbers = await store.study(), [person.id for person in people]
+    numbers = [person.id for person in people]
 
     async def gone(backup: Store) -> bool:
         ever = datetime.datetime.max.replace(tzinfo=datetime.UTC)
@@ -100,9 +99,10 @@ async def _forget(store: Store, visits: Path, people: Sequence[Person], names: M
             await backup.forget(sorted(identified), [names[number] for number in sorted(identified)], WHO)
         return bool(identified)
 
-    for copy in copies(visits.parent):
-        if copy.kind == "backup" and Path(copy.path).is_file():
-            await rewrite_backup(Path(copy.path), study.name, gone)
+    await change_databases(store, visits.parent, gone, "them")
+    for person in people:  # what was made of a folder of visits names the hash of the link
+        traces = (person.token_hash, visit_name(person.token_hash))
+        await asyncio.to_thread(remove_from_files, visits.parent, traces)
     for person in people:  # done again after a stop: who is moved already is not there
         if (folder := visits / person.token_hash).is_dir():
             await asyncio.to_thread(folder.rename, visits / names[person.id])

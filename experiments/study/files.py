@@ -16,13 +16,10 @@ from experiments.analysis.statistics.mixed import WaldTest
 from experiments.record.files import write_json
 from experiments.record.run_directory import check_file
 from experiments.study.analysis import Analysis, Test, tests_of
-from experiments.study.table import StudyTable
+from experiments.study.table import FILES, PEOPLE, REPORT, STATISTICS, TESTS, StudyTable
 from experiments.trials.trial_config import SEEDS
 from mjsim.files import replacing, write_text_atomically
 
-FOLDER = "analysis"
-REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "tests.csv"
-FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)
 TEST_COLUMNS = (
     *("origin", "measure", "column", "test", "effect", "objects", "statistic", "df1", "df2", "people", "p"),
     *("partial_eta_squared", "low", "high", "of", "reason"),

@@ -23,6 +23,9 @@ from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_
 from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
 
+ANALYSIS = "analysis"  # its usual folder
+REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "tests.csv"
+FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)  # of an analysis
 REQUIRED = ("assistance", "objects", "user")
 CONDITIONS = ("none", "highlight", "optimal")  # of the paper, in its order
 SHOWN = 20  # people in a line

@@ -41,16 +41,15 @@ def run(arguments: argparse.Namespace) -> int:
     require_extra("study")
     from experiments.errors import ConfigError
     from experiments.record.run_directory import check_file
-    from experiments.study.files import FOLDER
     from experiments.study.measures import read_measures
-    from experiments.study.table import read_study
+    from experiments.study.table import ANALYSIS, read_study
     from studies.published import read_published
     from studies.score import score
     from studies.score_files import FILES, write_score
 
     if arguments.seed < 0:
         raise ConfigError(f"--seed {arguments.seed} must not be negative")
-    out = arguments.folder / FOLDER if arguments.out is None else arguments.out
+    out = arguments.folder / ANALYSIS if arguments.out is None else arguments.out
     for name in FILES:
         check_file(out / name, replace=arguments.force)
     published = read_published()

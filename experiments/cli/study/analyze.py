@@ -55,17 +55,18 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Analyse, write, say where."""
     require_extra("study")
+    from experiments.people.copies import note_derived
     from experiments.study.analysis import analyse
-    from experiments.study.files import FOLDER, REPORT, check_files, write_analysis
+    from experiments.study.files import check_files, write_analysis
     from experiments.study.measures import read_measures
     from experiments.study.preregistration import departures, read_preregistration
     from experiments.study.report import report
     from experiments.study.robustness import Selection, leave_one_out
-    from experiments.study.table import people_path, read_people, study_table
+    from experiments.study.table import ANALYSIS, REPORT, people_path, read_people, study_table
     from experiments.trials.design import read_exclusions
     from experiments.trials.exclusions import Exclusions
 
-    out = arguments.folder / FOLDER if arguments.out is None else arguments.out
+    out = arguments.folder / ANALYSIS if arguments.out is None else arguments.out
     check_files(out, replace=arguments.force)
     frozen = None if arguments.preregistration is None else read_preregistration(arguments.preregistration)
     exclusions = Exclusions() if frozen is None else frozen.exclusions
@@ -81,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     if frozen is not None:
         departing = departures(frozen, exclusions, everybody, arguments.folder, measures)
         selection = Selection(without, frozen.sha256, departing)
+    note_derived(arguments.folder, "analysis", out)
     write_analysis(out, analysis, report(analysis, arguments.folder, selection), selection.as_json())
     print(
         f"{analysis.table.origin}: {len(analysis.table.rows)} people, {len(analysis.table.left_out)} left out. "

@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Collect; 1 if a run cannot be used."""
     require_extra("people")
     from experiments.people.collect import TEXTS, collect_visits, write_collected
-    from experiments.people.copies import note_copy
+    from experiments.people.copies import note_copy, note_derived
     from experiments.people.study_file import read_people_study
     from experiments.record.run_directory import check_file
     from experiments.study.simulate import study_path
@@ -65,6 +65,8 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if _is_served(arguments):
         note_copy(arguments.folder, "table", arguments.out)
+    else:
+        note_derived(arguments.folder, "table", arguments.out)
     table, *_ = write_collected(found, arguments.out)
     others = ", ".join(f"{number} {status.replace('_', ' ')}" for status, number in found.unfinished.items())
     print(f"{table} ({counted(len(found.rows), 'row')}; without one: {others or 'nobody'})")

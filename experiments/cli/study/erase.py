@@ -12,9 +12,10 @@ if TYPE_CHECKING:
     from experiments.people.study_file import Study
 
 DESCRIPTION = """\
-Delete all that a study knows of a person: the rows of the database, the journal and the runs, and the person in
-backups, tables and exports that were made of the study and are where they were written. The audit log keeps that it
-was done, and what was paid. Who is owed a payment must be paid first."""
+Delete all that a study stores about a person: the rows of the database, the journal and the runs. Backups, restored
+databases, tables and exports are written anew without the person. Analyses, metrics, films and pages that the person is
+in are deleted: make them again. A file that is no longer where it was written is named, with what to do. The audit log
+keeps that the person was erased, and what was paid. A person who is owed a payment must be paid first."""
 
 
 def add_parser(commands: Any) -> None:

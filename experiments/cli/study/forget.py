@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 DESCRIPTION = """\
 Delete who people are, keep_days of [study.limits] after their last sign: ids of platforms, the keys by which people
-are recognised, and links, also in backups that the study knows of. What they did and answered stays under a number;
+are recognised, and links, also in backups that the study lists. What they did and answered stays under a number;
 people who wanted their data deleted are erased. Who is owed a payment is kept until it is made. The server does the
 same once a day; run this command after the study."""
 

@@ -28,9 +28,13 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Restore."""
     require_extra("people")
+    from experiments.people.copies import note_derived
     from experiments.people.store import restore
 
     url = arguments.database
+    if "://" not in url:
+        note_derived(Path(url), "database", Path(url))
+        note_derived(arguments.backup, "database", Path(url))
     asyncio.run(restore(arguments.backup, url if "://" in url else sqlite_url(Path(url))))
     print(url)
     return 0

@@ -36,7 +36,7 @@ Serve a study with people: consent, a check of the computer, the story, a film o
 training, task, survey, and the way back to where people came from. STUDY.toml is a design with a table [study]
 (docs/study-with-people.md); `paper` is the published study. Prints the URL on a separate line and opens it.
 
-Everything is kept in --out: the database, the journals and run directories of trials, the film, and the secret from
+Everything is kept in --out: the database, run directories and journals of trials, the film, and the secret from
 which people who come from a platform are recognised ({SECRET} sets another one). Ctrl-C ends the server; the same
 command continues the study, and everybody in it continues where they stopped."""
 
@@ -73,6 +73,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Serve until a signal comes."""
     require_extra("people")
+    from experiments.people.copies import INDEX
     from experiments.people.phases import phases_of_study
     from experiments.people.recruitment import recruiter
     from experiments.people.study_file import read_people_study
@@ -96,6 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
             at = listen(arguments.researcher_host, arguments.researcher_port)
             researchers = open_things.enter_context(at)
         open_things.enter_context(locked(arguments.out))
+        (arguments.out / INDEX).touch()
         from experiments.web.server.pool import WorkerPool
 
         pool = WorkerPool(study.cells[0].trial(0).house)

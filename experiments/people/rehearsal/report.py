@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from experiments.people.collect import collect, write_collected
+from experiments.people.copies import note_copy
 from experiments.people.export import export
 from experiments.people.payments import decide, due
 from experiments.people.rehearsal.person import Rehearsed
@@ -70,6 +71,7 @@ async def report(
     found = await collect(study, store, served)
     faults += [f"{person}: {fault}" for person, fault in found.unusable.items()]
     if found.rows:
+        note_copy(served, "table", out / TABLE)
         write_collected(found, out / TABLE)
         await export(study, store, served, out / EXPORT, replace=True)
     counts = (await store.counts()).cells

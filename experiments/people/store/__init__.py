@@ -3,7 +3,7 @@
 from experiments.people.store.choice import choose
 from experiments.people.store.copies import restore
 from experiments.people.store.ledger import Ledger
-from experiments.people.store.store import Store, rewrite_backup
+from experiments.people.store.store import Store, change_database
 from experiments.people.store.values import (
     Answer,
     Assignment,
@@ -47,8 +47,8 @@ __all__ = [
     "StudyRow",
     "StudyState",
     "TrialRow",
+    "change_database",
     "choose",
     "restore",
-    "rewrite_backup",
     "utc_now",
 ]

@@ -1,9 +1,8 @@
 """The store of a study: who takes part, how far they are, what they answered, what they are paid."""
 
-import shutil
 import sqlite3
 from collections.abc import Awaitable, Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
@@ -70,6 +69,13 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         """Tell how long each transaction that writes took, s."""
         self._database.on_write = tell
 
+    def is_at(self, path: Path) -> bool:
+        """Return whether the database is this file."""
+        return (
+            self._database.kind == "sqlite"
+            and path.resolve() == Path(self._database.url.database or "").resolve()
+        )
+
     async def backup(self, path: Path) -> None:
         """Write the whole database, as of one moment, to a new SQLite file; people may go on meanwhile."""
         await back_up(self._database, path)
@@ -110,35 +116,25 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
             return tuple(AuditRow(*row) for row in await connection.execute(query))
 
 
-async def rewrite_backup(path: Path, study_name: str, work: Callable[[Store], Awaitable[bool]]) -> bool:
-    """Change what a backup holds of a study, whole or not at all; whether something was changed.
+async def change_database(path: Path, study_name: str, work: Callable[[Store], Awaitable[bool]]) -> bool:
+    """Let `work` change what a backup or another SQLite file holds of a study, and return what it returned.
 
-    Args:
-        path: A file that :meth:`Store.backup` wrote.
-        study_name: Name of the study.
-        work: Changes it, and says whether there was something to change.
+    Raises StoreError if the file cannot be read, or the database cannot do it.
     """
-    part = path.with_name(f"{path.name}.part")
-    shutil.copyfile(path, part)
     try:
-        with closing(sqlite3.connect(part)) as connection:
+        with closing(sqlite3.connect(path)) as connection:
             row = connection.execute("SELECT file_hash FROM study WHERE name = ?", (study_name,)).fetchone()
-        if row is None:
-            return False
-        store = await Store.open(f"sqlite:///{part}", study_name, row[0])
-        try:
-            changed = await work(store)
-        finally:
-            await store.close()
-        if changed:
-            one_file(part)
-            part.replace(path)
-        return changed
     except sqlite3.DatabaseError as error:
-        raise StoreError(f"{path} is no backup that can be read ({error}): delete it.") from error
+        raise StoreError(f"cannot read {path} ({error}): delete it.") from error
+    if row is None:
+        return False
+    store = await Store.open(f"sqlite:///{path}", study_name, row[0])
+    try:
+        return await work(store)
     finally:
-        for left in path.parent.glob(f"{part.name}*"):
-            left.unlink()
+        await store.close()
+        with suppress(sqlite3.OperationalError):  # another process serves it
+            one_file(path)
 
 
 async def _study_id(database: Database, name: str, file_hash: str) -> int:

@@ -52,6 +52,14 @@ async def _open(names):
     return await Store.open(f"sqlite:///{names[1]}/study.db", study.settings.name, study.sha256)
 
 
+async def audit_log(names):
+    store = await _open(names)
+    try:
+        return await store.audit_log()
+    finally:
+        await store.close()
+
+
 async def _fill(study, folder, runs):
     store = await Store.open(f"sqlite:///{folder}/study.db", study.settings.name, study.sha256)
     for name in PEOPLE:
@@ -103,12 +111,19 @@ def test_who_is_erased_is_nowhere_any_more(served, tmp_path, capsys):
 
 
 def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
-    (tmp_path / "backup.db").rename(tmp_path / "elsewhere.db")
+    moved = [tmp_path / "backup.db", tmp_path / "runs.csv", tmp_path / "served" / "restored.db"]
+    assert main(["study", "restore", str(moved[0]), str(moved[2])]) == 0
+    assert main(["metrics", f"{served[1]}/visits/{'b' * 64}/task", "--out", str(moved[1])]) == 0
+    for path in moved:
+        path.rename(path.with_name(f"{path.name}-elsewhere"))
     visits = tmp_path / "served" / "visits"
     (visits / ("b" * 64)).rename(tmp_path / "another-host")
     capsys.readouterr()
     assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
-    assert "backup.db of" in (said := capsys.readouterr().out) and "where it was moved, delete p00002" in said
+    said = capsys.readouterr().out
+    for path in moved:
+        (line,) = (line for line in said.splitlines() if f"{path} of " in line)
+        assert "is not there any more; where it was moved, delete p00002 there" in line
     assert f"the runs of p00002 are not here; delete visits/{'b' * 64}" in said
 
 
@@ -143,6 +158,9 @@ def test_who_people_are_is_forgotten_by_date(served, tmp_path, capsys):
     assert (planned.forgotten, planned.erased, planned.unpaid) == (("p00002",), ("p00003",), ("p00001",))
     assert traces(tmp_path / "served", "bert-PID")
     assert asyncio.run(forget(32)) == planned
+    log = [(row.who, row.action, row.details) for row in asyncio.run(audit_log(served))]
+    assert ("keep_days", "people forgotten", {"people": [2]}) in log
+    assert ("keep_days", "person erased", {"person": 3, "paid": []}) in log
     assert traces(tmp_path, "bert-PID", "bert-SUBMISSION", "bert-key", "b" * 64) == []
     assert traces(tmp_path, *[f"cleo-{trace}" for trace in TRACES], "c" * 64) == []
     assert traces(tmp_path / "served", "anna-PID") and traces(tmp_path / "served", "bert-wrote")

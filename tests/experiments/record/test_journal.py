@@ -1,5 +1,6 @@
 """The journal of a session: whatever happens to the file, what was synced is there, and nothing else."""
 
+import os
 import resource
 import signal
 import zlib
@@ -11,6 +12,8 @@ from hypothesis import strategies as st
 
 from experiments.errors import RecordError
 from experiments.record.journal import MAGIC, Entry, Journal, read_entries
+from experiments.web.protocol import Taken
+from experiments.web.worker.clock import _Acknowledger
 
 ENTRIES = st.builds(Entry, st.binary(max_size=300), st.lists(st.text(max_size=20), max_size=3))
 RECORDS = st.lists(ENTRIES, max_size=12)
@@ -71,6 +74,63 @@ def test_a_damaged_byte_is_never_read_as_a_record(tmp_path, records, data):
     path.write_bytes(content)
     read = list(read_entries(path))
     assert read == records[: len(read)] and len(read) < len(records)
+
+
+@pytest.fixture
+def on_disk(monkeypatch):
+    """Sizes of files, by inode, that a power cut leaves: those at their last sync."""
+    sizes = {}
+    for name in ("fsync", "fdatasync"):
+
+        def sync(file, call=getattr(os, name)):
+            call(file)
+            found = os.fstat(file)
+            sizes[found.st_ino] = found.st_size
+
+        monkeypatch.setattr(os, name, sync)
+    return lambda path: sizes.get(path.stat().st_ino)
+
+
+def test_a_journal_that_was_made_survives_a_power_cut(tmp_path, on_disk):
+    with Journal(tmp_path / "journal"):
+        assert on_disk(tmp_path / "journal") == len(MAGIC), "its first bytes"
+        assert on_disk(tmp_path) is not None, "its name"
+
+
+def test_a_journal_without_what_was_cut_off_survives_a_power_cut(tmp_path, on_disk):
+    path = written(tmp_path / "journal", [FULL])
+    whole = path.stat().st_size
+    with path.open("ab") as file:
+        file.write(b"cut off")
+    with Journal(path):
+        assert on_disk(path) == whole == path.stat().st_size
+
+
+def test_everything_before_a_sync_survives_a_power_cut(tmp_path, on_disk):
+    path = tmp_path / "journal"
+    with Journal(path) as journal:
+        for number in range(1, 4):
+            journal.append(FULL)
+            before = on_disk(path)
+            journal.append(LATER)
+            journal.sync()
+            assert before < on_disk(path) == path.stat().st_size
+            (tmp_path / "after").write_bytes(path.read_bytes()[: on_disk(path)])
+            assert read_entries(tmp_path / "after") == (FULL, LATER) * number
+
+
+def test_an_input_is_acknowledged_once_it_is_on_the_disk(tmp_path, on_disk):
+    path, sent = tmp_path / "journal", []
+    with Journal(path) as journal:
+        acknowledger = _Acknowledger(journal.sync, lambda taken: sent.append((taken, on_disk(path))))
+        sizes = []
+        for number in range(1, 6):
+            journal.append(FULL)
+            sizes.append(journal.size)
+            acknowledger.request(number, number)
+        acknowledger.close()
+    assert sent[-1][0] == Taken(5, 5)
+    assert all(size >= sizes[taken.input - 1] for taken, size in sent)
 
 
 def test_another_file_is_refused(tmp_path):

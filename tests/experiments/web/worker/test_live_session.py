@@ -12,7 +12,10 @@ import pytest
 
 from experiments.record.checksums import CHECKSUMS, write_checksums
 from experiments.record.files import read_arrays, read_json, save_arrays
+from experiments.record.journal import read_entries
+from experiments.record.reader import read_journal
 from experiments.record.records import EVENTS, FILES, METRICS, TOPDOWN, TRAJECTORY
+from experiments.record.verify import damage
 from experiments.replay.replay import replay
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
@@ -186,6 +189,16 @@ def test_a_journal_whose_run_does_not_hold_all_of_it_is_kept(visit, harm, caplog
     remove_journal(journal, visit / "task")
     assert (journal / "journal.bin").read_bytes() == before
     assert "journal.bin is kept: " in caplog.text
+
+
+def test_a_line_that_is_no_event_is_damage_even_if_all_hashes_fit(saved):
+    header, *entries = read_entries(saved / "journals" / "task" / "journal.bin")
+    assert damage(read_journal([header, *entries])) == []
+    number = next(k for k, entry in enumerate(entries) if k and entry.events)
+    wrong = msgspec.structs.replace(entries[number], events=['{"event": "nonsense", "time": 1.0}'])
+    found = damage(read_journal([header, *entries[:number], wrong, *entries[number + 1 :]]))
+    assert [mismatch.file for mismatch in found] == [EVENTS]
+    assert f"line {1 + sum(len(entry.events) for entry in entries[:number])}: " in found[0].message
 
 
 @pytest.mark.parametrize("stage", ["saved", "drawn", "deleted"])
