@@ -168,7 +168,6 @@ def test_a_person_who_is_erased_is_in_no_file_of_the_study(served, tmp_path, cap
         "runs.csv",
         "table/texts.csv",
         "restored.db",
-        "export/copies.jsonl",
         "served/again/study.db",
     }
     assert before["bert"] >= {*wanted, "served/study.db", "another analysis/people.parquet"}, (

@@ -80,14 +80,17 @@ def test_a_damaged_byte_is_never_read_as_a_record(tmp_path, records, data):
 def on_disk(monkeypatch):
     """Sizes of files, by inode, that a power cut leaves: those at their last sync."""
     sizes = {}
-    for name in ("fsync", "fdatasync"):
 
-        def sync(file, call=getattr(os, name)):
+    def syncing(call):
+        def sync(file):
             call(file)
             found = os.fstat(file)
             sizes[found.st_ino] = found.st_size
 
-        monkeypatch.setattr(os, name, sync)
+        return sync
+
+    for name in ("fsync", "fdatasync"):
+        monkeypatch.setattr(os, name, syncing(getattr(os, name)))
     return lambda path: sizes.get(path.stat().st_ino)
 
 
