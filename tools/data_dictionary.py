@@ -26,6 +26,18 @@ _TABLES = """\
 
 One row per trial of a batch. The columns are the rows of `metrics.json` under the same names, with null (in CSV:
 nothing) where a value is not known. CSV leaves out columns that are null throughout.
+
+## trials/*.sqlar
+
+Packed trials ([designs.md](designs.md#packed-trials)): SQLite databases with one table, `sqlar`, and one row per file.
+
+| column | type | what |
+|---|---|---|
+| `name` | text | `TRIAL/FILE`, unique. |
+| `mode` | int | File type and permissions, as `st_mode`. |
+| `mtime` | int | Time of the last change, in seconds since 1970. |
+| `sz` | int | Size of the file, in bytes. |
+| `data` | blob | Content, compressed with zlib if that is shorter than `sz`. |
 """
 _EVENTS = """\
 ## events.jsonl

@@ -28,7 +28,8 @@ DESCRIPTION = """\
 Run the trials of a design file, or one for every combination of --objects, --assistance, --user and --seeds, without
 video, one process per core. Each trial is a run directory under OUT/trials; OUT/trials.parquet and OUT/trials.csv hold
 one row per trial. Finished trials are not run again: give the command once more to continue after an interruption, or
-with more values to extend the design. The records do not depend on --workers."""
+with more values to extend the design. The records do not depend on --workers.
+--packed stores trials in a few SQLite archives, which the other commands read like run directories."""
 
 
 def add_parser(commands: Any) -> None:
@@ -86,7 +87,9 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.cli.terminal import error_console
 
     design = _design(arguments)
-    rows, failed = run_with_progress(design, arguments.out, arguments.workers, arguments.executor)
+    rows, failed = run_with_progress(
+        design, arguments.out, arguments.workers, arguments.executor, arguments.packed
+    )
     error_console().print(
         f"{counted(len(rows), 'trial')} in {arguments.out}/trials.parquet and .csv; {failed} failed"
     )

@@ -12,7 +12,7 @@ from experiments.trials.workers import EXECUTORS, PROCESSES
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add `--workers`, `--executor` and `--call-limit`."""
+    """Add `--workers`, `--executor`, `--packed` and `--call-limit`."""
     add_call_limit(parser)
     parser.add_argument(
         "--workers",
@@ -28,10 +28,16 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
         help="processes of this machine, or the Ray cluster at RAY_ADDRESS whose machines share OUT "
         "(default: %(default)s)",
     )
+    parser.add_argument(
+        "--packed",
+        action="store_true",
+        help="store the trials in OUT/trials/*.sqlar, one file per worker, instead of a folder each: for batches of "
+        "many thousands (`mjsim unpack --help`)",
+    )
 
 
 def run_with_progress(
-    design: Design, out: Path, workers: int, executor: str, what: str = "trials"
+    design: Design, out: Path, workers: int, executor: str, packed: bool, what: str = "trials"
 ) -> tuple[list[Mapping[str, Any]], int]:
     """Run what is missing of a design; all rows of the folder, and how many trials failed. `what` precedes the bar."""
     from rich.progress import (
@@ -76,6 +82,7 @@ def run_with_progress(
             out,
             workers=workers,
             executor=executor,
+            packed=packed,
             on_progress=show,
             on_note=note,
             on_read=show_reading,

@@ -23,6 +23,7 @@ COMMANDS = {
     "view": "look at a recorded run in the browser",
     "batch": "run the trials of a design on all cores; resumes",
     "metrics": "compute the metrics of a run or a batch anew",
+    "unpack": "turn packed trials of a batch into run directories",
     "compare": "compare the assistance conditions of a batch",
     "study": "simulate and analyse studies, score them against the published one, plan them",
     "plan": "solve a routing problem from a JSON file",

@@ -52,16 +52,17 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print or write the metrics; 1 if a trial of a batch cannot be measured."""
+    from experiments.record.archive import archive_of, run_paths
     from experiments.record.phases import TASK
     from experiments.record.run_directory import TRIALS, check_file, is_batch, is_run, visit_folders
 
     if arguments.out is not None:
         check_file(arguments.out, replace=arguments.force)
-    if is_run(arguments.directory):
+    is_one = is_run(arguments.directory) or archive_of(arguments.directory) is not None
+    if is_one:
         rows, failures = [_measured(arguments.directory)], 0
     elif is_batch(arguments.directory):
-        runs = sorted(p for p in (arguments.directory / TRIALS).glob("[!.]*") if p.is_dir())
-        rows, failures = _measure_all({path: {} for path in runs})
+        rows, failures = _measure_all({path: {} for path in run_paths(arguments.directory / TRIALS)})
     elif found := visit_folders(arguments.directory):
         rows, failures = _measure_all(
             {
@@ -77,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         note_derived(arguments.directory, "metrics", arguments.out)
         write_text_atomically(arguments.out, _text(rows, arguments.out.suffix))
-    elif is_run(arguments.directory):
+    elif is_one:
         sys.stdout.writelines(f"{name:<32} {_shown(value)}\n" for name, value in rows[0].items())
     else:
         sys.stdout.write(_text(rows, ".csv"))
@@ -93,11 +94,13 @@ def _table_file(text: str) -> Path:
 
 def _measured(path: Path) -> Mapping[str, Any]:
     """Metrics of one run; says so where its `metrics.json` says something else."""
+    from experiments.record.archive import opened_run
     from experiments.record.verify import check_log
     from experiments.trials.batch_folder import read_trial
 
-    check_log(path)
-    trial = read_trial(path)
+    with opened_run(path) as run:
+        check_log(run)
+        trial = read_trial(run)
     if not trial.as_measured:
         print(f"mjsim: {path}: metrics.json does not say this; these follow from the log", file=sys.stderr)
     return trial.row

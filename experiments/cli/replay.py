@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 DESCRIPTION = """\
 Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one
-bit for bit. DIR is a run directory, however the run ended. Prints for every file of it what was checked, and exits with
-0, or names the first step that differs and exits with 1. Of a session of `mjsim play` that is not over, the run is made
-from its journal, as far as it goes, and replayed.
+bit for bit. DIR is a run directory or a packed trial (OUT/trials/NAME), however the run ended. Prints for every file of
+it what was checked, and exits with 0, or names the first step that differs and exits with 1. Of a session of
+`mjsim play` that is not over, the run is made from its journal, as far as it goes, and replayed.
 
 With --video, the replay is filmed: as it was, or in another size, from another camera, with another HUD."""
 
@@ -39,7 +39,7 @@ def add_parser(commands: Any) -> None:
         run,
         description=DESCRIPTION,
     )
-    parser.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+    parser.add_argument("directory", type=Path, metavar="DIR", help="run directory or packed trial")
     parser.add_argument(
         "--from",
         dest="start",
@@ -150,12 +150,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def run_of(arguments: argparse.Namespace) -> Iterator[Path]:
-    """The run directory; that of a session which is not over is made for as long as it is needed.
+    """The run directory; that of a packed trial, or of a session which is not over, is made while it is needed.
 
     Raises:
         RecordError: Nothing was played.
     """
     from experiments.house import House
+    from experiments.record.archive import opened_run
     from experiments.record.run_directory import is_run
     from experiments.web.worker.live_session import (  # imported late: most runs have no journal
         journal_of,
@@ -164,7 +165,8 @@ def run_of(arguments: argparse.Namespace) -> Iterator[Path]:
 
     journal = None if is_run(arguments.directory) else journal_of(arguments.directory)
     if journal is None:
-        yield arguments.directory
+        with opened_run(arguments.directory) as run:
+            yield run
         return
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "unfinished"

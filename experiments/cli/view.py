@@ -22,7 +22,7 @@ WebGL 2, and neither a server nor mjsim."""
 def add_parser(commands: Any) -> None:
     """Add the subcommand."""
     parser = add_command(commands, "view", run, description=DESCRIPTION)
-    parser.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+    parser.add_argument("directory", type=Path, metavar="DIR", help="run directory or packed trial")
     parser.add_argument(
         "--out", type=Path, metavar="FILE.html", help="write the page to a file, and open nothing"
     )

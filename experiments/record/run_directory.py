@@ -15,6 +15,7 @@ from mjsim.files import exchange, work_folder
 SHOWN_NAMES = 3  # of what is in the way
 SAMPLE = 100  # number of folders in a batch that are looked into; looking into all takes long over a network
 TRIALS = "trials"  # folder of a batch
+PACKED = ".sqlar"  # suffix of an archive of runs
 VISIT = "visit.json"  # in the folder of each visit of `mjsim play`
 
 
@@ -24,16 +25,17 @@ def is_run(directory: Path) -> bool:
 
 
 def is_batch(directory: Path) -> bool:
-    """Whether `directory` is the folder of a batch: it holds folders only, and a sample of them holds runs."""
+    """Whether `directory` is the folder of a batch: it holds folders and archives, and a sample of folders holds runs."""
     trials = directory / TRIALS
     if not trials.is_dir():
         return False
     with os.scandir(trials) as entries:
-        inside = [entry for entry in entries if not entry.name.startswith(".")]
+        inside = [entry for entry in entries if PACKED in entry.name or not entry.name.startswith(".")]
     if not inside:  # a batch that was killed before its first trial was done has no table either
         return not list(directory.glob(f"{TRIALS}.*"))
-    sample = (Path(entry) for entry in inside[:SAMPLE])
-    return all(entry.is_dir() for entry in inside) and all(is_run(p) or not p.exists() for p in sample)
+    folders = [entry for entry in inside if PACKED not in entry.name]
+    sample = (Path(entry) for entry in folders[:SAMPLE])
+    return all(entry.is_dir() for entry in folders) and all(is_run(p) or not p.exists() for p in sample)
 
 
 def visit_folders(directory: Path) -> list[Path]:

@@ -15,6 +15,7 @@ from experiments.analysis.page import Picture
 from experiments.errors import RecordError
 from experiments.house import House
 from experiments.record import records
+from experiments.record.archive import opened_run, read_file, run_paths
 from experiments.record.files import read_arrays
 from experiments.record.phases import TASK
 from experiments.record.run_directory import TRIALS, is_run
@@ -22,7 +23,6 @@ from experiments.record.topdown import PLANNED, WALKED, planned_path
 from experiments.study.figures import svg
 from experiments.study.table import StudyTable
 from mjsim.episode import Episode
-from mjsim.files import read_text
 
 WIDTH = 4.0  # inches of a panel
 DISTANCE = "distance"
@@ -35,7 +35,8 @@ def paths_figure(table: StudyTable, folder: Path) -> Picture:
         raise RecordError(f"{folder} holds no run directories of its people")
     figure = Figure(figsize=(WIDTH * len(shown), 0.8 * WIDTH), layout="constrained")
     for axes, (row, run) in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
-        _draw_run(axes, row, run)
+        with opened_run(run) as opened:
+            _draw_run(axes, row, opened)
     figure.axes[0].legend(fontsize=7, loc="lower left")
     mark_origin(figure, table.origin)
     caption = (
@@ -61,13 +62,13 @@ def _run_of(row: Any, folder: Path) -> Path | None:
     visit = folder / str(row.get("participant")) / TASK
     if is_run(visit):
         return visit
-    for path in sorted((folder / TRIALS).glob(f"[!.]*/{records.METRICS}")):
+    for path in run_paths(folder / TRIALS):
         try:
-            metrics = json.loads(read_text(path))
-        except (OSError, ValueError):
+            metrics = json.loads(read_file(path, records.METRICS))
+        except (OSError, ValueError, RecordError):
             continue
         if row.get("fingerprint") is not None and metrics.get("fingerprint") == row["fingerprint"]:
-            return path.parent
+            return path
     return None
 
 

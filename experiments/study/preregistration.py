@@ -17,8 +17,9 @@ from typing import Any
 
 import msgspec
 
-from experiments.errors import ConfigError
+from experiments.errors import ConfigError, RecordError
 from experiments.record import records
+from experiments.record.archive import read_file, run_paths
 from experiments.record.run_directory import TRIALS
 from experiments.study.measures import FILE, Measures, decoded_measures, read_measures
 from experiments.trials.batch_checks import check_names
@@ -222,12 +223,11 @@ def _by_cell(rows: Sequence[Mapping[str, Any]], name: str) -> Counter[str]:
 def _settings_of_runs(folder: Path) -> list[dict[str, Any]]:
     """Settings of the trials in a folder, as their logs begin with them."""
     found = []
-    for path in sorted((folder / TRIALS).glob(f"[!.]*/{records.EVENTS}")):
+    for path in run_paths(folder / TRIALS):
         try:
-            with path.open(encoding="utf-8") as lines:
-                start = json.loads(next(lines))
+            start = json.loads(read_file(path, records.EVENTS).partition(b"\n")[0])
             found.append(_comparable({name: start[name] for name in SETTINGS}))
-        except (OSError, ValueError, KeyError, StopIteration):
+        except (OSError, ValueError, KeyError, RecordError):
             continue
     return found
 

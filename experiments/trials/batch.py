@@ -3,16 +3,21 @@
 import dataclasses
 import functools
 import gc
+import secrets
+import shutil
+import sqlite3
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.record.run_directory import TRIALS, check_batch_folder
+from experiments.record.archive import WAIT_S, adopt, new_archive, pack
+from experiments.record.run_directory import TRIALS, check_batch_folder, is_run
 from experiments.session.signals import signals_postponed
 from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import StoredTrial, folder_notes, read_trial, trial_key
@@ -21,9 +26,9 @@ from experiments.trials.design import Design, confounded
 from experiments.trials.table import write_tables
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import SEEDS, TrialConfig
-from experiments.trials.trial_reader import OnRead, TrialReader
+from experiments.trials.trial_reader import UNSTAMPED, OnRead, TrialReader
 from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor
-from mjsim.files import remove_leftovers
+from mjsim.files import remove_leftovers, work_folder
 from mjsim.model.house import MAX_HOUSES
 
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
@@ -46,6 +51,7 @@ def run_batch(
     *,
     workers: int,
     executor: str = PROCESSES,
+    packed: bool = False,
     on_progress: Callable[[BatchProgress], None] = lambda _: None,
     on_note: Callable[[str], None] = lambda _: None,
     on_read: OnRead = lambda *_: None,
@@ -57,6 +63,7 @@ def run_batch(
         out: Folder of the batch; an earlier batch there is added to.
         workers: How many trials at a time.
         executor: Who runs them: `processes` of this machine, or a `ray` cluster whose machines share the folder.
+        packed: Store the trials in archives, one per worker process, instead of run directories.
         on_progress: Called at the start and after every trial.
         on_note: Called with lines that a user should read: what is run again, what the tables leave out.
         on_read: Called after each finished trial that is read, with the numbers of trials read and to be read.
@@ -85,16 +92,20 @@ def run_batch(
     check_batch_folder(out)
     inputs = check_trials(design.trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
+    adopt(out / TRIALS)  # of a batch that was killed
     reader = TrialReader(out, workers=workers, on_read=on_read)
     plan = plan_batch(design.trials, inputs, out, reader)
     for line in filter(None, (*plan.notes, confounded(design.trials))):
         note(line)
+    archives = secrets.token_hex(4) if packed else None
     try:
-        _run_missing(plan, workers, executor, on_progress, reader)
+        _run_missing(plan, workers, executor, archives, on_progress, reader)
     finally:
         with signals_postponed() as signals:
             signals.save()
             remove_leftovers(out / TRIALS)
+            if archives is not None and adopt(out / TRIALS, archives, WAIT_S):
+                note("a worker still writes to its archive; run the command again to read its trials")
             rows = _write_rows(design.trials, out, note, reader)
     return rows
 
@@ -103,6 +114,7 @@ def _run_missing(
     plan: BatchPlan,
     workers: int,
     executor: str,
+    archives: str | None,
     on_progress: Callable[[BatchProgress], None],
     reader: TrialReader,
 ) -> None:
@@ -111,7 +123,7 @@ def _run_missing(
     on_progress(progress)
     if not plan.missing:
         return
-    for result in _results(plan.missing, workers, executor):
+    for result in _results(plan.missing, workers, executor, archives):
         if isinstance(result, str):
             field, failure = "failed", result
         else:
@@ -142,7 +154,9 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
     return [settings[name] for name in ("objects", "assistance", "user", "house", *SEEDS)]
 
 
-def _results(missing: Mapping[Path, TrialConfig], workers: int, executor: str) -> Iterator[StoredTrial | str]:
+def _results(
+    missing: Mapping[Path, TrialConfig], workers: int, executor: str, archives: str | None
+) -> Iterator[StoredTrial | str]:
     """Yield each trial that succeeds, else what went wrong; those whose process may die go last and alone.
 
     Trials go house by house: making one takes longer than many a trial in it.
@@ -152,11 +166,11 @@ def _results(missing: Mapping[Path, TrialConfig], workers: int, executor: str) -
     alone = {path: config for path, config in missing.items() if path not in left}
     while left:
         with EXECUTORS[executor](min(workers, len(left))) as pool:
-            yield from _together(pool, left, alone, workers)
+            yield from _together(pool, left, alone, workers, archives)
     for path, config in alone.items():
         with EXECUTORS[executor](1) as pool:
             again: dict[Path, TrialConfig] = {}
-            yield from _together(pool, {path: config}, again, 1)
+            yield from _together(pool, {path: config}, again, 1, archives)
         if again:
             yield f"{path.name}: its process died: killed, out of memory, or ended by code of your own"
         else:
@@ -169,7 +183,11 @@ def _died(path: Path) -> Path:
 
 
 def _together(
-    pool: Executor, left: dict[Path, TrialConfig], alone: dict[Path, TrialConfig], workers: int
+    pool: Executor,
+    left: dict[Path, TrialConfig],
+    alone: dict[Path, TrialConfig],
+    workers: int,
+    archives: str | None,
 ) -> Iterator[StoredTrial | str]:
     """Run the trials that are left, a few at a time; when a process dies, those in progress are moved to `alone`."""
     running: dict[Future[StoredTrial | str], tuple[Path, TrialConfig]] = {}
@@ -179,7 +197,7 @@ def _together(
             path, config = next(iter(left.items()))
             del left[path]
             try:
-                running[pool.submit(_run, config, path)] = path, config
+                running[pool.submit(_run, config, path, archives)] = path, config
             except BrokenProcessPool:
                 left[path], whole = config, False
         if not running:
@@ -192,7 +210,7 @@ def _together(
                 _died(path).touch()
                 continue
             result = future.result() if error is None else _failure(error)
-            if not isinstance(result, str) and not path.exists():
+            if not isinstance(result, str) and archives is None and not path.exists():
                 result = "its run directory is not here; all machines must share the folder of the batch"
             yield f"{path.name}: {result}" if isinstance(result, str) else result
 
@@ -205,13 +223,31 @@ def _house(name: str) -> House:
     return house
 
 
-def _run(config: TrialConfig, out: Path) -> StoredTrial | str:
-    """Run a trial and read it back. Return an error as text, because not every exception can be pickled."""
-    try:
-        run_trial(config, out, topdown=False, replace=True, house=_house(config.house))
-        return read_trial(out)
-    except Exception as error:  # an error in one trial must not stop the others
-        return _failure(error)
+@functools.cache
+def _archive(folder: Path, prefix: str) -> sqlite3.Connection:
+    """The archive of this process, open until the process ends."""
+    return new_archive(folder, prefix)
+
+
+def _run(config: TrialConfig, out: Path, archives: str | None = None) -> StoredTrial | str:
+    """Run a trial and read it back. Return an error as text, because not every exception can be pickled.
+
+    With `archives`, the prefix of their names, the trial is packed.
+    """
+    with nullcontext(out.parent) if archives is None else work_folder(out.parent) as folder:
+        run = folder / out.name
+        try:
+            try:
+                run_trial(config, run, topdown=False, replace=True, house=_house(config.house))
+                trial = read_trial(run)
+            finally:
+                if archives is not None and is_run(run):
+                    pack(run, _archive(out.parent, archives))
+                    if is_run(out):  # an earlier run that ended early
+                        shutil.rmtree(out)
+        except Exception as error:  # an error in one trial must not stop the others
+            return _failure(error).replace(str(run), str(out))
+    return trial if archives is None else dataclasses.replace(trial, path=out, stamp=UNSTAMPED)
 
 
 def _failure(error: BaseException) -> str:

@@ -1,6 +1,7 @@
 """The folder of a batch: which trials it holds, how they were made, and what they say.
 
 OUT/trials/NAME      one run directory per trial
+OUT/trials/ARCHIVE.sqlar    packed trials, many in one file
 OUT/outdated/NAME    trials that were run again because something that they depend on has changed
 OUT/trials.parquet, OUT/trials.csv    one row per trial
 OUT/.rows.jsonl.gz   rows that were read (`trial_reader`)
@@ -11,18 +12,20 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.errors import RecordError
 from experiments.record import records
+from experiments.record.archive import move
 from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.columns import HEALTH
 from experiments.record.files import read_arrays, read_json
 from experiments.record.metrics import CIRCUMSTANCES, measure
 from experiments.record.records import read_events
+from experiments.record.run_directory import PACKED, TRIALS, free_name
 from experiments.session.endings import COMPLETE
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.fingerprint import Inputs
@@ -41,7 +44,7 @@ Stamp = tuple[tuple[int, int] | None, ...]
 class StoredTrial:
     """A trial of a batch."""
 
-    path: Path  # its run directory
+    path: Path  # its run directory, also if it is packed
     settings: Mapping[str, Any]  # fields of its configuration by name
     inputs: Inputs  # what else it depended on
     row: Mapping[str, Any]  # what its log and trajectory say, as in `metrics.json`
@@ -96,7 +99,9 @@ def _metrics(path: Path) -> Mapping[str, Any]:
 
 
 def stamp_of(path: Path) -> Stamp:
-    """Equal as long as no file that `read_trial` reads has changed."""
+    """Equal as long as no file that `read_trial` reads has changed, or the archive of a packed trial."""
+    if path.parent.suffix == PACKED:
+        return (_file_stamp(str(path.parent)),)
     return tuple(_file_stamp(f"{path}/{name}") for name in (CHECKSUMS, records.METRICS, *_CHECKED))
 
 
@@ -108,15 +113,14 @@ def _file_stamp(path: str) -> tuple[int, int] | None:
     return found.st_size, found.st_mtime_ns
 
 
-def put_aside(path: Path) -> None:
-    """Move a trial to the outdated ones of its batch; nothing there is replaced."""
-    folder = path.parents[1] / OUTDATED
-    folder.mkdir(exist_ok=True)
-    place, number = folder / path.name, 1
-    while place.exists():
-        number += 1
-        place = folder / f"{path.name}-{number}"
-    path.rename(place)
+def put_aside(out: Path, names: Collection[str]) -> None:
+    """Move trials to the outdated ones of their batch; nothing there is replaced."""
+    if names:
+        (out / OUTDATED).mkdir(exist_ok=True)
+        move(out / TRIALS, names, out / OUTDATED)
+    for name in sorted(names):
+        if (out / TRIALS / name).exists():
+            (out / TRIALS / name).rename(free_name(out / OUTDATED / name))
 
 
 def trial_name(config: TrialConfig, inputs: Inputs) -> str:

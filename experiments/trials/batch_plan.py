@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from experiments.record.archive import discard
 from experiments.record.run_directory import TRIALS
 from experiments.trials.batch_folder import OUTDATED, StoredTrial, put_aside, trial_key, trial_name
 from experiments.trials.design import counted
@@ -34,6 +35,7 @@ def plan_batch(
     for found in stored:
         by_key.setdefault(found.key, []).append(found)
     done, missing, reasons = [], {}, Counter[str]()
+    outdated, early = set[str](), set[str]()
     for trial, needed in wanted.items():
         same = [s for s in by_key.get(trial_key(trial.settings()), []) if s.is_in(trial.house, needed)]
         current = [s for s in same if s.complete and s.inputs == needed]
@@ -41,15 +43,16 @@ def plan_batch(
         for old in same:
             if old not in current:
                 reasons.update([_why_again(old, needed)])
-            if old.complete and old not in current:
-                put_aside(old.path)
+                (outdated if old.complete else early).add(old.path.name)
         if current:
             done.append(current[0])
             continue
         if path in unusable:
-            reasons.update([unusable.pop(path)])
-            put_aside(path)
+            reasons.update([unusable[path]])
+            outdated.add(path.name)
         missing[path] = trial
+    put_aside(out, outdated)
+    discard(out / TRIALS, early)
     return BatchPlan(tuple(done), missing, tuple(_notes(reasons, out)))
 
 

@@ -4,8 +4,8 @@ Rows that were read are kept in OUT/.rows.jsonl.gz, with the size and modificati
 trial is read again after one of these files, or the code of mjsim, has changed. The file may be deleted at any time.
 """
 
+import dataclasses
 import gzip
-import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
@@ -16,7 +16,8 @@ from typing import Any
 import msgspec
 
 from experiments.errors import RecordError
-from experiments.record.run_directory import TRIALS
+from experiments.record.archive import opened_run, run_paths
+from experiments.record.run_directory import PACKED, TRIALS
 from experiments.trials.batch_folder import Stamp, StoredTrial, read_trial, stamp_of
 from experiments.trials.fingerprint import CODE
 from experiments.trials.workers import worker_pool
@@ -24,6 +25,7 @@ from mjsim.files import replacing
 from mjsim.sources import source_digest
 
 ROWS = ".rows.jsonl.gz"
+UNSTAMPED: Stamp = ()
 POOL_FROM = 500  # number of unread trials from which starting processes to read them pays
 
 OnRead = Callable[[int, int], None]  # called with the numbers of trials that are read, and to be read
@@ -53,35 +55,34 @@ class TrialReader:
         self._saved = dict(self._known)
 
     def add(self, trial: StoredTrial) -> None:
-        """Take a trial that was read elsewhere."""
+        """Take a trial that was read elsewhere; a packed one before it was packed, with the stamp `UNSTAMPED`."""
         self._known[trial.path.name] = trial
 
     def read(self) -> tuple[list[StoredTrial], dict[Path, str]]:
         """Return the trials by name, and what is wrong with those that cannot be used."""
-        paths = self._paths()
+        paths = run_paths(self._trials)
         self._known = {
-            path.name: trial
-            for path in paths
-            if (trial := self._known.get(path.name)) is not None and trial.stamp == stamp_of(path)
+            path.name: trial for path in paths if (trial := self._unchanged(path, stamp_of(path))) is not None
         }
         unusable = {}
         try:
             unread = [path for path in paths if path.name not in self._known]
             for number, (path, result) in enumerate(self._results(unread), start=1):
                 if isinstance(result, str):
-                    unusable[path] = result
+                    unusable[self._trials / path.name] = result
                 else:
                     self.add(result)
                 self._on_read(number, len(unread))
         finally:
             self._save()
-        return [self._known[path.name] for path in paths if path not in unusable], unusable
+        return [self._known[path.name] for path in paths if path.name in self._known], unusable
 
-    def _paths(self) -> list[Path]:
-        with suppress(FileNotFoundError), os.scandir(self._trials) as entries:
-            names = sorted(e.name for e in entries if not e.name.startswith(".") and e.is_dir())
-            return [self._trials / name for name in names]
-        return []
+    def _unchanged(self, path: Path, stamp: Stamp) -> StoredTrial | None:
+        """A trial that was read before, if its files have not changed since."""
+        trial = self._known.get(path.name)
+        if trial is None or trial.stamp not in (stamp, UNSTAMPED):
+            return None
+        return dataclasses.replace(trial, stamp=stamp) if trial.stamp == UNSTAMPED else trial
 
     def _results(self, unread: list[Path]) -> Iterator[tuple[Path, StoredTrial | str]]:
         left = iter(unread)
@@ -135,6 +136,12 @@ def _load(file: Path) -> Iterable[_KeptRow]:
 def _read(path: Path) -> StoredTrial | str:
     """Read a trial. Return what is wrong with one that cannot be used."""
     try:
-        return read_trial(path)
+        stamp = stamp_of(path)
+        with opened_run(path) as run:
+            return dataclasses.replace(
+                read_trial(run),
+                path=path.parent.with_name(path.name) if path.parent.suffix == PACKED else path,
+                stamp=stamp,
+            )
     except (RecordError, OSError, KeyError, TypeError, ValueError) as error:
         return str(error)

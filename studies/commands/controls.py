@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     for control in controls:
         out = arguments.out / control.name
         rows, failed = run_with_progress(
-            control.design, out, arguments.workers, arguments.executor, control.name
+            control.design, out, arguments.workers, arguments.executor, arguments.packed, control.name
         )
         failures += failed
         error_console().print(

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow.csv
 import pytest
 
+from experiments.cli.main import main
 from experiments.record import records, run_directory
 from experiments.record.checksums import CHECKSUMS
 from experiments.replay.replay import replay
@@ -22,10 +23,9 @@ from mjsim.files import remove_leftovers
 
 CASES = int(os.environ.get("MJSIM_KILL_CASES", "1"))  # for each command, of four kills each
 FAST = ("--objects", "6", "--fidelity", "event", "--no-regret")
-COMMANDS = {
-    "run": ("run", *FAST, "--no-video"),
-    "batch": ("batch", *FAST, "--assistance", "none,optimal", "--seeds", "0:2", "--workers", "2"),
-}
+BATCH = ("batch", *FAST, "--assistance", "none,optimal", "--seeds", "0:2", "--workers", "2")
+PACKED = "--packed"
+COMMANDS = {"run": ("run", *FAST, "--no-video"), "batch": BATCH, "packed": (*BATCH, PACKED)}
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -86,11 +86,11 @@ def contents(folder):
 
 @pytest.fixture(scope="module", params=list(COMMANDS))
 def undisturbed(request, tmp_path_factory):
-    """A command, the folder that it writes, and its processor time, s."""
+    """A command, the folder that it writes (without packing), and its processor time, s."""
     folder = tmp_path_factory.mktemp("undisturbed")
     for name in ("first", "out"):  # the first one may compile kernels
         before = os.times()
-        assert start(COMMANDS[request.param], folder / name).wait(600) == 0
+        assert start([w for w in COMMANDS[request.param] if w != PACKED], folder / name).wait(600) == 0
     return request.param, folder / "out", sum(os.times()[2:4]) - sum(before[2:4])  # of children
 
 
@@ -113,6 +113,9 @@ def test_killed_commands_end_up_with_the_files_of_undisturbed_ones(undisturbed, 
     assert code == 0 or again().wait(600) == 0
     for folder in filter(Path.is_dir, (tmp_path, out, out / "trials")):
         remove_leftovers(folder, max_age=0)
+    if name == "packed":
+        assert not [path for path in (out / "trials").iterdir() if path.is_dir()]
+        assert main(["unpack", str(out)]) == 0
     assert contents(out) == contents(expected)
     assert {path.name for path in tmp_path.iterdir()} == {name, f"{name}.txt"}
     assert not list(out.rglob(".*"))

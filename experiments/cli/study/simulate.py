@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     design = read_study(study_path(arguments.study), arguments.people)
     rows, failed = run_with_progress(
-        design, arguments.out, arguments.workers, arguments.executor, "simulated people"
+        design, arguments.out, arguments.workers, arguments.executor, arguments.packed, "simulated people"
     )
     console = error_console()
     if (others := len(rows) + failed - len(design.trials)) > 0:

@@ -1,0 +1,252 @@
+"""Packed trials: SQLite archives that hold run directories, in the schema that `sqlite3 -A` reads.
+
+Each process that runs trials writes to an archive of its own. SQLite's exclusive lock on the archive lasts as long as
+the process, so an archive without a lock is finished. Its name is hidden until `adopt` gives it the final one.
+"""
+
+import itertools
+import os
+import re
+import secrets
+import socket
+import sqlite3
+import tempfile
+import zlib
+from collections.abc import Collection, Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+
+from experiments.errors import RecordError
+from experiments.record import records
+from experiments.record.checksums import CHECKSUMS, checksum_faults
+from experiments.record.run_directory import PACKED, is_run
+from mjsim.files import MAX_INPUT, read_bytes, work_folder
+
+WAIT_S = 60.0  # how long to wait for another process that changes the same archive
+_SCHEMA = "CREATE TABLE IF NOT EXISTS sqlar(name TEXT PRIMARY KEY, mode INT, mtime INT, sz INT, data BLOB)"
+_OF_RUN = "WHERE name >= ? || '/' AND name < ? || '0'"  # 0 is the character after the slash
+
+
+def new_archive(folder: Path, prefix: str) -> sqlite3.Connection:
+    """Create an archive that no other process can open until the connection is closed."""
+    while True:
+        host = re.sub(r"[^\w.-]", "", socket.gethostname(), flags=re.ASCII)
+        path = folder / f".{prefix}-{host}-{os.getpid()}-{secrets.token_hex(4)}{PACKED}"
+        database = _connect(path, "rwc")
+        # The journal is synced and kept, not deleted, so a committed run survives a power cut.
+        database.executescript(
+            f"PRAGMA auto_vacuum=FULL; PRAGMA locking_mode=EXCLUSIVE; PRAGMA synchronous=FULL; {_SCHEMA};"
+        )
+        if path.exists():  # else it was adopted before it was locked
+            return database
+        database.close()
+
+
+def pack(run: Path, database: sqlite3.Connection) -> None:
+    """Add a run directory to an archive in one transaction.
+
+    Raises:
+        RecordError: The archive cannot be written. What it held is kept.
+    """
+    rows = [_row(path, run.parent) for path in sorted(run.rglob("*")) if path.is_file()]
+    try:
+        with database:
+            database.executemany("INSERT OR REPLACE INTO sqlar VALUES (?, ?, ?, ?, ?)", rows)
+    except sqlite3.Error as error:
+        raise RecordError(f"cannot pack {run.name}: {error}; run it again once there is space") from error
+
+
+def _row(path: Path, folder: Path) -> tuple[str, int, int, int, bytes]:
+    content, status = path.read_bytes(), path.stat()
+    data = min(content, zlib.compress(content), key=len)
+    return path.relative_to(folder).as_posix(), status.st_mode, int(status.st_mtime), len(content), data
+
+
+def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
+    """Give archives whose writer has ended their final names. Return the number of those still being written.
+
+    A run that a killed writer did not commit is rolled back.
+    """
+    busy = 0
+    for path in sorted(folder.glob(f".{prefix}*{PACKED}")):
+        try:
+            with closing(_connect(path, "rw", wait_s)) as database:
+                database.execute(_SCHEMA)
+                database.execute("BEGIN EXCLUSIVE")
+                empty = database.execute("SELECT 1 FROM sqlar").fetchone() is None
+                if path.exists():  # else another process adopted it before this one had the lock
+                    path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
+                    path.unlink() if empty else path.rename(path.with_name(path.name[1:]))
+        except sqlite3.Error as error:
+            if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
+                busy += 1
+            elif path.exists():
+                raise _unreadable(path, error) from error
+    return busy
+
+
+def run_paths(folder: Path) -> list[Path]:
+    """List the runs of a batch's folder of trials by name: `FOLDER/NAME`, or `FOLDER/ARCHIVE/NAME` if packed.
+
+    Of a packed run and a run directory with the same name, the run directory is listed.
+
+    Raises:
+        RecordError: An archive is damaged.
+    """
+    found = {name: archive / name for archive in _archives(folder) for name in packed_names(archive)}
+    with suppress(FileNotFoundError), os.scandir(folder) as entries:
+        found |= {e.name: folder / e.name for e in entries if not e.name.startswith(".") and e.is_dir()}
+    return [path for _, path in sorted(found.items())]
+
+
+def packed_names(archive: Path) -> set[str]:
+    """Names of the runs in an archive."""
+    with _opened(archive) as database:
+        rows = database.execute(f"SELECT name FROM sqlar WHERE name GLOB '*/{records.EVENTS}'")
+        return {name.partition("/")[0] for (name,) in rows}
+
+
+@contextmanager
+def opened_run(path: Path) -> Iterator[Path]:
+    """Yield a run directory as it is, or a temporary folder with the files of a packed run.
+
+    Raises:
+        RecordError: The archive or a packed file is damaged; the message names it.
+    """
+    archive = None if is_run(path) else archive_of(path)
+    if archive is None:
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="mjsim-") as folder:
+        unpack(archive, path.name, Path(folder))
+        yield Path(folder) / path.name
+
+
+def unpack(archive: Path, name: str, folder: Path) -> None:
+    """Write a packed run to `folder/name` and check every file against the run's checksums.
+
+    Raises:
+        RecordError: The archive or a file is damaged; the message names it.
+    """
+    places = set[Path]()
+    with _opened(archive) as database:
+        for member, mtime, size, data in database.execute(
+            f"SELECT name, mtime, sz, data FROM sqlar {_OF_RUN}", (name, name)
+        ):
+            path = folder / member
+            if not path.resolve().is_relative_to(folder.resolve()):
+                raise RecordError(f"{archive}: {member} is not the name of a file of a run")
+            content = _content(archive, member, size, data)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            places.add(path.parent)
+            path.write_bytes(content)
+            os.utime(path, (mtime, mtime))
+    if not places:
+        raise RecordError(f"{archive} holds no run {name}")
+    for place in sorted(places):
+        try:
+            names = [path.name for path in place.iterdir() if path.is_file() and path.name != CHECKSUMS]
+            faults = [message for _, message in checksum_faults(place, names)]
+        except (OSError, RecordError) as error:
+            faults = [str(error)]
+        if faults:
+            raise RecordError(f"{archive}: {place.relative_to(folder)} is damaged: {faults[0]}")
+
+
+def read_file(path: Path, file: str) -> bytes:
+    """Read a file of a run, packed or not, without checking it; raises `OSError` or `RecordError`."""
+    if path.parent.suffix != PACKED:
+        return read_bytes(path / file)
+    member = f"{path.name}/{file}"
+    with _opened(path.parent) as database:
+        row = database.execute("SELECT sz, data FROM sqlar WHERE name = ?", (member,)).fetchone()
+    return _content(path.parent, member, *(row or (0, None)))
+
+
+def unpack_in_place(folder: Path, runs: Collection[Path]) -> Iterator[str | None]:
+    """Turn packed runs into run directories in `folder`. Yield None for each, or a message if it is damaged."""
+    for archive, paths in itertools.groupby(sorted(runs), lambda path: path.parent):
+        done = set()
+        for path in paths:
+            try:
+                with work_folder(folder) as work:
+                    unpack(archive, path.name, work)
+                    if not is_run(folder / path.name):
+                        (work / path.name).rename(folder / path.name)
+            except RecordError as error:
+                yield str(error)
+                continue
+            done.add(path.name)
+            yield None
+        os.sync()  # before the packed runs are deleted
+        discard(folder, done)
+
+
+def discard(folder: Path, names: Collection[str]) -> None:
+    """Remove packed runs from the archives in `folder`; an archive without others is deleted."""
+    for archive in _archives(folder):
+        held = packed_names(archive)
+        if held <= set(names):
+            archive.unlink()
+        elif gone := held.intersection(names):
+            with _opened(archive) as database, database:
+                database.executemany(f"DELETE FROM sqlar {_OF_RUN}", [(name, name) for name in gone])
+
+
+def move(folder: Path, names: Collection[str], target: Path) -> None:
+    """Move packed runs from the archives in `folder` to archives in `target`."""
+    for archive in _archives(folder):
+        held = packed_names(archive)
+        if held <= set(names):
+            archive.rename(target / archive.name)
+        elif gone := held.intersection(names):
+            with closing(new_archive(target, "moved")) as database:
+                database.execute("ATTACH ? AS source", (archive.absolute().as_uri(),))
+                copy = f"INSERT INTO sqlar SELECT * FROM source.sqlar {_OF_RUN}"
+                with database:
+                    database.executemany(copy, [(name, name) for name in gone])
+    adopt(target, "moved")
+    discard(folder, names)
+
+
+def _content(archive: Path, member: str, size: int, data: bytes) -> bytes:
+    try:
+        content = data if len(data) == size else zlib.decompressobj().decompress(data, min(size, MAX_INPUT))
+    except (zlib.error, TypeError, ValueError) as error:
+        raise RecordError(f"{archive}: {member} is damaged ({error})") from error
+    if len(content) != size:
+        raise RecordError(f"{archive}: {member} is damaged: it has {len(content)} bytes, not {size}")
+    return content
+
+
+def archive_of(path: Path) -> Path | None:
+    """The archive that holds the run of this path, or None."""
+    if path.suffix == PACKED and path.is_file():
+        name = next(iter(sorted(packed_names(path))), "NAME")
+        raise RecordError(f"{path} holds packed runs; name one of them, such as {path.parent / name}")
+    if path.parent.suffix == PACKED and path.parent.is_file():
+        return path.parent
+    return next((archive for archive in _archives(path.parent) if path.name in packed_names(archive)), None)
+
+
+def _archives(folder: Path) -> list[Path]:
+    return sorted(folder.glob(f"[!.]*{PACKED}"))
+
+
+def _connect(path: Path, mode: str, wait_s: float = WAIT_S) -> sqlite3.Connection:
+    return sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", timeout=wait_s, uri=True)
+
+
+@contextmanager
+def _opened(archive: Path, wait_s: float = WAIT_S) -> Iterator[sqlite3.Connection]:
+    try:
+        with closing(_connect(archive, "rw", wait_s)) as database:
+            yield database
+    except sqlite3.Error as error:
+        raise _unreadable(archive, error) from error
+
+
+def _unreadable(archive: Path, error: sqlite3.Error) -> RecordError:
+    return RecordError(
+        f"cannot read {archive}: {error}; if it is damaged, move it away: its trials are run again"
+    )
