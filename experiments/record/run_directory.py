@@ -25,7 +25,7 @@ def is_run(directory: Path) -> bool:
 
 
 def is_batch(directory: Path) -> bool:
-    """Whether `directory` is the folder of a batch: it holds folders and archives, and a sample of folders holds runs."""
+    """Whether `directory` is the folder of a batch: it holds archives and folders, some of which are checked."""
     trials = directory / TRIALS
     if not trials.is_dir():
         return False

@@ -135,13 +135,10 @@ def _load(file: Path) -> Iterable[_KeptRow]:
 
 def _read(path: Path) -> StoredTrial | str:
     """Read a trial. Return what is wrong with one that cannot be used."""
+    listed = path.parent.with_name(path.name) if path.parent.suffix == PACKED else path
+    stamp = stamp_of(path)
     try:
-        stamp = stamp_of(path)
         with opened_run(path) as run:
-            return dataclasses.replace(
-                read_trial(run),
-                path=path.parent.with_name(path.name) if path.parent.suffix == PACKED else path,
-                stamp=stamp,
-            )
+            return dataclasses.replace(read_trial(run), path=listed, stamp=stamp)
     except (RecordError, OSError, KeyError, TypeError, ValueError) as error:
         return str(error)
