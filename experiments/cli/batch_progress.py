@@ -17,9 +17,8 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers",
         type=int,
-        default=os.cpu_count(),
         metavar="N",
-        help="trials at a time (default: one per core, %(default)s here)",
+        help=f"trials at a time (default: one per core; {os.cpu_count()} here, all of a Ray cluster)",
     )
     parser.add_argument(
         "--executor",
@@ -37,7 +36,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def run_with_progress(
-    design: Design, out: Path, workers: int, executor: str, packed: bool, what: str = "trials"
+    design: Design, out: Path, workers: int | None, executor: str, packed: bool, what: str = "trials"
 ) -> tuple[list[Mapping[str, Any]], int]:
     """Run what is missing of a design; all rows of the folder, and how many trials failed. `what` precedes the bar."""
     from rich.progress import (

@@ -109,17 +109,18 @@ def check_file(path: Path, *, replace: bool = False) -> None:
 
 
 @contextmanager
-def run_directory(path: Path, *, replace: bool = False) -> Iterator[Path]:
+def run_directory(path: Path, *, replace: bool = False, scratch: Path | None = None) -> Iterator[Path]:
     """Yield a working folder; with metrics in it, it is moved to `path` in the end, also where the block raises.
 
-    A folder without metrics is removed. `replace` allows the place of an earlier run.
+    A folder without metrics is removed. `replace` allows the place of an earlier run. `scratch` is the parent of the
+    working folder (default: that of `path`).
 
     Raises:
         RecordError: Something is in the way. If it came there during the run, the run is kept next to it.
         OSError: The folder cannot be written.
     """
     place = check_run_directory(path, replace=replace)
-    with _folder(place.parent), work_folder(place.parent) as folder:
+    with _folder(place.parent), work_folder(scratch or place.parent) as folder:
         try:
             yield folder
         finally:

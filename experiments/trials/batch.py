@@ -3,13 +3,15 @@
 import dataclasses
 import functools
 import gc
+import os
 import secrets
 import shutil
 import sqlite3
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,15 +25,18 @@ from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import StoredTrial, folder_notes, read_trial, trial_key
 from experiments.trials.batch_plan import BatchPlan, plan_batch
 from experiments.trials.design import Design, confounded
+from experiments.trials.fingerprint import plugins
+from experiments.trials.ray_workers import LostMachineError
 from experiments.trials.table import write_tables
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import SEEDS, TrialConfig
 from experiments.trials.trial_reader import UNSTAMPED, OnRead, TrialReader
-from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor
+from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor, Pools
 from mjsim.files import remove_leftovers, work_folder
 from mjsim.model.house import MAX_HOUSES
 
-QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
+ExecutorContext = Callable[[Path], AbstractContextManager[Pools]]
+RETRIES = 5  # maximum number of machines that a trial loses before it is run alone
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ def run_batch(
     design: Design,
     out: Path,
     *,
-    workers: int,
+    workers: int | None = None,
     executor: str = PROCESSES,
     packed: bool = False,
     on_progress: Callable[[BatchProgress], None] = lambda _: None,
@@ -61,7 +66,7 @@ def run_batch(
     Args:
         design: Which trials.
         out: Folder of the batch; an earlier batch there is added to.
-        workers: How many trials at a time.
+        workers: Number of trials at a time (default: one per core of this machine or of the Ray cluster).
         executor: Who runs them: `processes` of this machine, or a `ray` cluster whose machines share the folder.
         packed: Store the trials in archives, one per worker process, instead of run directories.
         on_progress: Called at the start and after every trial.
@@ -72,11 +77,12 @@ def run_batch(
         A row for every trial of the folder, those of the design first, in the design's order.
 
     Raises:
-        ConfigError: `workers` is below 1, or there is no such executor, or it cannot be had.
+        ConfigError: `workers` is below 1, there is no such executor, or a machine of the cluster cannot be used.
+        ConnectionError: The Ray cluster is lost.
         ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run; nothing was run.
         OSError: A table cannot be written.
     """
-    if workers < 1:
+    if workers is not None and workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
     if executor not in EXECUTORS:
         raise ConfigError(f"no executor {executor!r}; there are {', '.join(EXECUTORS)}")
@@ -93,13 +99,15 @@ def run_batch(
     inputs = check_trials(design.trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     adopt(out / TRIALS)  # of a batch that was killed
-    reader = TrialReader(out, workers=workers, on_read=on_read)
+    reader = TrialReader(out, workers=workers or os.cpu_count() or 1, on_read=on_read)
     plan = plan_batch(design.trials, inputs, out, reader)
     for line in filter(None, (*plan.notes, confounded(design.trials))):
         note(line)
     archives = secrets.token_hex(4) if packed else None
     try:
-        _run_missing(plan, workers, executor, archives, on_progress, reader)
+        modules = sorted({module for config in plan.missing.values() for module in plugins(config)})
+        workplace = functools.partial(EXECUTORS[executor], workers, modules, note)
+        _run_missing(plan, workplace, archives, on_progress, reader)
     finally:
         with signals_postponed() as signals:
             signals.save()
@@ -112,8 +120,7 @@ def run_batch(
 
 def _run_missing(
     plan: BatchPlan,
-    workers: int,
-    executor: str,
+    executor: ExecutorContext,
     archives: str | None,
     on_progress: Callable[[BatchProgress], None],
     reader: TrialReader,
@@ -123,7 +130,7 @@ def _run_missing(
     on_progress(progress)
     if not plan.missing:
         return
-    for result in _results(plan.missing, workers, executor, archives):
+    for result in _results(plan.missing, executor, archives):
         if isinstance(result, str):
             field, failure = "failed", result
         else:
@@ -155,7 +162,7 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
 
 
 def _results(
-    missing: Mapping[Path, TrialConfig], workers: int, executor: str, archives: str | None
+    missing: Mapping[Path, TrialConfig], executor: ExecutorContext, archives: str | None
 ) -> Iterator[StoredTrial | str]:
     """Yield each trial that succeeds, else what went wrong; those whose process may die go last and alone.
 
@@ -164,17 +171,20 @@ def _results(
     by_house = sorted(missing.items(), key=lambda trial: trial[1].house)
     left = {path: config for path, config in by_house if not _died(path).exists()}
     alone = {path: config for path, config in missing.items() if path not in left}
-    while left:
-        with EXECUTORS[executor](min(workers, len(left))) as pool:
-            yield from _together(pool, left, alone, workers, archives)
-    for path, config in alone.items():
-        with EXECUTORS[executor](1) as pool:
+    # The work folder is removed in the end, with what killed processes left in it.
+    with work_folder(by_house[0][0].parent) as folder, executor(folder) as pools:
+        run = functools.partial(_run, folder=folder, archives=archives)
+        while left:
+            with pools() as pool:
+                yield from _together(pool, left, alone, run)
+        for path, config in alone.items():
             again: dict[Path, TrialConfig] = {}
-            yield from _together(pool, {path: config}, again, 1, archives)
-        if again:
-            yield f"{path.name}: its process died: killed, out of memory, or ended by code of your own"
-        else:
-            _died(path).unlink(missing_ok=True)
+            with pools() as pool:
+                yield from _together(pool, {path: config}, again, run)
+            if again:
+                yield f"{path.name}: its process died: killed, out of memory, or ended by code of your own"
+            else:
+                _died(path).unlink(missing_ok=True)
 
 
 def _died(path: Path) -> Path:
@@ -186,18 +196,17 @@ def _together(
     pool: Executor,
     left: dict[Path, TrialConfig],
     alone: dict[Path, TrialConfig],
-    workers: int,
-    archives: str | None,
+    run: Callable[[TrialConfig, Path], StoredTrial | str],
 ) -> Iterator[StoredTrial | str]:
     """Run the trials that are left, a few at a time; when a process dies, those in progress are moved to `alone`."""
     running: dict[Future[StoredTrial | str], tuple[Path, TrialConfig]] = {}
-    whole = True
+    lost, whole = Counter[Path](), True
     while True:
-        while whole and left and len(running) < workers * QUEUED_PER_WORKER:
+        while whole and left and len(running) < pool.room:
             path, config = next(iter(left.items()))
             del left[path]
             try:
-                running[pool.submit(_run, config, path, archives)] = path, config
+                running[pool.submit(run, config, path)] = path, config
             except BrokenProcessPool:
                 left[path], whole = config, False
         if not running:
@@ -205,12 +214,17 @@ def _together(
         finished, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in finished:
             (path, config), error = running.pop(future), future.exception()
+            if isinstance(error, ConfigError | ConnectionError):  # of the cluster; those of trials are texts
+                raise error
+            if isinstance(error, LostMachineError) and lost[path] < RETRIES:
+                lost[path], left[path] = lost[path] + 1, config
+                continue
             if isinstance(error, BrokenProcessPool):
-                whole, alone[path] = False, config
+                alone[path] = config
                 _died(path).touch()
                 continue
             result = future.result() if error is None else _failure(error)
-            if not isinstance(result, str) and archives is None and not path.exists():
+            if not isinstance(result, str) and result.stamp != UNSTAMPED and not path.exists():
                 result = "its run directory is not here; all machines must share the folder of the batch"
             yield f"{path.name}: {result}" if isinstance(result, str) else result
 
@@ -229,16 +243,17 @@ def _archive(folder: Path, prefix: str) -> sqlite3.Connection:
     return new_archive(folder, prefix)
 
 
-def _run(config: TrialConfig, out: Path, archives: str | None = None) -> StoredTrial | str:
+def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> StoredTrial | str:
     """Run a trial and read it back. Return an error as text, because not every exception can be pickled.
 
-    With `archives`, the prefix of their names, the trial is packed.
+    The trial is made in the work folder of the batch. With `archives`, the prefix of their names, it is packed.
     """
-    with nullcontext(out.parent) if archives is None else work_folder(out.parent) as folder:
-        run = folder / out.name
+    with nullcontext(out.parent) if archives is None else work_folder(folder) as place:
+        run = place / out.name
         try:
             try:
-                run_trial(config, run, topdown=False, replace=True, house=_house(config.house))
+                house = _house(config.house)
+                run_trial(config, run, topdown=False, replace=True, scratch=folder, house=house)
                 trial = read_trial(run)
             finally:
                 if archives is not None and is_run(run):

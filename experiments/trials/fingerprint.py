@@ -9,7 +9,7 @@ import hashlib
 import importlib.util
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from mjsim.files import read_bytes
 from mjsim.model.catalogue import Catalogue
 from mjsim.sources import PACKAGES, digest_of, source_digest
 
-LIBRARIES = ("mujoco", "numpy", "numba", "ortools", "scipy", "shapely")
+LIBRARIES = ("mujoco", "numpy", "numba", "llvmlite", "ortools", "scipy", "shapely")
 # Code on which the record of a trial depends; what only looks at records is not here.
 CODE = (
     "hud",
@@ -38,13 +38,19 @@ Inputs = Mapping[str, str]
 
 def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
     """Hash or version by what it is of; equal configurations with equal inputs give equal records."""
-    inputs = {"house": catalogue.content, "code of mjsim": source_digest(*CODE), **_libraries()}
+    inputs = {"house": catalogue.content, **code_versions()}
     if config.episode is not None:
         inputs["episode"] = hashlib.sha256(read_bytes(Path(config.episode))).hexdigest()
     if STORY in config.phase_names:
         text = story_text(None if config.story is None else Path(config.story))
         inputs["story"] = hashlib.sha256(text.encode()).hexdigest()
-    return inputs | {f"module {name}": plugin_digest(name) for name in plugins(config)}
+    return inputs | code_versions(plugins(config))
+
+
+def code_versions(modules: Iterable[str] = ()) -> dict[str, str]:
+    """Hash or version of all code that affects trials: this package, its libraries, and these user modules."""
+    user_code = {f"module {name}": plugin_digest(name) for name in modules}
+    return {"code of mjsim": source_digest(*CODE), **_libraries(), **user_code}
 
 
 def fingerprint(config: TrialConfig, inputs: Inputs) -> str:

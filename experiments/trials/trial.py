@@ -51,6 +51,7 @@ def run_trial(
     film: FilmConfig | None = None,
     topdown: bool = True,
     replace: bool = False,
+    scratch: Path | None = None,
     house: House | None = None,
     on_progress: OnProgress = lambda _: None,
     on_warning: Callable[[str], None] = lambda _: None,
@@ -63,6 +64,7 @@ def run_trial(
         film: How to film it, or None for no video.
         topdown: Whether to draw the floor plan.
         replace: Whether `out` may take the place of an earlier run.
+        scratch: Parent of the working folder (default: that of `out`).
         house: A loaded house to use again; it must be the one that `config` names.
         on_progress: Called after every action.
         on_warning: Called with what went wrong without harm to the record: no video, no floor plan.
@@ -78,7 +80,7 @@ def run_trial(
     """
     started = time.perf_counter()
     with chdir("."), signals_postponed() as signals:  # a user's own code may go elsewhere
-        with run_directory(out, replace=replace) as folder:
+        with run_directory(out, replace=replace, scratch=scratch) as folder:
             person = draw_person(config)
             house = (house or House.load(config.house)).for_person(person)
             episode = trial_episode(config, house)

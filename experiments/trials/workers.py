@@ -1,12 +1,13 @@
 """What runs the trials of a batch: processes of this machine that end with their parent, or a Ray cluster."""
 
+import functools
 import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from multiprocessing.connection import Connection, wait
 from multiprocessing.synchronize import Semaphore
 from typing import Any, Protocol
@@ -14,9 +15,16 @@ from typing import Any, Protocol
 from experiments.session.signals import SIGNALS
 from experiments.trials.ray_workers import ray_cluster
 
+QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
+
 
 class _Pool(ProcessPoolExecutor):
     """Its processes begin with signals blocked, and keep them so: what stops a batch is up to the parent."""
+
+    @property
+    def room(self) -> int:
+        """Maximum number of calls under way."""
+        return int(self._max_workers * QUEUED_PER_WORKER)  # type: ignore[attr-defined]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
@@ -27,8 +35,8 @@ class _Pool(ProcessPoolExecutor):
 
 
 @contextmanager
-def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Worker processes. Where the block raises, or this process is killed, they end at once, in the middle of work."""
+def worker_pool(count: int | None = None) -> Iterator[_Pool]:
+    """Worker processes, by default one per core. They end at once where the block raises or this process is killed."""
     # Spawned, not forked: a forked GL context or thread pool does not work.
     context = multiprocessing.get_context("spawn")
     end_of_work, work = context.Pipe(duplex=False)
@@ -61,15 +69,20 @@ def _end_with(end_of_work: Connection) -> None:
 
 
 class Executor(Protocol):
-    """Runs calls in the background."""
+    """Runs calls in the background. A call whose process dies raises `BrokenProcessPool`."""
+
+    @property
+    def room(self) -> int:
+        """Maximum number of calls under way."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]:
         """Start a call."""
 
 
 PROCESSES, RAY = "processes", "ray"
-# Name -> context of an executor with a number of workers.
-EXECUTORS: Mapping[str, Callable[[int], AbstractContextManager[Executor]]] = {
-    PROCESSES: worker_pool,
+Pools = Callable[[], AbstractContextManager[Executor]]  # makes a new executor after a process has died
+# Name -> context, for a number of workers or None, user modules, a callback for notes, and the batch's work folder.
+EXECUTORS: Mapping[str, Callable[..., AbstractContextManager[Pools]]] = {
+    PROCESSES: lambda workers, *_: nullcontext(functools.partial(worker_pool, workers)),
     RAY: ray_cluster,
 }

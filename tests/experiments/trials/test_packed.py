@@ -86,7 +86,7 @@ def test_a_packed_trial_that_ended_early_is_kept_until_it_is_run_again(packed, o
     own_module(participant("if self.count == 3: raise ValueError('lost')"))
     config = TrialConfig(**SAME, assistance="none", seed=0, user="own_code:build")
     (path,) = plan(packed, config).missing
-    failure = batch._run(config, path, "test")
+    failure = batch._run(config, path, path.parent, "test")
     assert "lost" in failure and f"mjsim replay {path}`" in failure, "not the name of the work folder"
     batch._archive(path.parent, "test").close()
     batch._archive.cache_clear()
