@@ -121,12 +121,6 @@ def work_folder(parent: Path) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def remove_work(folder: Path, process: int) -> None:
-    """Remove from `folder` the work of a process that has ended."""
-    if folder.is_dir():
-        remove_leftovers(folder, 0.0, f"{WORK}{process}-")
-
-
 @functools.lru_cache(maxsize=64)
 def _tidy(folder: Path, _day: int) -> None:
     """Remove the leftovers in a folder; once a day per process, as a batch writes many trials into one folder."""

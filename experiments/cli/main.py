@@ -1,6 +1,7 @@
 """The `mjsim` command: a module of `experiments.cli` for each subcommand, or one of the checkout."""
 
 import argparse
+import faulthandler
 import importlib
 import os
 import sys
@@ -11,8 +12,7 @@ from typing import NoReturn
 
 from experiments.cli.failures import USAGE_ERROR, drop_output, end_with, flush_output
 from experiments.cli.requirements import add_checkout_command
-from experiments.session.own_process import in_own_child, tell_end
-from experiments.session.signals import exit_code, signal_of, signals_raised
+from experiments.session.signals import exit_code, exit_raised, signal_of, signals_raised
 from mjsim.errors import brief
 from mjsim.gl_choice import postpone_gl
 
@@ -38,8 +38,6 @@ COMMANDS = {
 }
 MODULES = {"import": "import_"}  # where a module cannot be called as its command
 CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # modules outside the wheel
-
-WATCHED = ("run", "plan", "replay", "view")  # call a user's own code in their own process
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
@@ -121,20 +119,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     postpone_gl()
     if sys.stderr is None:  # closed; messages must not go to standard output
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - as long as the process
+    if argv is None:
+        faulthandler.enable(all_threads=False)  # names file and line of code that crashes the process
     if sys.stdout is None:  # closed; what is written there is lost, and must not seem to have arrived
         os.dup2(os.open(os.devnull, os.O_RDONLY), 1)
         sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the process
     with signals_raised():
         try:
-            return _run(words, watch=argv is None)
+            return _run(words)
         except KeyboardInterrupt as stop:
             return _stopped(stop)
         except Exception as error:
             if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
                 return _stopped(error.__cause__)  # the signal came while compiled code returned
             return end_with(error, words)
-        finally:
-            tell_end()
 
 
 def _stopped(stop: KeyboardInterrupt) -> int:
@@ -143,7 +141,7 @@ def _stopped(stop: KeyboardInterrupt) -> int:
     return exit_code(number)
 
 
-def _run(words: list[str], *, watch: bool) -> int:
+def _run(words: list[str]) -> int:
     known = words[:1] if words and words[0] in COMMANDS else []
     try:
         here = str(Path.cwd())
@@ -163,9 +161,8 @@ def _run(words: list[str], *, watch: bool) -> int:
         from experiments.trials.compile_notice import announce_compiling
 
         announce_compiling()
-    if watch and words[0] in WATCHED and (ended := in_own_child(arguments)) is not None:
-        return ended
-    code = int(arguments.run(arguments))
+    with exit_raised():
+        code = int(arguments.run(arguments))
     if sys.stdout is not None:
         try:
             sys.stdout.flush()

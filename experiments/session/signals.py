@@ -1,12 +1,13 @@
 """Signals that ask a process to stop: Ctrl-C, SIGTERM (what clusters send) and SIGHUP (a terminal that is closed)."""
 
 import asyncio
+import os
 import signal
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 T = TypeVar("T")
@@ -44,6 +45,23 @@ def signals_raised() -> Iterator[None]:
 
     with _handled(stop):
         yield
+
+
+@contextmanager
+def exit_raised() -> Iterator[None]:
+    """Let `os._exit` of this thread raise `SystemExit` in the block; other threads and processes end as they ask."""
+    leave, here = os._exit, (os.getpid(), threading.get_ident())
+
+    def refuse(status: int) -> NoReturn:
+        if here == (os.getpid(), threading.get_ident()):
+            raise SystemExit(status)
+        leave(status)
+
+    os._exit = refuse
+    try:
+        yield
+    finally:
+        os._exit = leave
 
 
 class PostponedSignals:

@@ -15,7 +15,7 @@ from experiments.errors import ConfigError, UserCodeError
 from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Participant, Percept
-from experiments.session import own_process
+from experiments.session.signals import exit_raised
 from hud.conditions import Condition
 from hud.errors import SchemaError
 from hud.schema import check_state
@@ -49,7 +49,7 @@ def user_code(code: object, what: str) -> Iterator[None]:
         return
     limit = _call_limit()
     try:
-        with _time_limit(limit), _exit_raised(), _watched(what):
+        with _time_limit(limit), exit_raised():
             yield
     except PASSED_ON:
         raise
@@ -65,29 +65,6 @@ def _call_limit() -> float:
         return min(abs(float(text)), LONGEST_LIMIT)
     except ValueError:
         raise ConfigError(f"{CALL_LIMIT} is {text!r}; give a number of seconds") from None
-
-
-@contextmanager
-def _watched(what: str) -> Iterator[None]:
-    """Tell the parent, where there is one that watches, that a user's own code is called."""
-    if (shared := own_process.shared_calls()) is None:
-        yield
-        return
-    shared.begin(what)
-    try:
-        yield
-    finally:
-        shared.end()
-
-
-@contextmanager
-def _exit_raised() -> Iterator[None]:
-    """Let `os._exit` of this thread raise `SystemExit` in the block."""
-    leave = own_process.refuse_exit()
-    try:
-        yield
-    finally:
-        os._exit = leave  # type: ignore[assignment]  # it never returns either
 
 
 @contextmanager
