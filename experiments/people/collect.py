@@ -6,8 +6,10 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from experiments.errors import ConfigError, RecordError, ReplayError
 from experiments.people.copies import INDEX
@@ -25,6 +27,7 @@ from mjsim.files import write_text_atomically
 TEXTS = "texts.csv"
 FREE = ("line", "text")  # kinds of items whose answers are written freely
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # how what a spreadsheet would compute begins
+Row = TypeVar("Row", Answer, PhaseRow)
 _NAME = re.compile(r"p?(\d{1,9})", re.ASCII)
 
 
@@ -53,7 +56,8 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
     people = [person for person in await store.people() if not person.delete_wanted]
     check_people(study, people)
     trials = {row.person_id: row for row in await store.trials() if row.phase == TASK}
-    answers, phases = await store.answers(), await store.phases()
+    answers = await store.answers()
+    answers_of, phases_of = _by_person(answers), _by_person(await store.phases())
     rows: list[Mapping[str, Any]] = []
     unusable: dict[str, str] = {}
     unfinished: dict[str, int] = {}
@@ -68,11 +72,15 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
         except (RecordError, ReplayError, OSError) as error:
             unusable[person_name(person)] = str(error)
             continue
-        mine = [answer for answer in answers if answer.person_id == person.id]
-        passed = [phase for phase in phases if phase.person_id == person.id]
-        row = {**_about(person, trial, passed), **run.row, **_answers(items, mine)}
+        about = _about(person, trial, phases_of.get(person.id, ()))
+        row = {**about, **run.row, **_answers(items, answers_of.get(person.id, ()))}
         rows.append({key: harmless(value) if isinstance(value, str) else value for key, value in row.items()})
     return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable)
+
+
+def _by_person(rows: Sequence[Row]) -> Mapping[int, Sequence[Row]]:
+    """Group rows by person; they are in the order of people."""
+    return {person: list(mine) for person, mine in groupby(rows, attrgetter("person_id"))}
 
 
 def check_people(study: Study, people: Sequence[Person]) -> None:

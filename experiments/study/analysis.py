@@ -25,6 +25,9 @@ from experiments.study.table import StudyTable
 
 ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
 MIXED, ROOMS, BY_HOUSE = "mixed model", "rooms", "by house"
+OUT_OF_MEMORY = (
+    "there is not enough memory; analyse fewer trials, or trials with fewer persons, houses or conditions"
+)
 STRICT = "nd_strict_2n"  # holds how many visits deviated, as its denominator is known
 
 
@@ -149,6 +152,8 @@ def _attempt(measure: str, kind: str, objects: int | None, work: Callable[[], An
         return Result(measure, kind, objects, work(), None)
     except StatisticsError as error:
         return Result(measure, kind, objects, None, str(error))
+    except MemoryError:
+        return Result(measure, kind, objects, None, OUT_OF_MEMORY)
 
 
 def _sensitivity(result: Result, measures: Measures) -> Iterator[Result]:

@@ -12,7 +12,7 @@ from experiments.analysis.page import Block, Paragraph, Picture, freedom, p_valu
 from experiments.analysis.statistics.diagnostics import residuals_of
 from experiments.analysis.statistics.effects import ALPHA, FTest
 from experiments.study.analysis import ONE_WAY, TWO_WAY, Analysis, cells_of, tests_of
-from experiments.study.figures import COLOURS, framed, grid
+from experiments.study.figures import COLOURS, MAX_DOTS, framed, grid
 
 FISHER, WELCH, HC3 = "Fisher; Type II", "Welch; Welch-James", "HC3"
 ANALYSES = {  # rows of the matrix, by kind of result
@@ -136,11 +136,13 @@ def _residuals(analysis: Analysis, labels: Mapping[str, str]) -> Picture:
         left = residuals_of(cells)
         means = np.repeat([v.mean() for v in cells.values()], [len(v) for v in cells.values()])
         spread = float(left.std()) or 1.0
-        upper.plot(means, left / spread, ".", color="#666666", ms=3, alpha=0.6)
+        upper.plot(
+            means, left / spread, ".", color="#666666", ms=3, alpha=0.6, rasterized=len(left) > MAX_DOTS
+        )
         upper.axhline(0.0, color="black", lw=0.8)
         upper.set_xlabel(f"mean of the cell: {label}", fontsize=8)
         theory, ordered = stats.probplot(left / spread, fit=False)
-        lower.plot(theory, ordered, ".", color="#666666", ms=3)
+        lower.plot(theory, ordered, ".", color="#666666", ms=3, rasterized=len(left) > MAX_DOTS)
         lower.plot(theory, theory, color="black", lw=0.8)
         lower.set_xlabel("quantile of the normal distribution", fontsize=8)
     for axes in panels[:, 0]:

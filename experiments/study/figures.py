@@ -24,8 +24,10 @@ from experiments.study.table import ANSWERS, StudyTable
 COLOURS = ("#666666", "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 ANSWER_COLOURS = ("#B35806", "#F1A340", "#D8DAEB", "#998EC3", "#542788")
+RASTER_DPI = 200  # of dots that become a picture
 PANEL = (3.0, 2.6)  # inches
 JITTER = 0.12  # of a category's width
+MAX_DOTS = 2000  # dots that are drawn as vectors; more become a picture, which is smaller
 
 
 def by_condition(table: StudyTable, labels: Mapping[str, str]) -> Picture:
@@ -48,7 +50,8 @@ def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None
     for place, (condition, values) in enumerate(groups.items()):
         # A fixed jitter: equal data give equal figures.
         shift = JITTER * np.sin(np.arange(len(values)) * 2.4)
-        axes.plot(place + shift, values, ".", color=_colour(table, condition), ms=3, alpha=0.5)
+        dots = axes.plot(place + shift, values, ".", color=_colour(table, condition), ms=3, alpha=0.5)
+        dots[0].set_rasterized(len(values) > MAX_DOTS)
         low, high = mean_interval(values) or (values.mean(), values.mean())
         error = [[values.mean() - low], [high - values.mean()]]
         axes.errorbar(place + 0.28, values.mean(), error, fmt="o", color="black", capsize=3, ms=5)
@@ -120,7 +123,7 @@ def svg(figure: Figure, title: str, caption: str) -> Picture:
     FigureCanvasSVG(figure)
     text = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": "mjsim", "svg.fonttype": "path"}):
-        figure.savefig(text, format="svg", metadata={"Date": None})
+        figure.savefig(text, format="svg", dpi=RASTER_DPI, metadata={"Date": None})
     found = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
     found = found[found.index("<svg") :]
     found = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", found)

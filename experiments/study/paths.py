@@ -62,7 +62,9 @@ def _run_of(row: Any, folder: Path) -> Path | None:
     visit = folder / str(row.get("participant")) / TASK
     if is_run(visit):
         return visit
-    for path in run_paths(folder / TRIALS):
+    seed = f"{row.get('house_seed')}"
+    likely_first = sorted(run_paths(folder / TRIALS), key=lambda path: (seed not in path.name, path))
+    for path in likely_first:
         try:
             metrics = json.loads(read_file(path, records.METRICS))
         except (OSError, ValueError, RecordError):

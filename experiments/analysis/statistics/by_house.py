@@ -13,6 +13,7 @@ from experiments.analysis.statistics.mixed import MIN_LEVELS
 from experiments.errors import StatisticsError
 
 RESAMPLES = 2000
+TOGETHER = 100  # resamples held in memory at a time
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,12 @@ def differences_by_house(
     if not counts.sum(axis=0).all():
         raise StatisticsError("a condition has no trials at some number of objects")
     rng = np.random.default_rng(seed)
-    drawn = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), RESAMPLES)
-    with np.errstate(invalid="ignore"):  # homes drawn may leave a cell empty
-        means = np.tensordot(drawn, sums, 1) / np.tensordot(drawn, counts, 1)
-    means, own = means.mean(axis=2), (sums.sum(axis=0) / counts.sum(axis=0)).mean(axis=1)
+    even, resampled = np.full(len(names), 1 / len(names)), []
+    for _ in range(0, RESAMPLES, TOGETHER):
+        drawn = rng.multinomial(len(names), even, TOGETHER)
+        with np.errstate(invalid="ignore"):  # homes drawn may leave a cell empty
+            resampled.append(np.tensordot(drawn, sums, 1) / np.tensordot(drawn, counts, 1))
+    means, own = np.concatenate(resampled).mean(axis=2), (sums.sum(axis=0) / counts.sum(axis=0)).mean(axis=1)
     found = []
     for i, j in itertools.combinations(range(len(conditions)), 2):
         low, high = np.nanquantile(means[:, j] - means[:, i], (0.025, 0.975)).tolist()

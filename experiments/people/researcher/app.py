@@ -2,6 +2,8 @@
 
 import asyncio
 import logging
+import math
+import re
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
@@ -35,9 +37,11 @@ from mjsim.scene_export.store import scenes_folder
 LOG = logging.getLogger("mjsim.study")
 HEALTH_TIMEOUT = 3.0  # s for the database to answer
 CHECK_PERIOD = 5.0  # s between two looks whether who watches may still do so
+PAGE_SIZE = 100  # participants on a page of the list
 MAX_WANTED = 1_000_000  # people of a cell
 METRICS_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 UNKNOWN = "Not found", "There is no such page."
+_PAGE = re.compile(r"\d{1,9}", re.ASCII)
 Handler = Callable[[Request, Researcher], Awaitable[Response]]
 
 
@@ -169,13 +173,21 @@ class ResearcherServer:
         return self._page(request, who, "overview", now=now, faults=self._watched.metrics.log.latest)
 
     async def _people(self, request: Request, who: Researcher) -> Response:
-        people = await self._store.people()
+        find, asked = (request.query_params.get(name, "").strip() for name in ("find", "page"))
+        people = [one for one in await self._store.people() if find.lower() in _described(one)]
         cells = {place.person_id: place.cell for place in await self._store.assignments()}
+        last = max(1, math.ceil(len(people) / PAGE_SIZE))
+        number = min(max(1, int(asked)), last) if _PAGE.fullmatch(asked) else 1
+        shown = people[(number - 1) * PAGE_SIZE : number * PAGE_SIZE]
         return self._page(
             request,
             who,
             "people",
-            people=[(one, cells.get(one.id), self._session(one)) for one in people],
+            people=[(one, cells.get(one.id), self._session(one)) for one in shown],
+            found=len(people),
+            find=find,
+            number=number,
+            last=last,
             labels=[cell.label for cell in self._study.cells],
         )
 
@@ -284,3 +296,8 @@ class ResearcherServer:
         return self._message(
             request, 503, "Not possible now", "The database says no; its words are in the log."
         )
+
+
+def _described(person: Person) -> str:
+    """Text of a participant's row that the list can be searched for."""
+    return f"{person_name(person)} {person.status.replace('_', ' ')} {person.phase}".lower()

@@ -1,7 +1,6 @@
 """Cells and places: who gets which, in one transaction with a lock on the study."""
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -25,10 +24,20 @@ _ACTIVE = update(person).where(
     person.c.status.in_(ACTIVE),
 )
 _FRESH = or_(assignment.c.state == "finished", person.c.seen >= bindparam("since"))
-_HOLDERS = (
-    select(assignment.c.cell, assignment.c.place, assignment.c.person_id, _FRESH.label("fresh"))
+_TAKEN = (
+    select(assignment.c.cell, func.count())
     .join(person, person.c.id == assignment.c.person_id)
-    .where(assignment.c.study_id == bindparam("study"), assignment.c.active == 1)
+    .where(assignment.c.study_id == bindparam("study"), assignment.c.active == 1, _FRESH)
+    .group_by(assignment.c.cell)
+)
+_HOLDERS = (
+    select(assignment.c.place, assignment.c.person_id, _FRESH.label("fresh"))
+    .join(person, person.c.id == assignment.c.person_id)
+    .where(
+        assignment.c.study_id == bindparam("study"),
+        assignment.c.active == 1,
+        assignment.c.cell == bindparam("of"),
+    )
     .order_by(person.c.seen)
 )
 
@@ -74,13 +83,16 @@ class Assignments(Part):
                     return before
                 if await take_back(connection, self._study_id, before, "held"):
                     return await place_of(connection, person_id)
-            holders = await self._holders(connection, now - abandoned_after)
             wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
-            fresh = Counter(cell for cell, _, _, fresh in holders if fresh)
-            cell = choose([fresh[index] for index in range(len(cells))], wanted, rule, rng)
-            if cell is None:
-                return None
-            place = await _free_place(connection, [one for one in holders if one[0] == cell], wanted[cell])
+            here = {"study": self._study_id, "since": now - abandoned_after}
+            while True:  # again if a sign of life came between the two queries
+                taken = await _tally(connection, _TAKEN, here)
+                cell = choose([taken.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
+                if cell is None:
+                    return None
+                holders = (await connection.execute(_HOLDERS, {**here, "of": cell})).all()
+                if (place := await _free_place(connection, holders, wanted[cell])) is not None:
+                    break
             await self._give(connection, person_id, (cell, place), cells, rng, now, new=before is None)
             return await place_of(connection, person_id)
 
@@ -168,13 +180,6 @@ class Assignments(Part):
                 f"Person {person_id} has ended the participation, or does not exist: no place is given."
             )
 
-    async def _holders(self, connection: AsyncConnection, since: datetime) -> Sequence[Any]:
-        """Who has which place, and whether it is finished or held with a sign of life since then.
-
-        It is one query, as signs of life may come meanwhile; those who have been away for longest come first.
-        """
-        return (await connection.execute(_HOLDERS, {"study": self._study_id, "since": since})).all()
-
     async def _give(
         self,
         connection: AsyncConnection,
@@ -204,16 +209,20 @@ class Assignments(Part):
         await connection.execute(update(person).where(person.c.id == person_id).values(status="assigned"))
 
 
-async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int:
-    """The first place of a cell that nobody has; an abandoned one is released where no other is free."""
+async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int | None:
+    """Return the first place of a cell that nobody has, else release and return an abandoned one, if any."""
     free = sorted(set(range(wanted)) - {holder.place for holder in holders})
     if free:
         return free[0]
-    abandoned = next(holder for holder in holders if not holder.fresh and holder.place < wanted)
+    abandoned = next((one for one in holders if not one.fresh and one.place < wanted), None)
+    if abandoned is None:
+        return None
     await set_place(connection, abandoned.person_id, "released")
     return int(abandoned.place)
 
 
-async def _tally(connection: AsyncConnection, query: Select[Any]) -> dict[Any, int]:
-    """How many rows have each value."""
-    return {row[0]: row[1] for row in await connection.execute(query)}
+async def _tally(
+    connection: AsyncConnection, query: Select[Any], values: Mapping[str, Any] | None = None
+) -> dict[Any, int]:
+    """Count the rows that have each value."""
+    return {row[0]: row[1] for row in await connection.execute(query, values)}

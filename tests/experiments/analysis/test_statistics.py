@@ -14,6 +14,7 @@ from statsmodels.formula.api import ols
 from statsmodels.stats.anova import anova_lm
 from study_people import SIZES
 
+from experiments.analysis.statistics import variance_components
 from experiments.analysis.statistics.anova import brown_forsythe, cells_of, one_way, two_way, welch
 from experiments.analysis.statistics.by_house import differences_by_house
 from experiments.analysis.statistics.effects import FTest, hedges_g
@@ -325,6 +326,66 @@ def test_factors_that_the_design_cannot_tell_apart_are_refused():
     condition, levels = np.tile([*"ab"], 40), np.full(80, 6)
     with pytest.raises(StatisticsError, match="cannot tell the variances of the random factors apart"):
         mixed_model(rng.normal(size=80), condition, levels, {"person": people, "house": people})
+
+
+def test_a_factor_that_only_says_the_cell_is_refused_next_to_another_factor():
+    rng, person = np.random.default_rng(1), np.repeat(np.arange(20), 6)
+    condition, levels = np.tile([*"aabbcc"], 20), np.tile([6, 12], 60)
+    cells = np.char.add(condition, levels.astype(str))
+    with pytest.raises(StatisticsError, match="cannot tell the variances of the random factors apart"):
+        mixed_model(rng.normal(size=120), condition, levels, {"person": person, "house": cells})
+
+
+def test_a_constant_measure_and_people_who_do_not_differ_are_refused():
+    houses, condition, levels = np.repeat(np.arange(10), 4), np.tile([*"ab"], 20), np.full(40, 6)
+    with pytest.raises(StatisticsError, match="the values do not vary"):
+        mixed_model(np.full(40, 3.7), condition, levels, {"house": houses})
+    of_house = np.random.default_rng(2).normal(size=10)[houses]
+    with pytest.raises(StatisticsError, match="in the same house and condition do not differ"):
+        mixed_model(of_house + (condition == "b"), condition, levels, {"house": houses})
+
+
+def test_a_mixed_model_of_many_houses_is_their_paired_t_test():
+    """With a trial of each condition in each of 20,000 houses; dense indicators would take 6 GB."""
+    rng, count = np.random.default_rng(3), 20_000
+    houses, condition = np.repeat(np.arange(count), 2), np.tile([*"ab"], count)
+    values = rng.normal(size=2 * count) + 0.7 * rng.normal(size=count)[houses] + 0.02 * (condition == "b")
+    model = mixed_model(values, condition, np.full(2 * count, 6), {"house": houses})
+    paired = stats.ttest_rel(values[1::2], values[::2])
+    test = model.tests["assistance"]
+    assert (test.statistic, test.df2) == (pytest.approx(paired.statistic**2), pytest.approx(count - 1))
+    between = values.reshape(-1, 2).mean(axis=1).var(ddof=1)
+    assert model.random["house"].variance == pytest.approx(between - model.residual_variance / 2)
+
+
+@pytest.mark.parametrize("copied", [True, False])
+def test_factors_with_as_many_levels_as_trials_or_the_same_ones_are_refused_at_once(copied):
+    rows = np.arange(40_000)
+    factors = {"person": rows // 2, "house": -(rows // 2)} if copied else {"house": rows}
+    message = "cannot tell the variances" if copied else "as many houses and cells as people"
+    with pytest.raises(StatisticsError, match=message):
+        mixed_model(np.random.default_rng(0).normal(size=len(rows)), rows % 2, np.full(len(rows), 6), factors)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sparse_crossproducts_give_the_model_of_dense_ones(seed, monkeypatch):
+    """Persons crossed with houses, and houses with conditions nested in houses."""
+    rng = np.random.default_rng(seed)
+    person, house = rng.integers(0, 12, 240), rng.integers(0, 9, 240)
+    condition, levels = rng.choice([*"abc"], 240), rng.choice([6, 12], 240)
+    both = np.char.add(house.astype(str), condition)
+    values = rng.normal(size=240) + rng.normal(size=12)[person] + rng.normal(size=9)[house]
+    factors = {"person": person, "house": house, "house x assistance": both}
+
+    def found():
+        model = mixed_model(values, condition, levels, factors)
+        tests = [(test.statistic, test.df2) for test in model.tests.values()]
+        return np.ravel(tests), [factor.variance for factor in model.random.values()]
+
+    dense = found()
+    monkeypatch.setattr(variance_components, "DENSE", 0)
+    for sparse, expected in zip(found(), dense, strict=True):
+        assert sparse == pytest.approx(expected, rel=1e-7)
 
 
 def test_power_by_simulation_and_its_inverse():

@@ -67,6 +67,32 @@ def test_who_is_logged_in_sees_the_study_and_who_is_not_sees_the_login(site):
     assert link.rsplit("/", 1)[1] not in text
 
 
+def test_participants_are_listed_a_page_at_a_time_and_found_by_name_status_or_phase(site, monkeypatch):
+    monkeypatch.setattr("experiments.people.researcher.app.PAGE_SIZE", 2)
+    owner = site.logged_in("owner")
+    assert "Nobody has come yet" in owner.get("/people").text
+    for _ in range(5):
+        site.begin(site.client())
+    site.ask(site.store.withdraw(4, delete=False))
+
+    def listed(**asked):
+        text = owner.get("/people", params=asked).text
+        links = re.findall(r'href="/people\?([^"]*)">(\w+) page', text)
+        return re.findall(r"p0000\d(?=</a></th>)", text), [(name, link) for link, name in links]
+
+    assert listed() == (["p00001", "p00002"], [("Next", "find=&amp;page=2")])
+    assert listed(page=2)[0] == ["p00003", "p00004"]
+    assert [name for name, _ in listed(page=2)[1]] == ["Previous", "Next"]
+    last = (["p00005"], [("Previous", "find=&amp;page=2")])
+    assert listed(page=3) == listed(page=999) == last
+    for other in ("0", "-1", "x", "\0", "9" * 5000, "\u0663"):
+        assert listed(page=other) == listed()
+    assert listed(find="P00003")[0] == ["p00003"] and listed(find="withdrawn")[0] == ["p00004"]
+    assert listed(find="consent", page=2)[1][0] == ("Previous", "find=consent&amp;page=1")
+    text = owner.get("/people", params={"find": '"><b>'}).text
+    assert "No participant matches" in text and "<b>" not in text
+
+
 def test_wrong_passwords_and_names_are_told_the_same_and_are_limited(site):
     client = site.client(researcher=True)
     tried = [("owner", "wrong"), ("nobody", PASSWORD), ("x\0'; DROP TABLE login; --", "\0"), ("", "")]

@@ -16,6 +16,7 @@ from experiments.cli import compare, run
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError, StatisticsError
 from experiments.record.origin import RECORDED, SIMULATED
+from experiments.study import analysis as study_analysis
 from experiments.study.analysis import analyse
 from experiments.study.cost import StudyCost
 from experiments.study.measures import read_measures
@@ -44,6 +45,15 @@ def test_columns_that_nothing_analyses_are_named():
     rows[-1] |= {"excluded": True, "mood\n": 3}
     *_, note = table_of(rows).notes
     assert note == "Nothing here analyses the table's further columns: 'excluded', 'mood\\n'."
+
+
+def test_a_model_that_memory_does_not_suffice_for_says_what_to_do(monkeypatch):
+    def exhausted(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(study_analysis, "mixed_model", exhausted)
+    found = analyse(table_of(made_up_people(SMALL)), read_measures()).find("distance", "mixed model")
+    assert found.reason.startswith("there is not enough memory; analyse fewer trials")
 
 
 def test_a_measure_has_one_column_wherever_it_is_named():
@@ -364,3 +374,12 @@ def test_people_with_several_trials_in_several_homes(tmp_path):
     assert people[3]["objects_per_m2"] == pytest.approx(6 / people[3]["area_m2"])
     report = (tmp_path / "analysis/report.html").read_text()
     assert "People have several trials in a cell" in report and "houses drawn again" in report
+
+
+def test_a_report_of_many_trials_stays_small_and_has_no_link(tmp_path):
+    people = made_up_people({("none", 6): 2100, ("optimal", 6): 2100})
+    write_tables(tmp_path, people)
+    assert main(["study", "analyze", str(tmp_path)]) == 0
+    page = (tmp_path / "analysis" / "report.html").read_text()
+    assert len(page) < 2_000_000 and "data:image/png" in page
+    assert not re.search(r'(?:href|src)="(?!#|data:image/png)', page)

@@ -55,8 +55,10 @@ def reading(site, link):
 
 
 @pytest.mark.parametrize("look", [DESK, PHONE])
-def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look):
+def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look, monkeypatch):
+    monkeypatch.setattr("experiments.people.researcher.app.PAGE_SIZE", 1)
     link = consented(site)
+    consented(site)
     page = chromium.new_context(**look).new_page()
     page.goto(site.researcher_url)
     found = violations(page)
@@ -73,6 +75,8 @@ def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look):
         page.get_by_role("link", name=name).press("Enter")
         page.get_by_role("heading", name=name).wait_for()
         found += violations(page)
+    page.goto(f"{site.researcher_url}people?find=consent&page=2")
+    found += violations(page)
     with reading(site, link) as socket:
         page.goto(f"{site.researcher_url}people/1")
         found += violations(page)
@@ -106,11 +110,19 @@ def test_numbers_change_by_themselves_and_a_session_is_watched(site, request, br
     assert page.faults == []
 
 
-def test_all_works_without_scripts(site, chromium):
+def test_all_works_without_scripts(site, chromium, monkeypatch):
+    monkeypatch.setattr("experiments.people.researcher.app.PAGE_SIZE", 1)
+    consented(site)
     consented(site)
     plain = chromium.new_context(java_script_enabled=False).new_page()
     log_in(plain, site)
     plain.get_by_role("button", name="Pause").press("Enter")
     plain.get_by_text("The study is paused").wait_for()
     plain.get_by_role("link", name="People").press("Enter")
+    assert plain.get_by_role("link", name="p00001").is_visible()
+    plain.get_by_role("link", name="Next page").press("Enter")
+    plain.get_by_role("link", name="p00002").wait_for()
+    plain.get_by_label("Name, status or phase").fill("p00001")
+    plain.get_by_role("button", name="Search").press("Enter")
+    plain.get_by_text("1 participant").wait_for()
     assert plain.get_by_role("link", name="p00001").is_visible()
