@@ -5,7 +5,7 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import StoreError
@@ -15,20 +15,29 @@ from experiments.people.study_file import Pay
 
 PHASES = ["consent", "device", "story", "training", "task", "survey", "completion"]
 NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)
-ACTIVE = "active"
-# How people end, and in which phase.
+ACTIVE = "assigned"
+ONCE = {"reward", "screen_out", "partial"}
+# How people stand, and in which phase; what pays by the share of phases comes as often as the rest.
 ENDS = st.one_of(
-    st.tuples(st.just("finished"), st.just("completion")),
-    st.tuples(st.just("no_consent"), st.just("consent")),
+    st.sampled_from([(ACTIVE, "task"), ("finished", "completion"), ("no_consent", "consent")]),
     st.tuples(st.sampled_from(["screened_out", "withdrawn", "timed_out"]), st.sampled_from(PHASES[:-1])),
+    st.tuples(
+        st.sampled_from(["screened_out", "withdrawn"]), st.sampled_from(["training", "task", "survey"])
+    ),
 )
-CENTS = st.integers(0, 2000)
+CENTS = st.one_of(
+    st.just(0), st.integers(0, 2000)
+)  # often nothing, so that a later rule is the first that pays
 RULES = st.builds(
-    lambda reward, screen_out, bonus, partial: Pay("EUR", reward / 100, screen_out / 100, bonus / 100, partial),
+    lambda reward, screen_out, bonus, partial: Pay(
+        currency="EUR", reward=reward / 100, screen_out=screen_out / 100, bonus_for_all=bonus / 100, partial=partial
+    ),
     CENTS, CENTS, CENTS, st.booleans(),
 )  # fmt: skip
-# Each person ends at one of the decisions, in one way, and may have put everything away, or be rejected.
-PEOPLE = st.lists(st.tuples(ENDS, st.integers(0, 3), st.booleans(), st.booleans()), min_size=1, max_size=6)
+# Of each person, at each decision: how they stand, whether they put everything away, and whether they are rejected.
+STANDING = st.tuples(ENDS, st.booleans(), st.sampled_from([False, False, True]))
+DECISIONS = 3
+HISTORIES = st.lists(st.lists(STANDING, min_size=DECISIONS, max_size=DECISIONS), min_size=1, max_size=6)
 
 
 def oracle(pay, status, phase, delivered):
@@ -50,36 +59,35 @@ def person(number, status, phase):
     return Person(number, f"{number:064}", "link", status, phase, NOON, NOON, delete_wanted=False)
 
 
-@given(people=PEOPLE, rules=st.lists(RULES, min_size=4, max_size=4))
+@settings(max_examples=300)
+@given(people=HISTORIES, rules=st.lists(RULES, min_size=DECISIONS, max_size=DECISIONS))
 def test_each_person_gets_what_the_rules_said_first(people, rules):
+    """Rules change between decisions, and so may how people stand; no person gets two payments of those given once."""
     ledger, expected = [], {}
-    for now, pay in enumerate(rules):
-        here = [
-            person(number, *(end if now >= when else (ACTIVE, "consent")))
-            for number, (end, when, _, _) in enumerate(people, 1)
-        ]
+    for decision, pay in enumerate(rules):
+        now = dict(enumerate((history[decision] for history in people), 1))
+        here = [person(number, *end) for number, (end, _, _) in now.items()]
         trials = [
             TrialRow(number, "task", "x", "all delivered" if delivered else "time is up", NOON)
-            for number, (_, when, delivered, _) in enumerate(people, 1)
-            if now >= when
+            for number, (_, delivered, _) in now.items()
         ]
-        rejected = {number for number, (_, _, _, refused) in enumerate(people, 1) if refused}
+        rejected = {number for number, (_, _, refused) in now.items() if refused}
         study = SimpleNamespace(settings=SimpleNamespace(pay=pay, phases=PHASES))
         new = undecided(due(study, here, trials, rejected), ledger)
-        for number, (end, when, delivered, refused) in enumerate(people, 1):
-            if now < when or refused:
+        for number, (end, delivered, refused) in now.items():
+            if refused:
                 continue
             mine = {kind for owner, kind in expected if owner == number}
             for kind, cents in oracle(pay, *end, delivered).items():
-                again = kind in mine or (kind != "bonus" and mine & {"reward", "screen_out", "partial"})
+                again = kind in mine or (kind in ONCE and mine & ONCE)
                 if cents >= Fraction(1, 2) and not again:
                     expected[number, kind] = cents
-        for one in new:
-            ledger.append(
-                PaymentEvent(
-                    len(ledger), one.person_id, one.key, 0, "decided", one.kind, one.cents, "EUR", "", one.why, NOON
-                )
-            )  # fmt: skip
+        ledger += [
+            PaymentEvent(
+                0, one.person_id, one.key, 0, "decided", one.kind, one.cents, "EUR", "", one.why, NOON
+            )
+            for one in new
+        ]
         assert {(event.person_id, event.kind) for event in ledger} == set(expected)
         assert len({event.key for event in ledger}) == len(ledger)
     for event in ledger:  # half a cent is rounded up
