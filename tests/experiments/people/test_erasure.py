@@ -127,6 +127,15 @@ def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
     assert f"the runs of p00002 are not here; delete visits/{'b' * 64}" in said
 
 
+def test_another_person_with_the_same_number_stays_in_a_backup(served, tmp_path):
+    """As after an older backup was restored and the study went on."""
+    with closing(sqlite3.connect(tmp_path / "backup.db")) as database, database:
+        database.execute("UPDATE person SET created = '2020-01-01 00:00:00.000000' WHERE id = 2")
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    with closing(sqlite3.connect(tmp_path / "backup.db")) as database:
+        assert database.execute("SELECT count(*) FROM person WHERE id = 2").fetchone() == (1,)
+
+
 def test_the_last_person_of_a_table_leaves_an_empty_one(served, tmp_path):
     for name in ("p00001", "p00002", "p00003"):
         assert main(["study", "erase", *served, name, "--who", "me"]) == 0
