@@ -15,13 +15,7 @@ directory is on the disk. Give the command again to continue after an interrupti
 
 You rarely need this: `mjsim replay`, `view`, `metrics`, `compare` and `study analyze` read packed trials, and a batch
 may hold both kinds. Without mjsim, `sqlite3 OUT/trials/FILE.sqlar -A --list` lists the files of an archive, and
-`-A --extract` unpacks them.
-
-examples:
-  mjsim unpack runs/batch
-      unpack all trials
-  mjsim unpack runs/batch apartment-06-none-follower-seed0000-1a2b3c4d
-      unpack one, to send it or to look into its files"""
+`-A --extract` unpacks them."""
 
 
 def add_parser(commands: Any) -> None:
@@ -33,26 +27,20 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Unpack with a progress bar; 1 if a trial is damaged."""
-    from rich.progress import BarColumn, MofNCompleteColumn, TimeElapsedColumn
-
     from experiments.cli.terminal import error_console, progress_bars
     from experiments.record.archive import adopt, run_paths, unpack_in_place
-    from experiments.record.run_directory import PACKED, TRIALS, is_batch
+    from experiments.record.run_directory import PACKED, TRIALS
 
-    if not is_batch(arguments.out):
-        raise RecordError(
-            f"{arguments.out} is not the folder of a batch; name the --out of `mjsim batch --packed`"
-        )
     trials, failures = arguments.out / TRIALS, 0
     adopt(trials)
     packed = {path.name: path for path in run_paths(trials) if path.parent.suffix == PACKED}
-    if unknown := [name for name in arguments.names if name not in packed]:
+    if not packed or not packed.keys() >= set(arguments.names):
+        missing = ", ".join(sorted({*arguments.names} - packed.keys())) or "at all"
         raise RecordError(
-            f"{arguments.out} has no packed trial {unknown[0]}; it has {len(packed)} of other names"
+            f"{arguments.out} has no packed trial {missing}; give the --out of `mjsim batch --packed`"
         )
-    wanted = {packed[name] for name in arguments.names} or set(packed.values())
-    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with progress_bars(error_console(), "unpack", *columns) as bars:
+    wanted = {packed[name] for name in arguments.names or packed}
+    with progress_bars(error_console()) as bars:
         for fault in bars.track(unpack_in_place(trials, wanted), total=len(wanted), description="unpack"):
             if fault is not None:
                 failures += 1

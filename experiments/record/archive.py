@@ -18,12 +18,13 @@ from pathlib import Path
 
 from experiments.errors import RecordError
 from experiments.record import records
-from experiments.record.checksums import CHECKSUMS, checksum_faults
+from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.run_directory import PACKED, is_run
 from mjsim.files import MAX_INPUT, read_bytes, work_folder
 
 WAIT_S = 60.0  # how long to wait for another process that changes the same archive
 _SCHEMA = "CREATE TABLE IF NOT EXISTS sqlar(name TEXT PRIMARY KEY, mode INT, mtime INT, sz INT, data BLOB)"
+_DAMAGED = "if it is damaged, move it away: its trials are run again"
 _OF_RUN = "WHERE name >= ? || '/' AND name < ? || '0'"  # 0 is the character after the slash
 
 
@@ -43,23 +44,18 @@ def new_archive(folder: Path, prefix: str) -> sqlite3.Connection:
 
 
 def pack(run: Path, database: sqlite3.Connection) -> None:
-    """Add a run directory to an archive in one transaction.
-
-    Raises:
-        RecordError: The archive cannot be written. What it held is kept.
-    """
-    rows = [_row(path, run.parent) for path in sorted(run.rglob("*")) if path.is_file()]
+    """Add a run directory to an archive in one transaction; a `RecordError` if it cannot be written."""
+    rows = []
+    for path in sorted(path for path in run.rglob("*") if path.is_file()):
+        content, status = path.read_bytes(), path.stat()
+        data = min(content, zlib.compress(content), key=len)
+        name = path.relative_to(run.parent).as_posix()
+        rows.append((name, status.st_mode, int(status.st_mtime), len(content), data))
     try:
         with database:
             database.executemany("INSERT OR REPLACE INTO sqlar VALUES (?, ?, ?, ?, ?)", rows)
     except sqlite3.Error as error:
         raise RecordError(f"cannot pack {run.name}: {error}; run it again once there is space") from error
-
-
-def _row(path: Path, folder: Path) -> tuple[str, int, int, int, bytes]:
-    content, status = path.read_bytes(), path.stat()
-    data = min(content, zlib.compress(content), key=len)
-    return path.relative_to(folder).as_posix(), status.st_mode, int(status.st_mtime), len(content), data
 
 
 def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
@@ -81,17 +77,15 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
             if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
                 busy += 1
             elif path.exists():
-                raise _unreadable(path, error) from error
+                raise RecordError(f"cannot read {path}: {error}; {_DAMAGED}") from error
     return busy
 
 
 def run_paths(folder: Path) -> list[Path]:
     """List the runs of a batch's folder of trials by name: `FOLDER/NAME`, or `FOLDER/ARCHIVE/NAME` if packed.
 
-    Of a packed run and a run directory with the same name, the run directory is listed.
-
-    Raises:
-        RecordError: An archive is damaged.
+    Of a packed run and a run directory with the same name, the run directory is listed. A damaged archive raises a
+    `RecordError`.
     """
     found = {name: archive / name for archive in _archives(folder) for name in packed_names(archive)}
     with suppress(FileNotFoundError), os.scandir(folder) as entries:
@@ -108,11 +102,7 @@ def packed_names(archive: Path) -> set[str]:
 
 @contextmanager
 def opened_run(path: Path) -> Iterator[Path]:
-    """Yield a run directory as it is, or a temporary folder with the files of a packed run.
-
-    Raises:
-        RecordError: The archive or a packed file is damaged; the message names it.
-    """
+    """Yield a run directory as it is, or a temporary one of a packed run; raises a `RecordError` as `unpack`."""
     archive = None if is_run(path) else archive_of(path)
     if archive is None:
         yield path
@@ -123,16 +113,11 @@ def opened_run(path: Path) -> Iterator[Path]:
 
 
 def unpack(archive: Path, name: str, folder: Path) -> None:
-    """Write a packed run to `folder/name` and check every file against the run's checksums.
-
-    Raises:
-        RecordError: The archive or a file is damaged; the message names it.
-    """
+    """Write a packed run to `folder/name`; a `RecordError` names a file that is not as its checksum says."""
     places = set[Path]()
     with _opened(archive) as database:
-        for member, mtime, size, data in database.execute(
-            f"SELECT name, mtime, sz, data FROM sqlar {_OF_RUN}", (name, name)
-        ):
+        members = f"SELECT name, mtime, sz, data FROM sqlar {_OF_RUN}"
+        for member, mtime, size, data in database.execute(members, (name, name)):
             path = folder / member
             if not path.resolve().is_relative_to(folder.resolve()):
                 raise RecordError(f"{archive}: {member} is not the name of a file of a run")
@@ -144,13 +129,10 @@ def unpack(archive: Path, name: str, folder: Path) -> None:
     if not places:
         raise RecordError(f"{archive} holds no run {name}")
     for place in sorted(places):
-        try:
-            names = [path.name for path in place.iterdir() if path.is_file() and path.name != CHECKSUMS]
-            faults = [message for _, message in checksum_faults(place, names)]
-        except (OSError, RecordError) as error:
-            faults = [str(error)]
-        if faults:
-            raise RecordError(f"{archive}: {place.relative_to(folder)} is damaged: {faults[0]}")
+        sums = read_checksums(place)
+        for path in {*map(place.joinpath, sums), *filter(Path.is_file, place.iterdir())}:
+            if path.name != CHECKSUMS and (not path.exists() or sums.get(path.name) != sha256_of(path)):
+                raise RecordError(f"{archive}: {path.relative_to(folder)} is damaged: it is not as written")
 
 
 def read_file(path: Path, file: str) -> bytes:
@@ -182,51 +164,40 @@ def unpack_in_place(folder: Path, runs: Collection[Path]) -> Iterator[str | None
         discard(folder, done)
 
 
-def discard(folder: Path, names: Collection[str]) -> None:
-    """Remove packed runs from the archives in `folder`; an archive without others is deleted."""
+def discard(folder: Path, names: Collection[str], target: Path | None = None) -> None:
+    """Remove packed runs from the archives in `folder`, or move them to archives in `target`."""
     for archive in _archives(folder):
         held = packed_names(archive)
         if held <= set(names):
-            archive.unlink()
-        elif gone := held.intersection(names):
-            with _opened(archive) as database, database:
-                database.executemany(f"DELETE FROM sqlar {_OF_RUN}", [(name, name) for name in gone])
-
-
-def move(folder: Path, names: Collection[str], target: Path) -> None:
-    """Move packed runs from the archives in `folder` to archives in `target`."""
-    for archive in _archives(folder):
-        held = packed_names(archive)
-        if held <= set(names):
-            archive.rename(target / archive.name)
-        elif gone := held.intersection(names):
-            with closing(new_archive(target, "moved")) as database:
-                database.execute("ATTACH ? AS source", (archive.absolute().as_uri(),))
-                copy = f"INSERT INTO sqlar SELECT * FROM source.sqlar {_OF_RUN}"
-                with database:
-                    database.executemany(copy, [(name, name) for name in gone])
-    adopt(target, "moved")
-    discard(folder, names)
-
-
-def _content(archive: Path, member: str, size: int, data: bytes) -> bytes:
-    try:
-        content = data if len(data) == size else zlib.decompressobj().decompress(data, min(size, MAX_INPUT))
-    except (zlib.error, TypeError, ValueError) as error:
-        raise RecordError(f"{archive}: {member} is damaged ({error})") from error
-    if len(content) != size:
-        raise RecordError(f"{archive}: {member} is damaged: it has {len(content)} bytes, not {size}")
-    return content
+            archive.unlink() if target is None else archive.rename(target / archive.name)
+        elif gone := [(name, name) for name in held.intersection(names)]:
+            with _opened(archive) as database:
+                if target is not None:
+                    new = target / f"{archive.stem}-{secrets.token_hex(4)}{PACKED}"
+                    database.execute("ATTACH ? AS target", (f"{new.absolute().as_uri()}?mode=rwc",))
+                    database.execute(_SCHEMA.replace("sqlar", "target.sqlar", 1))
+                with database:  # one transaction for both archives
+                    if target is not None:
+                        database.executemany(
+                            f"INSERT INTO target.sqlar SELECT * FROM main.sqlar {_OF_RUN}", gone
+                        )
+                    database.executemany(f"DELETE FROM main.sqlar {_OF_RUN}", gone)
 
 
 def archive_of(path: Path) -> Path | None:
     """The archive that holds the run of this path, or None."""
     if path.suffix == PACKED and path.is_file():
-        name = next(iter(sorted(packed_names(path))), "NAME")
-        raise RecordError(f"{path} holds packed runs; name one of them, such as {path.parent / name}")
+        raise RecordError(f"{path} holds packed runs; name one of them: {path.parent / 'NAME'}")
     if path.parent.suffix == PACKED and path.parent.is_file():
         return path.parent
     return next((archive for archive in _archives(path.parent) if path.name in packed_names(archive)), None)
+
+
+def _content(archive: Path, member: str, size: int, data: bytes) -> bytes:
+    try:
+        return data if len(data) == size else zlib.decompressobj().decompress(data, MAX_INPUT)
+    except (zlib.error, TypeError) as error:
+        raise RecordError(f"{archive}: {member} is damaged ({error})") from error
 
 
 def _archives(folder: Path) -> list[Path]:
@@ -238,15 +209,9 @@ def _connect(path: Path, mode: str, wait_s: float = WAIT_S) -> sqlite3.Connectio
 
 
 @contextmanager
-def _opened(archive: Path, wait_s: float = WAIT_S) -> Iterator[sqlite3.Connection]:
+def _opened(archive: Path) -> Iterator[sqlite3.Connection]:
     try:
-        with closing(_connect(archive, "rw", wait_s)) as database:
+        with closing(_connect(archive, "rw")) as database:
             yield database
     except sqlite3.Error as error:
-        raise _unreadable(archive, error) from error
-
-
-def _unreadable(archive: Path, error: sqlite3.Error) -> RecordError:
-    return RecordError(
-        f"cannot read {archive}: {error}; if it is damaged, move it away: its trials are run again"
-    )
+        raise RecordError(f"cannot read {archive}: {error}; {_DAMAGED}") from error

@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 from experiments.errors import RecordError
@@ -36,22 +36,6 @@ def read_checksums(folder: Path) -> dict[str, str]:
     if lines[-1] or len(sums) != len(found):
         raise RecordError(f"{path} is not as written: a line is not a checksum and a file name")
     return sums
-
-
-def checksum_faults(folder: Path, names: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Yield each file that is not as written, of those in `SHA256SUMS` and of `names`, with a message.
-
-    Raises:
-        RecordError: `SHA256SUMS` is missing or damaged.
-    """
-    sums = read_checksums(folder)
-    for name in sorted({*sums, *(name for name in names if (folder / name).is_file())}):
-        if name not in sums:
-            yield name, f"{name} was not written with the run: {CHECKSUMS} does not name it"
-        elif not (folder / name).is_file():
-            yield name, f"{name} is missing; it was written with the run"
-        elif sha256_of(folder / name) != sums[name]:
-            yield name, f"{name} is not the file that was written: its SHA-256 is another"
 
 
 def sha256_of(path: Path) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from experiments.errors import RecordError
 from experiments.record import records
-from experiments.record.checksums import CHECKSUMS, checksum_faults
+from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.columns import TRAJECTORY_COLUMNS, action_hashes
 from experiments.record.event_check import check_event
 from experiments.record.files import read_json
@@ -52,10 +52,17 @@ def checksum_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
     """Files that are not those that were written with the run."""
     last = record.steps - 1
     try:
-        for name, message in checksum_faults(directory, records.FILES):
-            yield Mismatch(last, message, name)
+        sums = read_checksums(directory)
     except RecordError as error:
         yield Mismatch(last, str(error), CHECKSUMS)
+        return
+    for name in sorted({*sums, *(name for name in records.FILES if (directory / name).is_file())}):
+        if name not in sums:
+            yield Mismatch(last, f"{name} was not written with the run: {CHECKSUMS} does not name it", name)
+        elif not (directory / name).is_file():
+            yield Mismatch(last, f"{name} is missing; it was written with the run", name)
+        elif sha256_of(directory / name) != sums[name]:
+            yield Mismatch(last, f"{name} is not the file that was written: its SHA-256 is another", name)
 
 
 def check_log(directory: Path) -> None:

@@ -6,7 +6,6 @@ import gc
 import os
 import secrets
 import shutil
-import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -237,10 +236,7 @@ def _house(name: str) -> House:
     return house
 
 
-@functools.cache
-def _archive(folder: Path, prefix: str) -> sqlite3.Connection:
-    """The archive of this process, open until the process ends."""
-    return new_archive(folder, prefix)
+_archive = functools.cache(new_archive)  # of this process, open until the process ends
 
 
 def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> StoredTrial | str:

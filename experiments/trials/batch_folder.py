@@ -19,7 +19,7 @@ from typing import Any
 
 from experiments.errors import RecordError
 from experiments.record import records
-from experiments.record.archive import move
+from experiments.record.archive import discard
 from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.columns import HEALTH
 from experiments.record.files import read_arrays, read_json
@@ -117,7 +117,7 @@ def put_aside(out: Path, names: Collection[str]) -> None:
     """Move trials to the outdated ones of their batch; nothing there is replaced."""
     if names:
         (out / OUTDATED).mkdir(exist_ok=True)
-        move(out / TRIALS, names, out / OUTDATED)
+        discard(out / TRIALS, names, out / OUTDATED)
     for name in sorted(names):
         if (out / TRIALS / name).exists():
             (out / TRIALS / name).rename(free_name(out / OUTDATED / name))

@@ -20,7 +20,6 @@ from experiments.record import records
 from experiments.record.archive import (
     adopt,
     discard,
-    move,
     new_archive,
     opened_run,
     pack,
@@ -277,7 +276,7 @@ def test_runs_are_moved_and_discarded_in_all_archives(tmp_path):
     other = packed(trials, "three")
     size = sum(path.stat().st_size for path in trials.iterdir())
     outdated.mkdir()
-    move(trials, {"two", "three", "four"}, outdated)
+    discard(trials, {"two", "three", "four"}, outdated)
     assert [path.name for path in run_paths(trials)] == ["one"]
     assert [path.name for path in run_paths(outdated)] == ["three", "two"]
     assert sum(path.stat().st_size for path in trials.iterdir()) < 0.4 * size
