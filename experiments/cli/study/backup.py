@@ -1,16 +1,20 @@
 """`mjsim study backup`: the database of a study as one file."""
 
 import argparse
-import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command
-from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import DATABASE, add_database, add_served_study, database_url
+from experiments.cli.study.database import (
+    DATABASE,
+    add_database,
+    add_served_study,
+    people_study,
+    with_store,
+)
 
 if TYPE_CHECKING:
-    from experiments.people.study_file import Study
+    from experiments.people.store import Store
 
 DESCRIPTION = """\
 Write the whole database of a study, as of one moment, to a new file; the study may be served meanwhile. Journals and
@@ -29,25 +33,15 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Back up."""
-    require_extra("people")
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
-
-    study = read_people_study(study_path(arguments.study))
-    asyncio.run(_back_up(study, arguments))
+    with_store(people_study(arguments), arguments, lambda store: _back_up(store, arguments))
     print(f"{arguments.out} (restore it with `mjsim study restore {arguments.out} {DATABASE}`)")
     return 0
 
 
-async def _back_up(study: "Study", arguments: argparse.Namespace) -> None:
+async def _back_up(store: "Store", arguments: argparse.Namespace) -> None:
     from experiments.people.copies import note_copy
-    from experiments.people.store import Store
     from experiments.people.store.copies import check_new
 
-    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
-    try:
-        check_new(arguments.out)  # what is not ours must not be noted as a copy
-        note_copy(arguments.folder, "backup", arguments.out)
-        await store.backup(arguments.out)
-    finally:
-        await store.close()
+    check_new(arguments.out)  # what is not ours must not be noted as a copy
+    note_copy(arguments.folder, "backup", arguments.out)
+    await store.backup(arguments.out)

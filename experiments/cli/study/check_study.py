@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.cli.options import add_command
 from experiments.cli.requirements import require_extra
 from experiments.cli.server import prepare_process
+from experiments.cli.study.database import people_study
 from experiments.errors import ConfigError
 from experiments.session.signals import run_until_signal
 
@@ -45,18 +46,15 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check; 1 if there is a problem."""
-    require_extra("people")
+    study = people_study(arguments)
     require_extra("study")
     from experiments.people.phases import phases_of_study
     from experiments.people.readiness.costs import durations, simulate
     from experiments.people.readiness.problems import located, problems_of_file, problems_of_length
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
     from experiments.web.server.pool import WorkerPool
 
     if arguments.out is not None and arguments.out.exists() and not arguments.out.is_dir():
         raise ConfigError(f"{arguments.out} is a file; name a folder for the pictures")
-    study = read_people_study(study_path(arguments.study))
     phases = phases_of_study(study)
     prepare_process()
     pool = WorkerPool(study.cells[0].trial(0).house)

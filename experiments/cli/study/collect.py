@@ -1,21 +1,22 @@
 """`mjsim study collect`: the tidy table of a study with people."""
 
 import argparse
-import asyncio
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from experiments.cli.options import add_command, add_force
 from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import DATABASE, add_database, add_served_study, database_url
+from experiments.cli.study.database import (
+    DATABASE,
+    add_database,
+    add_served_study,
+    people_study,
+    with_store,
+)
 from experiments.errors import RecordError
 from experiments.trials.design import counted
-
-if TYPE_CHECKING:
-    from experiments.people.collect import Collected
-    from experiments.people.study_file import Study
 
 DESCRIPTION = """\
 Write what the people of a study did and answered as a tidy table, a row for each whose task is over: OUT/trials.parquet
@@ -43,18 +44,16 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Collect; 1 if a run cannot be used."""
     require_extra("people")
-    from experiments.people.collect import TEXTS, collect_visits, write_collected
+    from experiments.people.collect import TEXTS, collect, collect_visits, write_collected
     from experiments.people.copies import note_copy, note_derived
-    from experiments.people.study_file import read_people_study
     from experiments.record.run_directory import check_file
-    from experiments.study.simulate import study_path
     from experiments.trials.table import NAME
 
     for name in (f"{NAME}.parquet", f"{NAME}.csv", TEXTS):
         check_file(arguments.out / name, replace=arguments.force)
     if _is_served(arguments):
-        study = replace(read_people_study(study_path(arguments.study)), rehearsal=arguments.rehearsal)
-        found = asyncio.run(_collect(study, arguments))
+        study = replace(people_study(arguments), rehearsal=arguments.rehearsal)
+        found = with_store(study, arguments, lambda store: collect(study, store, arguments.folder))
     else:
         found = collect_visits(arguments.folder)
     for person, fault in found.unusable.items():
@@ -79,14 +78,3 @@ def _is_served(arguments: argparse.Namespace) -> bool:
 
     known = bool(arguments.database) or (arguments.folder / DATABASE).is_file()
     return known or not visit_folders(arguments.folder)
-
-
-async def _collect(study: "Study", arguments: argparse.Namespace) -> "Collected":
-    from experiments.people.collect import collect
-    from experiments.people.store import Store
-
-    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
-    try:
-        return await collect(study, store, arguments.folder)
-    finally:
-        await store.close()

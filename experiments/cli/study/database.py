@@ -1,11 +1,20 @@
-"""The database of a study, as commands name it."""
+"""The study file and the database of a study with people, as commands name them."""
 
 import argparse
 import os
+from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
+from experiments.cli.requirements import require_extra
 from experiments.errors import ConfigError, RecordError
+from experiments.session.signals import run_until_signal
 
+if TYPE_CHECKING:
+    from experiments.people.store import Store
+    from experiments.people.study_file import Study
+
+T = TypeVar("T")
 DATABASE = "study.db"
 URL = "MJSIM_STUDY_DATABASE"  # environment variable
 
@@ -14,6 +23,34 @@ def add_served_study(parser: argparse.ArgumentParser) -> None:
     """Add the study file and the folder of a study that has been served."""
     parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the study")
+
+
+def people_study(arguments: argparse.Namespace) -> "Study":
+    """Read the study file of a command; a ConfigError if the extra `people` is missing or the file is unusable."""
+    require_extra("people")
+    from experiments.people.study_file import read_people_study
+    from experiments.study.simulate import study_path
+
+    return read_people_study(study_path(arguments.study))
+
+
+def with_store(
+    study: "Study",
+    arguments: argparse.Namespace,
+    work: "Callable[[Store], Awaitable[T]]",
+    url: str | None = None,
+) -> T:
+    """Open the database of a study, do `work` with it, and close it, also after a signal. Return the result."""
+    from experiments.people.store import Store
+
+    async def opened() -> T:
+        store = await Store.open(url or database_url(arguments), study.settings.name, study.sha256)
+        try:
+            return await work(store)
+        finally:
+            await store.close()
+
+    return run_until_signal(opened())
 
 
 def add_database(parser: argparse.ArgumentParser) -> None:

@@ -1,15 +1,10 @@
 """`mjsim study erase`: delete all of a person."""
 
 import argparse
-import asyncio
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from experiments.cli.options import add_command
-from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import add_database, add_served_study, database_url
-
-if TYPE_CHECKING:
-    from experiments.people.study_file import Study
+from experiments.cli.study.database import add_database, add_served_study, people_study, with_store
 
 DESCRIPTION = """\
 Delete all that a study stores about a person: the rows of the database, the journal and the runs. Backups, restored
@@ -29,23 +24,12 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Erase."""
-    require_extra("people")
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
+    study = people_study(arguments)
+    from experiments.people.erase import erase
 
-    study = read_people_study(study_path(arguments.study))
-    for line in asyncio.run(_erase(study, arguments)):
+    person, who = arguments.person, arguments.who
+    erased = with_store(study, arguments, lambda store: erase(store, arguments.folder, person, who))
+    for line in erased:
         print(line)
     print(f"{arguments.person} is deleted")
     return 0
-
-
-async def _erase(study: "Study", arguments: argparse.Namespace) -> list[str]:
-    from experiments.people.erase import erase
-    from experiments.people.store import Store
-
-    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
-    try:
-        return await erase(store, arguments.folder, arguments.person, arguments.who)
-    finally:
-        await store.close()

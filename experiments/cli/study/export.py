@@ -1,18 +1,12 @@
 """`mjsim study export`: all data of a study with people, to be kept or published."""
 
 import argparse
-import asyncio
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from experiments.cli.options import add_command, add_force
-from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import add_database, add_served_study, database_url
-
-if TYPE_CHECKING:
-    from experiments.people.export import Exported
-    from experiments.people.study_file import Study
+from experiments.cli.study.database import add_database, add_served_study, people_study, with_store
 
 DESCRIPTION = """\
 Write all data of a study to a new folder that follows Psych-DS: tidy tables (data/), the run directories of trials
@@ -36,26 +30,13 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Export; 1 if a run cannot be used."""
-    require_extra("people")
-    from experiments.people.export import check_export
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
+    study = people_study(arguments)
+    from experiments.people.export import check_export, export
 
-    study = read_people_study(study_path(arguments.study))
-    check_export(arguments.out, replace=arguments.force)
-    found = asyncio.run(_export(study, arguments))
+    folder, out, force = arguments.folder, arguments.out, arguments.force
+    check_export(out, replace=force)
+    found = with_store(study, arguments, lambda store: export(study, store, folder, out, replace=force))
     for person, fault in found.collected.unusable.items():
         print(f"mjsim: {person}: {fault}", file=sys.stderr)
     print(f"{arguments.out} ({found.people} people, {found.runs} runs)")
     return 1 if found.collected.unusable else 0
-
-
-async def _export(study: "Study", arguments: argparse.Namespace) -> "Exported":
-    from experiments.people.export import export
-    from experiments.people.store import Store
-
-    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
-    try:
-        return await export(study, store, arguments.folder, arguments.out, replace=arguments.force)
-    finally:
-        await store.close()

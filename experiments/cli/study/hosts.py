@@ -1,15 +1,13 @@
 """`mjsim study hosts`: several machines that serve one study."""
 
 import argparse
-import asyncio
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command
-from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import add_database, add_served_study, database_url
+from experiments.cli.study.database import add_database, add_served_study, people_study, with_store
 
 if TYPE_CHECKING:
-    from experiments.people.study_file import Study
+    from experiments.people.store import Store
 
 DESCRIPTION = """\
 List the hosts that serve a study (`mjsim study serve --host-name`), let one of them take no new visits, or give away
@@ -33,26 +31,15 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do it, and list the hosts."""
-    require_extra("people")
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
-
-    asyncio.run(_change(read_people_study(study_path(arguments.study)), arguments))
+    with_store(people_study(arguments), arguments, lambda store: _change(store, arguments))
     return 0
 
 
-async def _change(study: "Study", arguments: argparse.Namespace) -> None:
-    from experiments.people.store import Store
-
-    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
-    try:
-        if name := arguments.drain or arguments.open:
-            await store.drain(name, arguments.drain is not None, arguments.who)
-        if name := arguments.hand_over:
-            print(
-                f"{await store.hand_over(name, arguments.who)} visits of {name} continue where their journals are"
-            )
-        for host in await store.hosts():
-            print(f"{host.name}  heard of {host.seen:%F %T} UTC{'  takes no new visits' * host.draining}")
-    finally:
-        await store.close()
+async def _change(store: "Store", arguments: argparse.Namespace) -> None:
+    if name := arguments.drain or arguments.open:
+        await store.drain(name, arguments.drain is not None, arguments.who)
+    if name := arguments.hand_over:
+        visits = await store.hand_over(name, arguments.who)
+        print(f"{visits} visits of {name} continue where their journals are")
+    for host in await store.hosts():
+        print(f"{host.name}  heard of {host.seen:%F %T} UTC{'  takes no new visits' * host.draining}")

@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command
-from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import add_database, add_served_study, database_url
+from experiments.cli.study.database import add_database, add_served_study, people_study, with_store
 from experiments.errors import ConfigError
-from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
     from experiments.people.recruitment.payer import Payer
@@ -50,10 +48,6 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print, decide or note."""
-    require_extra("people")
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
-
     if bool(arguments.paid) != bool(arguments.reference):
         raise ConfigError("--paid and --reference belong together: which payment was made, and its receipt")
     if bool(arguments.reject) != bool(arguments.reason):
@@ -62,17 +56,15 @@ def run(arguments: argparse.Namespace) -> int:
     if len(wanted) > 1:
         first, second = (name.replace("_", "-") for name in wanted[:2])
         raise ConfigError(f"--{first} and --{second} cannot be used at once; leave out one of them")
-    study = read_people_study(study_path(arguments.study))
-    return run_until_signal(_run(study, arguments))
+    study = people_study(arguments)
+    return with_store(study, arguments, lambda store: _run(study, store, arguments))
 
 
-async def _run(study: "Study", arguments: argparse.Namespace) -> int:
+async def _run(study: "Study", store: "Store", arguments: argparse.Namespace) -> int:
     from experiments.people.recruitment import payer
     from experiments.people.rehearsal.passed import require_rehearsal
-    from experiments.people.store import Store
 
     client = payer(study.settings) if arguments.send or arguments.reject else None
-    store = await Store.open(database_url(arguments), study.settings.name, study.sha256)
     try:
         if arguments.send or arguments.paid:
             folder, without = arguments.rehearsal, arguments.without_rehearsal
@@ -86,7 +78,6 @@ async def _run(study: "Study", arguments: argparse.Namespace) -> int:
             if client is not None:
                 return await _send(store, study, client)
     finally:
-        await store.close()
         if client is not None:
             await client.close()
     return 0

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.cli.options import add_command
 from experiments.cli.requirements import require_extra
 from experiments.cli.server import number
+from experiments.cli.study.database import DATABASE, people_study, sqlite_url
 from experiments.errors import ConfigError
 from experiments.session.signals import run_until_signal
 
@@ -54,14 +55,11 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Rehearse; 1 if something went wrong."""
-    require_extra("people")
+    study = people_study(arguments)
     require_extra("study")
     from experiments.people.rehearsal.report import REPORT
     from experiments.people.rehearsal.run import Settings
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
 
-    study = read_people_study(study_path(arguments.study))
     people = arguments.people or study.people
     settings = Settings(
         study.sha256, people, arguments.seed, arguments.per_minute, arguments.dropouts, arguments.factor
@@ -83,7 +81,6 @@ def run(arguments: argparse.Namespace) -> int:
 async def _run(study: "Study", settings: "Settings", arguments: argparse.Namespace) -> "Report":
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
-    from experiments.cli.study.database import DATABASE, sqlite_url
     from experiments.cli.terminal import error_console, progress_bars
     from experiments.people.rehearsal.report import report
     from experiments.people.rehearsal.run import SERVED, rehearse

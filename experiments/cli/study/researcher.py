@@ -1,20 +1,24 @@
 """`mjsim study researcher`: who may see the researcher's page."""
 
 import argparse
-import asyncio
 import getpass
 import secrets
 import sys
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command
-from experiments.cli.requirements import require_extra
-from experiments.cli.study.database import DATABASE, add_database, add_served_study, sqlite_url
+from experiments.cli.study.database import (
+    DATABASE,
+    add_database,
+    add_served_study,
+    people_study,
+    sqlite_url,
+    with_store,
+)
 from experiments.errors import ConfigError
 
 if TYPE_CHECKING:
     from experiments.people.store import Store
-    from experiments.people.study_file import Study
 
 ROLES = ("owner", "assistant", "viewer")
 SHORTEST = 12  # characters of a password
@@ -43,28 +47,15 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do it."""
-    require_extra("people")
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
-
     if arguments.what != "list" and not arguments.name:
         raise ConfigError(f"`{arguments.what}` needs the NAME of a researcher")
     if arguments.what == "add" and not arguments.role:
         raise ConfigError(f"`add` needs --role: {', '.join(ROLES)}")
-    asyncio.run(_run(read_people_study(study_path(arguments.study)), arguments))
-    return 0
-
-
-async def _run(study: "Study", arguments: argparse.Namespace) -> None:
-    from experiments.people.store import Store
-
+    study = people_study(arguments)
     arguments.folder.mkdir(parents=True, exist_ok=True)  # the first owner may come before the study is served
     url = arguments.database or sqlite_url(arguments.folder / DATABASE)
-    store = await Store.open(url, study.settings.name, study.sha256)
-    try:
-        await _do(store, arguments)
-    finally:
-        await store.close()
+    with_store(study, arguments, lambda store: _do(store, arguments), url)
+    return 0
 
 
 async def _do(store: "Store", arguments: argparse.Namespace) -> None:

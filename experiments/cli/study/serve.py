@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_command
-from experiments.cli.requirements import require_extra
 from experiments.cli.server import (
     add_server_options,
     check_public_url,
@@ -20,7 +19,7 @@ from experiments.cli.server import (
     prepare_process,
     serve,
 )
-from experiments.cli.study.database import DATABASE, add_database, sqlite_url
+from experiments.cli.study.database import DATABASE, add_database, people_study, sqlite_url
 from experiments.errors import ConfigError
 from experiments.record.origin import REHEARSAL
 from experiments.record.phases import FLYTHROUGH
@@ -72,14 +71,11 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve until a signal comes."""
-    require_extra("people")
+    study = people_study(arguments)
     from experiments.people.copies import INDEX
     from experiments.people.phases import phases_of_study
     from experiments.people.recruitment import recruiter
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
 
-    study = read_people_study(study_path(arguments.study))
     if arguments.rehearsal is not None:
         from experiments.people.rehearsal.served import rehearsed
 
