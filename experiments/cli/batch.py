@@ -17,6 +17,7 @@ from experiments.cli.options import (
     text_list,
     trial_options,
 )
+from experiments.cli.shards import add_shards, run_share
 from experiments.errors import ConfigError
 from experiments.participants import DEFAULT_PARTICIPANT
 from experiments.trials.design import Design, counted, factorial, read_design
@@ -60,6 +61,7 @@ def add_parser(commands: Any) -> None:
     add_setting(parser, "user", type=text_list, metavar="NAME,..")
     add_trial_options(parser)
     add_workers(parser)
+    add_shards(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the batch")
 
 
@@ -87,6 +89,8 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.cli.terminal import error_console
 
     design = _design(arguments)
+    if (code := run_share(design, arguments)) is not None:
+        return code
     rows, failed = run_with_progress(
         design, arguments.out, arguments.workers, arguments.executor, arguments.packed
     )

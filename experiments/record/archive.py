@@ -81,13 +81,13 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
     return busy
 
 
-def run_paths(folder: Path) -> list[Path]:
+def run_paths(folder: Path, prefix: str = "") -> list[Path]:
     """List the runs of a batch's folder of trials by name: `FOLDER/NAME`, or `FOLDER/ARCHIVE/NAME` if packed.
 
-    Of a packed run and a run directory with the same name, the run directory is listed. A damaged archive raises a
-    `RecordError`.
+    Only archives whose names begin with `prefix` are read. Of a packed run and a run directory with the same name, the
+    run directory is listed. A damaged archive raises a `RecordError`.
     """
-    found = {name: archive / name for archive in _archives(folder) for name in packed_names(archive)}
+    found = {name: archive / name for archive in _archives(folder, prefix) for name in packed_names(archive)}
     with suppress(FileNotFoundError), os.scandir(folder) as entries:
         found |= {e.name: folder / e.name for e in entries if not e.name.startswith(".") and e.is_dir()}
     return [path for _, path in sorted(found.items())]
@@ -164,9 +164,9 @@ def unpack_in_place(folder: Path, runs: Collection[Path]) -> Iterator[str | None
         discard(folder, done)
 
 
-def discard(folder: Path, names: Collection[str], target: Path | None = None) -> None:
+def discard(folder: Path, names: Collection[str], target: Path | None = None, prefix: str = "") -> None:
     """Remove packed runs from the archives in `folder`, or move them to archives in `target`."""
-    for archive in _archives(folder):
+    for archive in _archives(folder, prefix):
         held = packed_names(archive)
         if held <= set(names):
             archive.unlink() if target is None else archive.rename(target / archive.name)
@@ -182,6 +182,18 @@ def discard(folder: Path, names: Collection[str], target: Path | None = None) ->
                             f"INSERT INTO target.sqlar SELECT * FROM main.sqlar {_OF_RUN}", gone
                         )
                     database.executemany(f"DELETE FROM main.sqlar {_OF_RUN}", gone)
+
+
+def copy(folder: Path, names: Collection[str], target: Path) -> None:
+    """Copy packed runs from the archives in `folder` to archives in `target`."""
+    for archive in _archives(folder):
+        if held := packed_names(archive).intersection(names):
+            with closing(new_archive(target, "merged")) as database:
+                database.execute("ATTACH ? AS source", (archive.absolute().as_uri(),))
+                insert = f"INSERT INTO sqlar SELECT * FROM source.sqlar {_OF_RUN}"
+                with database:
+                    database.executemany(insert, [(name, name) for name in held])
+    adopt(target, "merged")
 
 
 def archive_of(path: Path) -> Path | None:
@@ -200,8 +212,8 @@ def _content(archive: Path, member: str, size: int, data: bytes) -> bytes:
         raise RecordError(f"{archive}: {member} is damaged ({error})") from error
 
 
-def _archives(folder: Path) -> list[Path]:
-    return sorted(folder.glob(f"[!.]*{PACKED}"))
+def _archives(folder: Path, prefix: str = "") -> list[Path]:
+    return sorted(folder.glob(f"{prefix or '[!.]'}*{PACKED}"))
 
 
 def _connect(path: Path, mode: str, wait_s: float = WAIT_S) -> sqlite3.Connection:

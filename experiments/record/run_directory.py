@@ -135,7 +135,7 @@ def add_files(folder: Path, path: Path) -> None:
     Afterwards the folder holds the run as it was.
     """
     place = Path(os.path.realpath(path))
-    shutil.copytree(place, folder, copy_function=_link, dirs_exist_ok=True)
+    shutil.copytree(place, folder, copy_function=link_or_copy, dirs_exist_ok=True)
     write_checksums(folder, records.FILES)
     exchange(folder, place)
 
@@ -162,8 +162,8 @@ def _move(folder: Path, place: Path, *, replace: bool) -> None:
         raise RecordError(f"{error}; the run is kept in {kept}") from error
 
 
-def _link(source: str, target: str) -> None:
-    """The same file under a second name, or a copy on a file system without links."""
+def link_or_copy(source: str, target: str) -> None:
+    """Give a file a second name, or copy it on a file system without links."""
     try:
         os.link(source, target)
     except OSError:

@@ -7,7 +7,7 @@ import os
 import secrets
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, nullcontext
@@ -21,14 +21,14 @@ from experiments.record.archive import WAIT_S, adopt, new_archive, pack
 from experiments.record.run_directory import TRIALS, check_batch_folder, is_run
 from experiments.session.signals import signals_postponed
 from experiments.trials.batch_checks import check_trials
-from experiments.trials.batch_folder import StoredTrial, folder_notes, read_trial, trial_key
+from experiments.trials.batch_folder import StoredTrial, in_order, read_trial, trial_name, write_rows
 from experiments.trials.batch_plan import BatchPlan, plan_batch
 from experiments.trials.design import Design, confounded
 from experiments.trials.fingerprint import plugins
 from experiments.trials.ray_workers import LostMachineError
-from experiments.trials.table import write_tables
+from experiments.trials.shards import Shard
 from experiments.trials.trial import run_trial
-from experiments.trials.trial_config import SEEDS, TrialConfig
+from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import UNSTAMPED, OnRead, TrialReader
 from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor, Pools
 from mjsim.files import remove_leftovers, work_folder
@@ -56,6 +56,7 @@ def run_batch(
     workers: int | None = None,
     executor: str = PROCESSES,
     packed: bool = False,
+    shard: Shard | None = None,
     on_progress: Callable[[BatchProgress], None] = lambda _: None,
     on_note: Callable[[str], None] = lambda _: None,
     on_read: OnRead = lambda *_: None,
@@ -68,12 +69,13 @@ def run_batch(
         workers: Number of trials at a time (default: one per core of this machine or of the Ray cluster).
         executor: Who runs them: `processes` of this machine, or a `ray` cluster whose machines share the folder.
         packed: Store the trials in archives, one per worker process, instead of run directories.
+        shard: Runs and reads only this share of the design, and writes no tables.
         on_progress: Called at the start and after every trial.
         on_note: Called with lines that a user should read: what is run again, what the tables leave out.
         on_read: Called after each finished trial that is read, with the numbers of trials read and to be read.
 
     Returns:
-        A row for every trial of the folder, those of the design first, in the design's order.
+        A row for every trial of the folder, those of the design first, in the design's order; of a shard, only its own.
 
     Raises:
         ConfigError: `workers` is below 1, there is no such executor, or a machine of the cluster cannot be used.
@@ -95,14 +97,18 @@ def run_batch(
 
     out = out.absolute() if executor == RAY else out  # other machines have other current folders
     check_batch_folder(out)
-    inputs = check_trials(design.trials)
+    trials = design.trials if shard is None else shard.of(design).trials
+    inputs = check_trials(trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
-    adopt(out / TRIALS)  # of a batch that was killed
-    reader = TrialReader(out, workers=workers or os.cpu_count() or 1, on_read=on_read)
-    plan = plan_batch(design.trials, inputs, out, reader)
-    for line in filter(None, (*plan.notes, confounded(design.trials))):
+    label = "" if shard is None else shard.label
+    adopt(out / TRIALS, label)  # of a batch that was killed
+    own = None if shard is None else {trial_name(*trial) for trial in zip(trials, inputs, strict=True)}
+    readers = workers or os.cpu_count() or 1
+    reader = TrialReader(out, workers=readers, on_read=on_read, names=own, label=label)
+    plan = plan_batch(trials, inputs, out, reader, label)
+    for line in filter(None, (*plan.notes, confounded(trials) if shard is None else None)):
         note(line)
-    archives = secrets.token_hex(4) if packed else None
+    archives = f"{label}{secrets.token_hex(4)}" if packed else None
     try:
         modules = sorted({module for config in plan.missing.values() for module in plugins(config)})
         workplace = functools.partial(EXECUTORS[executor], workers, modules, note)
@@ -113,7 +119,11 @@ def run_batch(
             remove_leftovers(out / TRIALS)
             if archives is not None and adopt(out / TRIALS, archives, WAIT_S):
                 note("a worker still writes to its archive; run the command again to read its trials")
-            rows = _write_rows(design.trials, out, note, reader)
+            found, unusable = reader.read()
+            if shard is None:
+                rows = write_rows(trials, out, found, unusable, note)
+            else:
+                rows = [trial.row for trial in in_order(trials, found)]
     return rows
 
 
@@ -138,26 +148,6 @@ def _run_missing(
         count = getattr(progress, field) + 1
         progress = dataclasses.replace(progress, failure=failure, **{field: count})
         on_progress(progress)
-
-
-def _write_rows(
-    trials: Sequence[TrialConfig], out: Path, on_note: Callable[[str], None], reader: TrialReader
-) -> list[Mapping[str, Any]]:
-    """Write the tables of all trials that the folder holds."""
-    found, unusable = reader.read()
-    stored = [trial for trial in found if trial.complete]
-    order = {trial_key(trial.settings()): number for number, trial in enumerate(trials)}
-    stored.sort(key=lambda trial: (order.get(trial.key, len(order)), _sort_key(trial.settings)))
-    for note in folder_notes(found, unusable):
-        on_note(note)
-    rows = [trial.row for trial in stored]
-    if rows:
-        write_tables(out, rows)
-    return rows
-
-
-def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
-    return [settings[name] for name in ("objects", "assistance", "user", "house", *SEEDS)]
 
 
 def _results(

@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,12 +29,13 @@ from experiments.record.run_directory import PACKED, TRIALS, free_name
 from experiments.session.endings import COMPLETE
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.fingerprint import Inputs
+from experiments.trials.table import write_tables
 from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConfig
 
 OUTDATED = "outdated"
 MAX_NAME = 120  # characters, without seeds and hash
 _SETTINGS = frozenset(SETTINGS)
-_CHECKED = (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING)
+CHECKED = (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING)
 
 # Size in bytes and modification time in ns of each file that `read_trial` reads; None for a file that is missing.
 Stamp = tuple[tuple[int, int] | None, ...]
@@ -75,7 +76,7 @@ def read_trial(path: Path) -> StoredTrial:
     """Read a trial of a batch; what it says is worked out anew from its log and trajectory."""
     stamp = stamp_of(path)
     sums = read_checksums(path)
-    for name in _CHECKED:
+    for name in CHECKED:
         if sums.get(name) != sha256_of(path / name):
             raise RecordError(f"{path / name} is not as written")
     start, *_ = events = read_events(path / records.EVENTS)
@@ -102,7 +103,7 @@ def stamp_of(path: Path) -> Stamp:
     """Equal as long as no file that `read_trial` reads has changed, or the archive of a packed trial."""
     if path.parent.suffix == PACKED:
         return (_file_stamp(str(path.parent)),)
-    return tuple(_file_stamp(f"{path}/{name}") for name in (CHECKSUMS, records.METRICS, *_CHECKED))
+    return tuple(_file_stamp(f"{path}/{name}") for name in (CHECKSUMS, records.METRICS, *CHECKED))
 
 
 def _file_stamp(path: str) -> tuple[int, int] | None:
@@ -113,11 +114,11 @@ def _file_stamp(path: str) -> tuple[int, int] | None:
     return found.st_size, found.st_mtime_ns
 
 
-def put_aside(out: Path, names: Collection[str]) -> None:
+def put_aside(out: Path, names: Collection[str], prefix: str = "") -> None:
     """Move trials to the outdated ones of their batch; nothing there is replaced."""
     if names:
         (out / OUTDATED).mkdir(exist_ok=True)
-        discard(out / TRIALS, names, out / OUTDATED)
+        discard(out / TRIALS, names, out / OUTDATED, prefix)
     for name in sorted(names):
         if (out / TRIALS / name).exists():
             (out / TRIALS / name).rename(free_name(out / OUTDATED / name))
@@ -134,6 +135,33 @@ def trial_name(config: TrialConfig, inputs: Inputs) -> str:
     numbers = f"{seeds[0]:04d}" if len(set(seeds)) == 1 else "-".join(f"{seed:04d}" for seed in seeds)
     identity = trial_key(config.settings()) + (inputs["house"] if own_house else config.house)
     return f"{readable}-seed{numbers}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
+
+
+def write_rows(
+    trials: Sequence[TrialConfig],
+    out: Path,
+    found: Sequence[StoredTrial],
+    unusable: Mapping[Path, str],
+    on_note: Callable[[str], None],
+) -> list[Mapping[str, Any]]:
+    """Write the tables of the trials that were found in a folder. Return the rows, those of the design first."""
+    for note in folder_notes(found, unusable):
+        on_note(note)
+    rows = [trial.row for trial in in_order(trials, found)]
+    if rows:
+        write_tables(out, rows)
+    return rows
+
+
+def in_order(trials: Sequence[TrialConfig], found: Sequence[StoredTrial]) -> list[StoredTrial]:
+    """The complete trials, those of the design first and in its order."""
+    order = {trial_key(trial.settings()): number for number, trial in enumerate(trials)}
+    complete = [trial for trial in found if trial.complete]
+    return sorted(complete, key=lambda trial: (order.get(trial.key, len(order)), _sort_key(trial.settings)))
+
+
+def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
+    return [settings[name] for name in ("objects", "assistance", "user", "house", *SEEDS)]
 
 
 def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) -> Iterator[str]:

@@ -26,9 +26,16 @@ class BatchPlan:
 
 
 def plan_batch(
-    trials: Sequence[TrialConfig], inputs: Sequence[Inputs], out: Path, reader: TrialReader | None = None
+    trials: Sequence[TrialConfig],
+    inputs: Sequence[Inputs],
+    out: Path,
+    reader: TrialReader | None = None,
+    prefix: str = "",
 ) -> BatchPlan:
-    """Compare a design with what a folder holds, and put aside what is out of date."""
+    """Compare a design with what a folder holds, and put aside what is out of date.
+
+    Of the archives, only those whose names begin with `prefix` are changed.
+    """
     wanted = dict(zip(trials, inputs, strict=True))
     stored, unusable = (reader or TrialReader(out)).read()
     by_key: dict[str, list[StoredTrial]] = {}
@@ -51,8 +58,8 @@ def plan_batch(
             reasons.update([unusable[path]])
             outdated.add(path.name)
         missing[path] = trial
-    put_aside(out, outdated)
-    discard(out / TRIALS, early)
+    put_aside(out, outdated, prefix)
+    discard(out / TRIALS, early, prefix=prefix)
     return BatchPlan(tuple(done), missing, tuple(_notes(reasons, out)))
 
 

@@ -7,7 +7,7 @@ trial is read again after one of these files, or the code of mjsim, has changed.
 import dataclasses
 import gzip
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
@@ -46,12 +46,31 @@ _DECODER, _ENCODER = msgspec.json.Decoder(_KeptRow), msgspec.json.Encoder()
 
 
 class TrialReader:
-    """Reads the trials of a batch folder, and keeps what it has read in that folder."""
+    """Reads the trials of a batch folder, and keeps what it has read in that folder.
 
-    def __init__(self, out: Path, *, workers: int = 1, on_read: OnRead = lambda *_: None) -> None:
-        self._trials, self._file = out / TRIALS, out / ROWS
+    Args:
+        out: The folder.
+        workers: Number of processes that read.
+        on_read: Called after each trial that is read.
+        names: Folders of the only trials to read, those of a shard; None for all.
+        label: Label of a shard. Its file of rows and its archives have it in their names, so that no two shards use
+            the same ones.
+    """
+
+    def __init__(
+        self,
+        out: Path,
+        *,
+        workers: int = 1,
+        on_read: OnRead = lambda *_: None,
+        names: Collection[str] | None = None,
+        label: str = "",
+    ) -> None:
+        self._trials, self._file = out / TRIALS, out / _rows_file(label)
+        self._names, self._label = names, label
         self._workers, self._on_read = workers, on_read
-        self._known = {row.name: self._trial(row) for row in _load(self._file)}
+        files = [self._file] if names is not None else sorted(out.glob(_rows_file("*")))
+        self._known = {row.name: self._trial(row) for file in files for row in _load(file)}
         self._saved = dict(self._known)
 
     def add(self, trial: StoredTrial) -> None:
@@ -60,7 +79,7 @@ class TrialReader:
 
     def read(self) -> tuple[list[StoredTrial], dict[Path, str]]:
         """Return the trials by name, and what is wrong with those that cannot be used."""
-        paths = run_paths(self._trials)
+        paths = self._paths()
         self._known = {
             path.name: trial for path in paths if (trial := self._unchanged(path, stamp_of(path))) is not None
         }
@@ -76,6 +95,10 @@ class TrialReader:
         finally:
             self._save()
         return [self._known[path.name] for path in paths if path.name in self._known], unusable
+
+    def _paths(self) -> list[Path]:
+        paths = run_paths(self._trials, self._label)
+        return paths if self._names is None else [path for path in paths if path.name in self._names]
 
     def _unchanged(self, path: Path, stamp: Stamp) -> StoredTrial | None:
         """A trial that was read before, if its files have not changed since."""
@@ -101,7 +124,7 @@ class TrialReader:
     def _save(self) -> None:
         """Keep the rows of complete trials; a folder that cannot be written is no reason to fail."""
         kept = {name: trial for name, trial in self._known.items() if trial.complete}
-        if kept == self._saved:
+        if not self._trials.is_dir() or (kept == self._saved and self._file.is_file()):
             return
         with suppress(OSError), replacing(self._file) as path, gzip.open(path, "wb", compresslevel=1) as file:
             file.write(_header())
@@ -114,6 +137,10 @@ class TrialReader:
 def read_trials(out: Path) -> tuple[list[StoredTrial], Mapping[Path, str]]:
     """Trials of a batch folder by name, and what is wrong with those that cannot be used."""
     return TrialReader(out).read()
+
+
+def _rows_file(label: str) -> str:
+    return ROWS.replace(".jsonl", f".{label}jsonl")
 
 
 def _header() -> bytes:

@@ -6,6 +6,7 @@ from typing import Any
 
 from experiments.cli.batch_progress import add_workers, run_with_progress
 from experiments.cli.options import add_command
+from experiments.cli.shards import add_shards, run_share
 from experiments.trials.design import counted
 
 DESCRIPTION = """\
@@ -21,6 +22,7 @@ def add_parser(commands: Any) -> None:
         commands, "simulate", run, summary="simulate the people of a study; resumes", description=DESCRIPTION
     )
     add_study(parser)
+    add_shards(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the study")
 
 
@@ -42,6 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.study.simulate import read_study, study_path
 
     design = read_study(study_path(arguments.study), arguments.people)
+    if (code := run_share(design, arguments, "simulated people")) is not None:
+        return code
     rows, failed = run_with_progress(
         design, arguments.out, arguments.workers, arguments.executor, arguments.packed, "simulated people"
     )

@@ -1,0 +1,139 @@
+"""Merging of shards: joins their folders, writes the tables, and finds the trials that are missing."""
+
+import dataclasses
+import functools
+import re
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.errors import RecordError
+from experiments.record.archive import copy, opened_run, run_paths
+from experiments.record.checksums import read_checksums
+from experiments.record.run_directory import TRIALS, check_batch_folder, is_batch, is_run, link_or_copy
+from experiments.trials.batch_folder import CHECKED, StoredTrial, put_aside, trial_key, write_rows
+from experiments.trials.design import Design
+from experiments.trials.shards import Shard, shard_numbers
+from experiments.trials.trial_config import TrialConfig
+from experiments.trials.trial_reader import UNSTAMPED, OnRead, TrialReader
+from mjsim.files import work_folder
+from mjsim.model.catalogue import Catalogue
+
+_ROWS_OF = re.compile(r"\.rows\.\d+-of-(\d+)\..*")
+
+
+@dataclass(frozen=True)
+class Merged:
+    """A design whose shards were merged."""
+
+    rows: Sequence[Mapping[str, Any]]  # of the tables, those of the design first
+    missing: Sequence[TrialConfig]  # trials of the design that are in no part
+    shards: Mapping[
+        Shard, int
+    ]  # number of missing trials by shard; empty if the number of shards is not known
+
+
+def merge_shards(
+    design: Design,
+    out: Path,
+    parts: Iterable[Path],
+    *,
+    workers: int = 1,
+    on_note: Callable[[str], None] = lambda _: None,
+    on_read: OnRead = lambda *_: None,
+) -> Merged:
+    """Join the folders of shards in `out`, and write the tables. The parts stay as they are.
+
+    Args:
+        design: The whole design.
+        out: Folder that gets the trials of all parts; it may hold some of them already.
+        parts: Folders of further shards.
+        workers: Number of processes that read trials.
+        on_note: Called with lines that a user should read.
+        on_read: Called after each trial that is read, with the numbers of trials read and to be read.
+
+    Raises:
+        RecordError: A part is not the folder of a batch, or a trial is there twice, with different results.
+        OSError: The folder cannot be written.
+    """
+    check_batch_folder(out)
+    others = [part for part in parts if part.resolve() != out.resolve()]
+    for part in others:
+        if not is_batch(part):
+            raise RecordError(f"{part} is not the folder of a batch; name the --out of shards")
+    (out / TRIALS).mkdir(parents=True, exist_ok=True)
+    reader, *readers = (TrialReader(folder, workers=workers, on_read=on_read) for folder in (out, *others))
+    chosen = {trial.path.name: trial for trial in reader.read()[0] if trial.complete}
+    added: dict[Path, dict[str, StoredTrial]] = {}
+    for part, part_reader in zip(others, readers, strict=True):
+        for trial in (trial for trial in part_reader.read()[0] if trial.complete):
+            first = chosen.setdefault(trial.path.name, trial)
+            if first is trial:
+                added.setdefault(part, {})[trial.path.name] = trial
+            elif not _same(first.path, trial.path):
+                raise RecordError(
+                    f"{first.path} and {trial.path} are the same trial with different results; move one of them away"
+                )
+    for part, trials in added.items():
+        _add(part, trials, out, reader)
+    found, unusable = reader.read()
+    rows = write_rows(design.trials, out, found, unusable, on_note)
+    missing = _missing(design.trials, [trial for trial in found if trial.complete])
+    return Merged(rows, missing, _shards(design.trials, missing, (out, *others)))
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Whether two runs of a trial have equal records; the time that they took does not count."""
+    with opened_run(one) as first, opened_run(other) as second:
+        sums = read_checksums(first), read_checksums(second)
+    return all(sums[0].get(name) == sums[1].get(name) for name in CHECKED)
+
+
+def _add(part: Path, trials: Mapping[str, StoredTrial], out: Path, reader: TrialReader) -> None:
+    """Add trials of a part: files of run directories as hard links if possible, packed trials as copies."""
+    place = out / TRIALS
+    put_aside(out, {path.name for path in run_paths(place)}.intersection(trials))  # incomplete or damaged
+    for name in (name for name in trials if is_run(part / TRIALS / name)):
+        with work_folder(place) as work:
+            shutil.copytree(part / TRIALS / name, work / name, copy_function=link_or_copy)
+            (work / name).rename(place / name)
+    copy(part / TRIALS, [name for name in trials if not (place / name).exists()], place)
+    for name, trial in trials.items():
+        stamp = trial.stamp if (place / name).exists() else UNSTAMPED
+        reader.add(dataclasses.replace(trial, path=place / name, stamp=stamp))
+
+
+def _missing(trials: Sequence[TrialConfig], stored: Iterable[StoredTrial]) -> list[TrialConfig]:
+    catalogue = functools.cache(Catalogue.load)
+    by_key: dict[str, list[StoredTrial]] = {}
+    for found in stored:
+        by_key.setdefault(found.key, []).append(found)
+
+    def is_there(trial: TrialConfig) -> bool:
+        same = by_key.get(trial_key(trial.settings()), [])
+        return any(found.settings["house"] == trial.house for found in same) or any(
+            found.inputs["house"] == catalogue(trial.house).content for found in same
+        )
+
+    return [trial for trial in trials if not is_there(trial)]
+
+
+def _shards(
+    trials: Sequence[TrialConfig], missing: Iterable[TrialConfig], folders: Iterable[Path]
+) -> dict[Shard, int]:
+    """Number of missing trials by shard, for the number of shards that most files of rows are of."""
+    files = Counter(
+        int(match[1])
+        for folder in folders
+        for path in folder.iterdir()
+        if (match := _ROWS_OF.fullmatch(path.name))
+    )
+    if not files:
+        return {}
+    ((count, _),) = files.most_common(1)
+    number = dict(zip(trials, shard_numbers(trials, count), strict=True))
+    found = Counter(number[trial] for trial in missing)
+    return {Shard(k, count): found[k] for k in sorted(found)}
