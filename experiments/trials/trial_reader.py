@@ -1,7 +1,8 @@
 """Reads the trials of a batch folder, each one once.
 
-Rows that were read are kept in OUT/.rows.jsonl.gz, with the size and modification time of each file behind them. A
-trial is read again after one of these files, or the code of mjsim, has changed. The file may be deleted at any time.
+Rows that were read are kept in OUT/.rows.jsonl.gz, of a shard in a file of its own, with the size and modification time
+of each file behind them. A trial is read again after one of these files, or the code of mjsim, has changed. The files
+of rows may be deleted at any time.
 """
 
 import dataclasses
