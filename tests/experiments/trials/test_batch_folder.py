@@ -229,7 +229,9 @@ def test_confounding_is_named_with_all_that_differs():
 def test_what_is_confounded_in_the_design_and_in_the_folder_is_said_once(tmp_path, monkeypatch):
     design = Design((brief(assistance="none", user="searcher"), brief(assistance="optimal")))
     monkeypatch.setattr("experiments.trials.batch._run_missing", lambda *_: None)
-    monkeypatch.setattr("experiments.trials.batch_folder.folder_notes", lambda *_: [confounded(design.trials)])
+    monkeypatch.setattr(
+        "experiments.trials.batch_folder.folder_notes", lambda *_: [confounded(design.trials)]
+    )
     notes = []
     run_batch(design, tmp_path / "out", workers=1, on_note=notes.append)
     assert notes == [confounded(design.trials)]
