@@ -142,3 +142,10 @@ class FormPhase:
         form = form_of(self.items, self.texts.scale, study.texts["common"], study.settings.language)
         form.process(sent, data=dict(answers))
         return form
+
+
+class Story(FormPhase):
+    """The text of the study's story file."""
+
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
+        return {"paragraphs": [part for part in self._study.story.split("\n\n") if part.strip()]}

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.people.phases.base import Again, Done, FormData, FormPhase, Visitor
-from experiments.people.study_file import COMPREHENSION, Study
 
 
 class Comprehension(FormPhase):
@@ -26,8 +25,3 @@ class Comprehension(FormPhase):
         if visitor.attempts + 1 >= self._study.settings.limits.attempts:
             return Done(answers, "screened_out")
         return Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
-
-
-def build(study: Study) -> Comprehension:
-    """The phase."""
-    return Comprehension(study, COMPREHENSION, "comprehension")

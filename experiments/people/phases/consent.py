@@ -1,7 +1,6 @@
 """Consent, before anything is recorded."""
 
 from experiments.people.phases.base import Again, Done, FormData, FormPhase, Visitor
-from experiments.people.study_file import CONSENT, Study
 
 
 class Consent(FormPhase):
@@ -19,8 +18,3 @@ class Consent(FormPhase):
     def example(self) -> dict[str, str]:
         """Somebody agrees."""
         return {"agree": "yes", **super().example()}
-
-
-def build(study: Study) -> Consent:
-    """The phase."""
-    return Consent(study, CONSENT, "consent")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from experiments.people.phases.base import Again, Done, FormData, FormPhase, Visitor
-from experiments.people.study_file import DEVICE, Device, Study
+from experiments.people.study_file import Device
 
 MEASURES = ("frames_per_s", "latency_ms", "width", "height", "pixel_ratio")
 MAX_RENDERER = 200  # characters
@@ -74,8 +74,3 @@ def _measured(sent: FormData) -> _Measured | None:
         return None
     webgl = sent.get("webgl") == "yes"
     return _Measured(values, sent.get("keyboard") == "yes", webgl, sent.get("renderer", "")[:MAX_RENDERER])
-
-
-def build(study: Study) -> DeviceCheck:
-    """The phase."""
-    return DeviceCheck(study, DEVICE, "device")

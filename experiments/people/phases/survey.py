@@ -3,7 +3,6 @@
 import dataclasses
 
 from experiments.people.phases.base import Again, Done, FormData, FormPhase, Visitor
-from experiments.people.study_file import SURVEY, Study
 
 
 class Survey(FormPhase):
@@ -17,8 +16,3 @@ class Survey(FormPhase):
             return read
         wrong = sum(item.is_wrong(read.answers.get(item.name)) for item in self.items)
         return dataclasses.replace(read, outcome="screened_out") if wrong > allowed else read
-
-
-def build(study: Study) -> Survey:
-    """The phase."""
-    return Survey(study, SURVEY)
