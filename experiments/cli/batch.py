@@ -34,7 +34,6 @@ with more values to extend the design. The records do not depend on --workers.
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands,
         "batch",

@@ -21,7 +21,6 @@ Loading refuses by the same rules."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "check", run, description=DESCRIPTION)
     parser.add_argument(
         "path",
@@ -41,7 +40,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check, print, draw."""
     from experiments.record.run_directory import check_file
     from mjsim.model.validation.report import check_path
 

@@ -28,7 +28,6 @@ deviations of the differences) with its own. Trials without a counterpart are na
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands,
         "compare",
@@ -49,7 +48,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compare, show, write."""
     from rich.console import Console
 
     from experiments.analysis.comparison import (

@@ -16,7 +16,6 @@ examples:
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "completion",
         help=None,  # lets it list itself

@@ -10,7 +10,6 @@ Exits with 1 when frames cannot be rendered, something is missing, or Python imp
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "doctor",
         help=None,  # lets completion list it
@@ -21,7 +20,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:  # noqa: ARG001 - every subcommand takes them
-    """Print the report."""
     from mjsim.diagnostics import environment_report
 
     report = environment_report()

@@ -21,7 +21,6 @@ of them, and rests on each bin; captions name room and bin. Equal options give e
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "flythrough", run, description=DESCRIPTION)
     add_setting(parser, "house", default="apartment")
     parser.add_argument("--out", type=Path, required=True, metavar="FILM.mp4", help="film to write")

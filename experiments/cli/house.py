@@ -36,7 +36,6 @@ continues after an interruption; homes that are there are not drawn again."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "house", run, description=DESCRIPTION)
     parser.add_argument(
         "what",
@@ -84,7 +83,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Sample, compose, export."""
     from experiments.house import House
     from experiments.record.run_directory import check_file
     from mjsim.model.scene import compose

@@ -24,7 +24,6 @@ DIR/report.json; DIR/preview.png shows the house from above (docs/import.md)."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     # `help` lets completion list it; the overview has its own line.
     top = commands.add_parser(
         "import", help=None, description="Make objects, houses and episodes from files of others."
@@ -98,7 +97,6 @@ def _add_house(kinds: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Import an object, report."""
     require_extra()  # then trimesh, CoACD and OpenGL are loaded: other commands start fast
     from mjsim.importing.house_extension import Entry, HouseExtension
     from mjsim.importing.mesh_import import add_mesh

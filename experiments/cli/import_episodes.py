@@ -32,7 +32,6 @@ as far from where they belong as in those episodes (docs/import.md)."""
 
 
 def add_parser(kinds: Any) -> None:
-    """Add the subcommand."""
     parser = kinds.add_parser(
         "episodes", help="disorder from episodes", description=DESCRIPTION, formatter_class=HelpFormatter
     )
@@ -46,7 +45,6 @@ def add_parser(kinds: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, tabulate, draw."""
     from mjsim.importing.episodes import MISPLACED, kind_of, read_episodes
     from mjsim.model.disorder import Disorder
 

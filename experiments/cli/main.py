@@ -107,7 +107,6 @@ class Parser(argparse.ArgumentParser):
     """Says in one line what is wrong with a command line."""
 
     def error(self, message: str) -> NoReturn:
-        """End the process."""
         self.exit(USAGE_ERROR, f"mjsim: {brief(message)}; `{self.prog} --help` lists the options\n")
 
 

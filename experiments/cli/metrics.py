@@ -34,7 +34,6 @@ FORMATS = (".csv", ".json")
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands,
         "metrics",

@@ -47,7 +47,6 @@ does not hold exits with 1."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser: argparse.ArgumentParser = commands.add_parser(
         "plan",
         help="solve a routing problem from a JSON file",

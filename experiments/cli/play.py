@@ -54,7 +54,6 @@ Ctrl-C ends it; the same command resumes."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "play", run, description=DESCRIPTION)
     add_task_options(parser, OBJECTS)
     parser.add_argument("--user", default=HUMAN, metavar="NAME", help="name of the participant")

@@ -32,7 +32,6 @@ With --video, the replay is filmed: as it was, or in another size, from another 
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands,
         "replay",

@@ -62,7 +62,6 @@ task, which is no replan), and `mjsim replay` shows the same plans again."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "run", run, description=DESCRIPTION)
     add_task_options(parser, OBJECTS)
     add_setting(parser, "user")

@@ -95,7 +95,6 @@ def http_server(app: Any) -> Any:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket that listens."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         return socket.create_server((host, port), family=family, backlog=BACKLOG)

@@ -19,7 +19,6 @@ may hold both kinds. Without mjsim, `sqlite3 OUT/trials/FILE.sqlar -A --list` li
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "unpack", run, description=DESCRIPTION)
     parser.add_argument("out", type=Path, metavar="OUT", help="folder of a batch")
     parser.add_argument("names", nargs="*", metavar="NAME", help="names of trials (default: all)")

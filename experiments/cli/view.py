@@ -20,7 +20,6 @@ WebGL 2, and neither a server nor mjsim."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "view", run, description=DESCRIPTION)
     parser.add_argument("directory", type=Path, metavar="DIR", help="run directory or packed trial")
     parser.add_argument(

@@ -96,7 +96,6 @@ class Limits(_Table, frozen=True):
     keep_days: Count | None = None  # after which personal data are deleted
 
     def __post_init__(self) -> None:
-        """Check what belongs together."""
         if self.timed_out_after < self.abandoned_after:
             raise ValueError(
                 f"timed_out_after is {self.timed_out_after:g} s; it cannot be less than abandoned_after, "
@@ -124,7 +123,6 @@ class Settings(_Table, frozen=True):
     limits: Limits = Limits()
 
     def __post_init__(self) -> None:
-        """Check what belongs together."""
         usual = [name for name in self.phases if name in PHASES]
         if usual != [name for name in PHASES if name in usual] or len(set(self.phases)) < len(self.phases):
             raise ValueError(
@@ -176,7 +174,6 @@ class Study:
 
     @property
     def people(self) -> int:
-        """How many are wanted."""
         return sum(len(cell.trials) for cell in self.cells)
 
 

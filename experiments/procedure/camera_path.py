@@ -90,7 +90,6 @@ class _Camera:
         self._turn_by(change, pitch)
 
     def look_around(self) -> None:
-        """A full turn."""
         self._turn_by(2.0 * math.pi, 0.0)
 
     def look_at(self, house: House, key: str) -> None:

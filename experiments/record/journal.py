@@ -122,7 +122,6 @@ class Journal:
         os.fdatasync(self._file)
 
     def close(self) -> None:
-        """Close the file."""
         os.close(self._file)
 
     def __enter__(self) -> "Journal":

@@ -85,7 +85,6 @@ class Record:
 
     @property
     def end(self) -> Event:
-        """The last event."""
         return self.events[-1]
 
     @property
@@ -119,7 +118,6 @@ class Record:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the objects."""
         return tuple(placed.name for placed in self.episode.objects)
 
     def action(self, step: int) -> StepAction:

@@ -63,7 +63,6 @@ class EventLog:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Everything logged so far."""
         return [line for line in self._lines if line]
 
     @property

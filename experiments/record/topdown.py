@@ -144,16 +144,13 @@ class _Drawing:
             self._strokes(parts, tone, thickness)
 
     def dot(self, centre: _Points, colour: str) -> None:
-        """An object."""
         turn = np.linspace(0.0, math.tau, 32, endpoint=False)
         self._shape(centre + 8 * np.column_stack([np.cos(turn), np.sin(turn)]), colour)
 
     def square(self, centre: _Points, colour: str) -> None:
-        """A receptacle."""
         self._shape(centre + 9 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), colour)
 
     def star(self, centre: _Points) -> None:
-        """The start."""
         turn = np.arange(10) * math.pi / 5
         radius = np.where(np.arange(10) % 2, 5.0, 12.0)
         self._shape(centre + np.column_stack([radius * np.sin(turn), -radius * np.cos(turn)]), WHITE)

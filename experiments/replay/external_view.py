@@ -96,7 +96,6 @@ class ExternalViewer:
         self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
 
     def close(self) -> None:
-        """Free the GL context."""
         self._renderer.close()
 
     def __enter__(self) -> "ExternalViewer":

@@ -89,7 +89,6 @@ class FirstPersonRenderer:
         return dataclasses.replace(self._renderer.camera_pose(data), fovy=fovy)
 
     def close(self) -> None:
-        """Free the GL context."""
         self._renderer.close()
 
     def __enter__(self) -> Self:
@@ -107,11 +106,9 @@ class Filming:
         self._video = video
 
     def camera(self, world: World) -> CameraView:
-        """The eye camera."""
         return self._renderer.camera_view(world.data)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - all is in the world
-        """Film one frame."""
         self._video.write(self._renderer.frame(world.data, hud_state))
 
 
@@ -152,7 +149,6 @@ class TrialFilm:
         return self._renderer.camera_view(world.data) if self._renderer is not None else None
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - all is in the world
-        """Film one frame."""
         if self.failure is None and self._renderer is not None and self._video is not None:
             try:
                 self._video.write(self._renderer.frame(world.data, hud_state))

@@ -87,12 +87,10 @@ class SessionPercept(Percept):
         )
 
     def hud(self) -> HudState:
-        """What the HUD shows."""
         return self._hud()
 
     @property
     def shown_roles(self) -> frozenset[str]:
-        """Of the assistance condition."""
         return self._assistant.shown_roles
 
     @cached_property

@@ -128,7 +128,6 @@ class Session:
 
     @property
     def observation(self) -> Observation:
-        """The present state."""
         return self._now
 
     @property

@@ -37,7 +37,6 @@ class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     others: tuple[str, ...] = ()  # other readings of the measure, reported as well
 
     def axis(self) -> str:
-        """Label of an axis."""
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
 

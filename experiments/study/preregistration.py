@@ -83,7 +83,6 @@ def write_preregistration(study: Path, out: Path, measures: Path = FILE) -> str:
 
 
 def _frozen(exclusions: Exclusions, measures: bytes) -> Files:
-    """All but the design."""
     places = [ROOT / place for place in ANALYSIS]
     sources = [path for place in places for path in ([place] if place.is_file() else place.rglob("*.py"))]
     return {

@@ -100,7 +100,6 @@ class Selection:
     departures: Sequence[str] = ()  # from it
 
     def as_json(self) -> dict[str, Any]:
-        """For stats.json."""
         frozen = {"sha256": self.preregistration, "departures": list(self.departures)}
         return {
             "exclusions": [asdict(rule) for rule in self.rules],
@@ -108,7 +107,6 @@ class Selection:
         }
 
     def sections(self, people: StudyTable) -> tuple[tuple[str, Iterable[Block]], ...]:
-        """For the report."""
         told = (("Preregistration", _preregistered(self)),) if self.preregistration is not None else ()
         return (*told, ("People who are left out", _left_out(people, self.rules)))
 

@@ -109,7 +109,6 @@ def tukey_quantile(groups: int, freedom: float) -> float:
 
 
 def pooled_deviation(groups: Mapping[str, Values]) -> float:
-    """Standard deviation within groups."""
     squares = sum(float(((v - v.mean()) ** 2).sum()) for v in groups.values())
     return math.sqrt(squares / (people_in(groups) - len(groups)))
 

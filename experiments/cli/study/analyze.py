@@ -25,7 +25,6 @@ from simulated people is marked as such."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "analyze", run, summary="figures, tests and a report of a study", description=DESCRIPTION
     )
@@ -53,7 +52,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Analyse, write, say where."""
     require_extra("study")
     from experiments.people.copies import note_derived
     from experiments.study.analysis import analyse

@@ -22,7 +22,6 @@ run directories are plain files in DIR: copy that folder besides."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "backup", run, summary="the database of a study as one file", description=DESCRIPTION
     )
@@ -32,7 +31,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Back up."""
     with_store(people_study(arguments), arguments, lambda store: _back_up(store, arguments))
     print(f"{arguments.out} (restore it with `mjsim study restore {arguments.out} {DATABASE}`)")
     return 0

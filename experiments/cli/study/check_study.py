@@ -30,7 +30,6 @@ are listed with their line of the file; the exit code is 1 if there is one."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "check", run, summary="whether a study is ready for people", description=DESCRIPTION
     )

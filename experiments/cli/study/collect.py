@@ -28,7 +28,6 @@ these; people of `mjsim play` have no answers."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "collect", run, summary="the tidy table of a study with people", description=DESCRIPTION
     )

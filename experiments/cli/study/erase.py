@@ -14,7 +14,6 @@ keeps that the person was erased, and what was paid. A person who is owed a paym
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "erase", run, summary="delete all of a person", description=DESCRIPTION)
     add_served_study(parser)
     parser.add_argument("person", metavar="PERSON", help="name in tables, such as p00012")
@@ -23,7 +22,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Erase."""
     study = people_study(arguments)
     from experiments.people.erase import erase
 

@@ -18,7 +18,6 @@ What people wrote freely is in a table of its own: read it before you publish it
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "export", run, summary="all data of a study with people", description=DESCRIPTION
     )

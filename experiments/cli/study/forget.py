@@ -15,7 +15,6 @@ same once a day; run this command after the study."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "forget", run, summary="delete who people are, by date", description=DESCRIPTION
     )
@@ -25,7 +24,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Forget, and say whom."""
     study = people_study(arguments)
     from experiments.people import VISITS
     from experiments.people.retention import forget_old

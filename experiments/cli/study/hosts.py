@@ -16,7 +16,6 @@ continues where its journal is."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "hosts", run, summary="machines that serve one study", description=DESCRIPTION
     )

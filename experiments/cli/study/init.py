@@ -12,7 +12,6 @@ are asked and receive. Edit it, then run `mjsim study serve STUDY.toml --out DIR
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "init", run, summary="write a study file to start from", description=DESCRIPTION
     )
@@ -23,7 +22,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write it."""
     from experiments.people import TEMPLATE
     from experiments.record.run_directory import check_file
     from mjsim.files import read_text, write_text_atomically

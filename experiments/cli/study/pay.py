@@ -26,7 +26,6 @@ Both want a rehearsal of the study file that passed (`mjsim study rehearse`): --
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "pay", run, summary="who gets what, and what was paid", description=DESCRIPTION
     )
@@ -47,7 +46,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print, decide or note."""
     if bool(arguments.paid) != bool(arguments.reference):
         raise ConfigError("--paid and --reference belong together: which payment was made, and its receipt")
     if bool(arguments.reject) != bool(arguments.reason):

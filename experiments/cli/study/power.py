@@ -19,7 +19,6 @@ follows."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "power", run, summary="how many people a study needs", description=DESCRIPTION
     )

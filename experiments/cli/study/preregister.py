@@ -14,7 +14,6 @@ is printed; `mjsim study analyze DIR --preregistration FILE` applies its exclusi
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "preregister", run, summary="freeze a study before there are data", description=DESCRIPTION
     )
@@ -30,7 +29,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Freeze, say the hash."""
     require_extra("study")
     from experiments.record.run_directory import check_file
     from experiments.study.measures import FILE

@@ -31,7 +31,6 @@ command."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "rehearse", run, summary="a whole study with simulated people", description=DESCRIPTION
     )

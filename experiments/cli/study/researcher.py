@@ -32,7 +32,6 @@ least {SHORTEST} characters."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "researcher", run, summary="who may see the researcher's page", description=DESCRIPTION
     )
@@ -46,7 +45,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it."""
     if arguments.what != "list" and not arguments.name:
         raise ConfigError(f"`{arguments.what}` needs the NAME of a researcher")
     if arguments.what == "add" and not arguments.role:

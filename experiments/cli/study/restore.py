@@ -15,7 +15,6 @@ backed up, so that a study can move from a file to a server. A database that hol
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "restore", run, summary="a backup into an empty database", description=DESCRIPTION
     )
@@ -26,7 +25,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Restore."""
     require_extra("people")
     from experiments.people.copies import note_derived
     from experiments.people.store import restore

@@ -41,7 +41,6 @@ command continues the study, and everybody in it continues where they stopped.""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "serve", run, summary="serve a study with people", description=DESCRIPTION)
     parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the study")

@@ -17,7 +17,6 @@ not depend on --workers. All data are simulated; nothing is evidence about peopl
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(
         commands, "simulate", run, summary="simulate the people of a study; resumes", description=DESCRIPTION
     )

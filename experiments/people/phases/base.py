@@ -90,7 +90,6 @@ class FormPhase:
 
     @property
     def items(self) -> Sequence[Item]:
-        """What is asked."""
         return self.texts.items
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:

@@ -16,5 +16,4 @@ class Consent(FormPhase):
         return Done({"agreed": True, **read.answers}) if isinstance(read, Done) else read
 
     def example(self) -> dict[str, str]:
-        """Somebody agrees."""
         return {"agree": "yes", **super().example()}

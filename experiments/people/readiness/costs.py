@@ -117,7 +117,6 @@ class Cost:
 
 
 def cost(study: Study) -> Cost:
-    """What a study costs."""
     pay = study.settings.pay
     rewards, bonuses = study.people * pay.reward, study.people * pay.bonus_for_all
     fee = None if pay.fee is None else pay.fee * (rewards + bonuses)

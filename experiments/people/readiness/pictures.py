@@ -45,7 +45,6 @@ class Camera:
         self.taken: list[str] = []
 
     async def open(self) -> None:
-        """Open a tab."""
         tab = await self._ask("Target.createTarget", url="about:blank")
         attached = await self._ask("Target.attachToTarget", targetId=tab["targetId"], flatten=True)
         self._session = attached["sessionId"]

@@ -87,5 +87,4 @@ class ConnectPayer:
         return action
 
     async def close(self) -> None:
-        """Close connections."""
         await self._api.close()

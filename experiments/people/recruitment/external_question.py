@@ -104,7 +104,6 @@ class ExternalQuestionPayer:
         return "bonus"
 
     async def close(self) -> None:
-        """Close connections."""
         await self._api.close()
 
     async def _ask(self, operation: str, body: Mapping[str, Any]) -> Any:

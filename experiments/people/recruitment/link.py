@@ -21,7 +21,6 @@ class OpenLink:
         self.platform, self._code = platform, code
 
     def arrive(self, query: Mapping[str, str]) -> Arrival:  # noqa: ARG002 - the link says nothing
-        """A new person."""
         return Arrival()
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - nobody is known

@@ -87,9 +87,7 @@ class Payer(Protocol):
         """Let the platform pay; its own name for the payment. An UnsureError is raised where it may have paid."""
         ...
 
-    async def close(self) -> None:
-        """Close connections."""
-        ...
+    async def close(self) -> None: ...
 
 
 class Api:
@@ -130,7 +128,6 @@ class Api:
             raise UnsureError(f"the platform's answer is not understood: {said}") from error
 
     async def close(self) -> None:
-        """Close connections."""
         await self._client.aclose()
 
     async def _answer(self, method: str, path: str, request: Mapping[str, Any]) -> httpx.Response:

@@ -97,7 +97,6 @@ class ProlificPayer:
         return f"bonus {bonus}"
 
     async def close(self) -> None:
-        """Close connections."""
         await self._api.close()
 
     async def _prepare(self, order: Order) -> str:

@@ -106,7 +106,6 @@ class Player:
         return catalogue.categories[catalogue.objects[self._models[name]].category].receptacle
 
     def _aim(self, here: tuple[float, float]) -> tuple[float, float]:
-        """Where to go."""
         if self._goal is not None:
             return self._goal
         held = [name for name in self._held if name is not None]

@@ -77,7 +77,6 @@ class Metrics(Meter):
         self._lost.inc()
 
     def wrote(self, seconds: float) -> None:
-        """A transaction was committed."""
         self._writes.observe(seconds)
 
     def answered(self, status: int, seconds: float) -> None:
@@ -115,7 +114,6 @@ class FaultLog(logging.Handler):
         return list(self._kept)[::-1]
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep a line."""
         level = record.levelname.lower()
         self._counter.labels(level).inc()
         self._kept.append(Fault(datetime.fromtimestamp(record.created, UTC), level, record.getMessage()))
@@ -128,7 +126,6 @@ class Timed:
         self._app, self._metrics = app, metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle a request."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

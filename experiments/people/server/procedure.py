@@ -117,7 +117,6 @@ class Procedure:
         return await asyncio.to_thread(self.visits.create, token, played, self._trials(place), ended)
 
     async def withdraw(self, person: Person, *, delete: bool) -> None:
-        """Let a person leave."""
         await self.store.withdraw(person.id, delete=delete)
         if delete:
             await asyncio.to_thread(self.visits.remove, person.token_hash)

@@ -75,7 +75,6 @@ class Database:
         return self.url.render_as_string(hide_password=True)
 
     async def close(self) -> None:
-        """Close all connections."""
         await self._engine.dispose()
 
     @asynccontextmanager

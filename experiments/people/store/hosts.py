@@ -35,7 +35,6 @@ class Hosts(Part):
         return await self._database.write(work)
 
     async def hosts(self) -> tuple[Host, ...]:
-        """All hosts, by name."""
         query = select(host.c.name, host.c.seen, host.c.draining).where(host.c.study_id == self._study_id)
         async with self._database.reading() as connection:
             return tuple(Host(*row) for row in await connection.execute(query.order_by(host.c.name)))

@@ -210,7 +210,6 @@ def _same(event: PaymentEvent) -> dict[str, Any]:
 
 
 async def events_of(connection: AsyncConnection, *which: ColumnElement[bool]) -> Sequence[PaymentEvent]:
-    """Some events, in order."""
     query = select(*_FIELDS).where(*which).order_by(payment.c.id)
     return [PaymentEvent(*row) for row in await connection.execute(query)]
 

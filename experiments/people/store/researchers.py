@@ -124,7 +124,6 @@ class Researchers:
         return None if row is None else Researcher(*row)
 
     async def log_out(self, token_hash: str, now: datetime | None = None) -> None:
-        """Revoke a login."""
 
         async def work(connection: AsyncConnection) -> None:
             mine = (login.c.token_hash == token_hash, login.c.revoked.is_(None))

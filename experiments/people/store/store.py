@@ -62,7 +62,6 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
             raise
 
     async def close(self) -> None:
-        """Close all connections."""
         await self._database.close()
 
     def on_write(self, tell: Callable[[float], None]) -> None:

@@ -42,7 +42,6 @@ class Utc(TypeDecorator[datetime]):
         return value.astimezone(UTC).replace(tzinfo=None)
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
-        """With the zone."""
         return None if value is None else value.replace(tzinfo=UTC)
 
 

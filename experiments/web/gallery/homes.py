@@ -48,7 +48,6 @@ class Home(msgspec.Struct, frozen=True):
 
     @property
     def size(self) -> str:
-        """Rooms and area."""
         return f"{self.rooms} {'room' if self.rooms == 1 else 'rooms'}, {self.area:.0f} m²"
 
     @property

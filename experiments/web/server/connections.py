@@ -20,7 +20,6 @@ class QuickConnection(H11Protocol):
     _timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Wait for a request."""
         super().connection_made(transport)
         self._open[self] = machine_of(address_of(self.client[0] if self.client else ""))
         self._watch()
@@ -31,7 +30,6 @@ class QuickConnection(H11Protocol):
             oldest.transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget the connection."""
         super().connection_lost(exc)
         self._forget()
 

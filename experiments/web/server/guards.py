@@ -103,7 +103,6 @@ class Guards:
         await app({**scope, "client": (self._sender(scope, headers), 0)}, receive, send_guarded)
 
     def _sender(self, scope: Scope, headers: Headers) -> str:
-        """The machine that asks."""
         peer = address_of((scope.get("client") or ("",))[0])
         if any(peer is not None and peer in proxy for proxy in self._proxies):
             # the last one is what the proxy saw; others anybody can write

@@ -44,12 +44,10 @@ class SessionLimit:
 
     @property
     def held(self) -> Collection[str]:
-        """Who has a place."""
         return self._held.keys()
 
     @property
     def waiting(self) -> int:
-        """How many wait."""
         return len(self._there())
 
     def position(self, name: str) -> int | None:

@@ -100,7 +100,6 @@ class Drawer:
             self._changed.notify()
 
     def close(self) -> None:
-        """Stop drawing."""
         with self._changed:
             self._closed = True
             self._changed.notify()

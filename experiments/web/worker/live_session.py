@@ -77,7 +77,6 @@ class Human:
         self._world = world
 
     def act(self, percept: Percept) -> Action:  # noqa: ARG002 - a person sees the frame
-        """What was pressed."""
         world, state = self._world, self.state
         action, state.controls = control_step(
             state.controls,
