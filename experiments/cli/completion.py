@@ -28,7 +28,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the script for all commands."""
     import shtab
 
     from experiments.cli.main import COMMANDS, parser  # which loads this module

@@ -35,7 +35,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Film, with a progress bar."""
     from experiments.record.run_directory import check_file
 
     if arguments.out.suffix != ".mp4":

@@ -111,7 +111,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def run_house(arguments: argparse.Namespace) -> int:
-    """Import a house, report, check."""
     require_extra()
     from mjsim.importing.houses.house_import import import_house
     from mjsim.importing.houses.values import HouseOptions

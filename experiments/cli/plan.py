@@ -77,7 +77,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, solve, print; or check."""
     if arguments.check is not None:
         if arguments.time_limit is not None:
             raise ConfigError("--check plans nothing; leave out --time-limit")

@@ -99,7 +99,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until a signal comes."""
     trials = _trials(arguments)
     if arguments.film is not None and not arguments.film.is_file():
         raise ConfigError(f"there is no film {arguments.film}; leave out --film, or name an MP4 file")

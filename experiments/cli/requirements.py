@@ -14,7 +14,6 @@ EXTRAS = {
 
 
 def require_extra(extra: str) -> None:
-    """Check that an extra is installed."""
     for module in EXTRAS[extra]:
         if importlib.util.find_spec(module) is None:
             raise ConfigError(f"this needs {module}, which is not installed: pip install 'mjsim[{extra}]'")

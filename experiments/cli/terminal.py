@@ -17,13 +17,11 @@ class _Tolerant:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write if that is possible."""
         with contextlib.suppress(OSError, ValueError):
             self._stream.write(text)
         return len(text)
 
     def flush(self) -> None:
-        """Flush if that is possible."""
         with contextlib.suppress(OSError, ValueError):
             self._stream.flush()
 

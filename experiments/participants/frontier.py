@@ -54,7 +54,6 @@ class Frontier:
         return any(other is place for other in self._left)
 
     def mark_searched(self, place: Place) -> None:
-        """Mark a place as searched."""
         self._left = [other for other in self._left if other is not place]
 
     def mark_seen(self, percept: Percept, room: str, within: float) -> None:

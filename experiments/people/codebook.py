@@ -55,7 +55,6 @@ class Variable:
 
 
 def codebook(study: Study, columns: Iterable[str]) -> list[Variable]:
-    """The meaning of columns, each once."""
     told = {name: what for names, (_, what) in trial_columns().items() for name in names.split(", ")}
     items = {f"{_prefix(item)}{item.name}": item for item in study.texts[SURVEY].items}
     return [_variable(study, name, told, items) for name in dict.fromkeys(columns)]

@@ -29,7 +29,6 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     right: str | int | None = None
 
     def __post_init__(self) -> None:
-        """Check that it can be answered."""
         chosen = self.kind in ("choice", "several")
         if chosen and len(set(self.choices)) < max(2, len(self.choices)):
             raise ValueError(f"item {self.name!r} needs two choices or more, all different")

@@ -101,7 +101,6 @@ class Sender:
             return None
 
     async def _order(self, event: PaymentEvent, attempt: int) -> Order:
-        """What the platform is asked for."""
         history = await self._ledger.history(event.person_id)
         received = [
             one.cents

@@ -76,7 +76,6 @@ class Recruitment(_Table, frozen=True):
     api_url: str = ""  # of the platform's interface for programs
 
     def __post_init__(self) -> None:
-        """Check where secrets are sent."""
         url = urlsplit(self.api_url)
         if self.api_url and (not url.hostname or url.scheme not in ("http", "https")):
             raise ValueError(f"api_url is {self.api_url!r}; write it as https://HOST or https://HOST/PATH")
@@ -239,7 +238,6 @@ def _without_seeds(trial: TrialConfig) -> str:
 
 
 def _values(settings: Settings) -> Mapping[str, str]:
-    """What stands for places in texts."""
     pay = settings.pay
     paid = {"pay": f"{Decimal(str(pay.reward)):.2f} {pay.currency}"} if pay.reward else {}
     return {

@@ -19,7 +19,6 @@ class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     answer: str
 
     def __post_init__(self) -> None:
-        """Check that it can be answered."""
         if self.answer not in self.choices or len(set(self.choices)) < max(2, len(self.choices)):
             raise ValueError(
                 f"question {self.text!r} needs two choices or more, all different, with the answer among them"

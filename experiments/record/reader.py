@@ -55,7 +55,6 @@ class Record:
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """The events of the log."""
         return tuple(json.loads(line) for line in self.log.splitlines())
 
     @cached_property
@@ -89,7 +88,6 @@ class Record:
 
     @property
     def plans(self) -> list[Event]:
-        """Every plan that was logged."""
         return [event for event in self.events if event["event"] == "plan"]
 
     @cached_property

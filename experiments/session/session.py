@@ -137,7 +137,6 @@ class Session:
 
     @property
     def progress(self) -> Progress:
-        """How far the session has got."""
         return Progress(self._now.time, self._delivered, len(self._now.object_names))
 
     @property

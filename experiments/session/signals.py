@@ -27,7 +27,6 @@ class Stopped(KeyboardInterrupt):
 
 
 def signal_of(stop: KeyboardInterrupt) -> signal.Signals:
-    """The signal that caused an interruption."""
     return signal.Signals(stop.number if isinstance(stop, Stopped) else signal.SIGINT)
 
 

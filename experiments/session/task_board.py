@@ -57,7 +57,6 @@ class PlanView:
 
     @cached_property
     def steps(self) -> tuple[TaskStep, ...]:
-        """Remaining steps in planned order."""
         route = self.route()
         return () if route is None else tuple(task_step(visit) for visit in route.visits)
 
@@ -114,7 +113,6 @@ class TaskBoard:
         self._receptacles = tuple(self._task_receptacle(key) for key in episode.receptacles)
 
     def note_visit(self, visit: Visit) -> None:
-        """Note a successful pick or place."""
         self._done.append(task_step(visit))
         self._scroll = 0
 

@@ -74,7 +74,6 @@ class Analysis:
         return next((r for r in self.results if (r.measure, r.kind, r.objects) == wanted), None)
 
     def as_json(self) -> dict[str, Any]:
-        """All of it, for stats.json."""
         sizes = [{"assistance": c, "objects": n, "people": k} for (c, n), k in self.table.sizes().items()]
         return {
             "origin": self.table.origin,
@@ -90,7 +89,6 @@ class Analysis:
 
 
 def plain(value: Any) -> Any:
-    """A result as JSON has it."""
     if isinstance(value, FTest):
         return value.as_json()
     if isinstance(value, dict):

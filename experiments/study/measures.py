@@ -75,7 +75,6 @@ def decoded_measures(content: bytes) -> Measures:
 
 
 def present_columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Columns of a table, in order."""
     return list(dict.fromkeys(name for row in rows for name in row))
 
 

@@ -135,7 +135,6 @@ def _levels(pool: Pool, effect: str) -> list[str | int]:
 
 
 def _freedom(pool: Pool, effect: str) -> int:
-    """Degrees of freedom of an effect."""
     counts = [len(_levels(pool, name)) for name in EFFECTS[:2]]
     if math.prod(counts) != len(pool):
         raise ConfigError(

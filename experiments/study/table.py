@@ -247,7 +247,6 @@ def _likert_columns(measures: Measures) -> list[str]:
 
 
 def _candidates(measures: Measures) -> list[str]:
-    """All columns that may be analysed."""
     objective = [
         c for m in measures.objective.values() for c in (m.column, m.without, *m.others) if c is not None
     ]

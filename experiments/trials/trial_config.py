@@ -230,7 +230,6 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def phase_names(self) -> tuple[str, ...]:
-        """The phases, one by one."""
         return phases_of(self.phases)
 
     @property

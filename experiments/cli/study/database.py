@@ -75,7 +75,6 @@ def database_url(arguments: argparse.Namespace) -> str:
 
 
 def sqlite_url(path: Path) -> str:
-    """The URL of an SQLite file."""
     try:
         str(path).encode()
     except UnicodeEncodeError:

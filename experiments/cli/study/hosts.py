@@ -29,7 +29,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and list the hosts."""
     with_store(people_study(arguments), arguments, lambda store: _change(store, arguments))
     return 0
 

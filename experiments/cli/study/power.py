@@ -64,7 +64,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Plan, say it, write it."""
     require_extra("study")
     from experiments.errors import ConfigError
     from experiments.record.files import write_json

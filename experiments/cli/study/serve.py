@@ -69,7 +69,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until a signal comes."""
     study = people_study(arguments)
     from experiments.people.copies import INDEX
     from experiments.people.phases import phases_of_study

@@ -69,9 +69,7 @@ class Phase(Protocol):
         """What the person sees; `refused` is what was wrong with what was sent."""
         ...
 
-    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """Check what the person sent."""
-        ...
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again: ...
 
 
 class FormPhase:
@@ -107,11 +105,9 @@ class FormPhase:
         )
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - of subclasses
-        """Further values of the template."""
         return {}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """The answers, if all are there."""
         form = self._form(sent, visitor.answers)
         if not form.validate():
             return Again(self._study.texts["common"]["faults"], {"form": form})

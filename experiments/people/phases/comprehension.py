@@ -10,7 +10,6 @@ class Comprehension(FormPhase):
     """Questions about the story, which can be read again on the same page."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
-        """The story, to be read again."""
         return {"story": [part for part in self._study.story.split("\n\n") if part.strip()]}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:

@@ -35,7 +35,6 @@ class DeviceCheck(FormPhase):
     """A page that measures and sends what it found."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
-        """Whether a keyboard is needed."""
         return {"keyboard": self._study.settings.device.keyboard}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - what is sent says all
@@ -57,7 +56,6 @@ class DeviceCheck(FormPhase):
         return Done(answers)
 
     def example(self) -> dict[str, str]:
-        """A computer that just suffices."""
         needed = self._study.settings.device
         fits = {"frames_per_s": max(needed.frames_per_s, 1.0), "latency_ms": needed.latency_ms}
         fits |= {"width": needed.width, "height": needed.height, "pixel_ratio": 1.0}

@@ -142,7 +142,6 @@ class _DryRun:
             self._fault(f"the run that was recorded cannot be used: {why}")
 
     async def _check_minimum(self, link: str, phase: Phase) -> None:
-        """What comes too early is refused."""
         if isinstance(phase, Played) or phase.name not in self._study.settings.minimum:
             return
         await self._send(link, phase.name, _example(phase))

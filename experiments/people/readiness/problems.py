@@ -69,7 +69,6 @@ def problems_of_length(study: Study, shortest: float, longest: float) -> list[Pr
 
 
 def located(study: Study, problems: Sequence[Problem]) -> list[str]:
-    """Problems with file and line."""
     text = read_text(study.path)
     lines = [(line_of(text, problem.key) or 1, problem.text) for problem in problems]
     return [f"{study.path}, line {line}: {words}" for line, words in sorted(lines)]

@@ -44,11 +44,9 @@ class Player:
 
     @property
     def step(self) -> int:
-        """The control step that comes next."""
         return 0 if self.state is None else int(self.state["step"])
 
     def take(self, message: Mapping[str, Any]) -> None:
-        """See what the server shows."""
         match message["type"]:
             case "scene":
                 self._speeds = message["speeds"]

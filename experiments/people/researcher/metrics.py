@@ -80,7 +80,6 @@ class Metrics(Meter):
         self._writes.observe(seconds)
 
     def answered(self, status: int, seconds: float) -> None:
-        """A participant's request was answered."""
         self._answers.labels(f"{status // 100}xx").observe(seconds)
 
     def text(self, counts: Counts, sessions: Sessions) -> bytes:
@@ -110,7 +109,6 @@ class FaultLog(logging.Handler):
 
     @property
     def latest(self) -> Sequence[Fault]:
-        """The last ones, newest first."""
         return list(self._kept)[::-1]
 
     def emit(self, record: logging.LogRecord) -> None:

@@ -75,7 +75,6 @@ class Overview:
 
 
 async def overview(study: Study, store: Store, sessions: Sessions) -> Overview:
-    """How a study stands now."""
     row, counts, people = await store.study(), await store.counts(), await store.people()
     checked = [answer.value for answer in await store.answers_to(DEVICE, "frames_per_s")]
     playing = [one.display.frames_per_s for one in sessions.under_way.values() if one.display and one.browser]

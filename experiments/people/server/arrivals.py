@@ -64,7 +64,6 @@ class Arrivals:
         )
 
     async def begin(self, request: Request) -> Response:
-        """Let somebody begin, or go on."""
         if not self._new.allows(request.client.host if request.client else ""):
             return self._pages.message(request, "paused", 429)
         form = {name: str(value) for name, value in (await sent_form(request)).items()}
@@ -99,7 +98,6 @@ class Arrivals:
         return self._pages.show(request, "returning", 403, section=section, parameters=ids)
 
     async def _arrive(self, came: Arrival) -> Response:
-        """Note who comes, or comes again."""
         token, key = new_token(), None
         if came.key is not None:
             token, key = self._keys.token(came.key), self._keys.person(came.key)

@@ -97,7 +97,6 @@ class Trials:
         )
 
     async def play(self, socket: WebSocket, person: Person, visit: Visit) -> None:
-        """Serve a socket of a person."""
         if not person.active or visit.phase not in PLAYED or self._sockets[person.id] >= SOCKETS_OF_A_PERSON:
             await socket.close(1008)
             return

@@ -52,6 +52,5 @@ async def note(
     details: Mapping[str, Any],
     now: datetime,
 ) -> None:
-    """Add to the audit log."""
     values = {"study_id": study_id, "at": now, "who": who, "action": action, "details": dict(details)}
     await connection.execute(insert(tables.audit).values(**values))

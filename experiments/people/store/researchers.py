@@ -50,7 +50,6 @@ class Researchers:
         return await self._database.write(work)
 
     async def all(self) -> tuple[Researcher, ...]:
-        """Everybody, also who is disabled."""
         async with self._database.reading() as connection:
             return tuple(Researcher(*row) for row in await connection.execute(select(*_FIELDS)))
 

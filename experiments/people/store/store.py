@@ -80,7 +80,6 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         await back_up(self._database, path)
 
     async def study(self) -> StudyRow:
-        """The study, with its state."""
         async with self._database.reading() as connection:
             row = (await connection.execute(select(study).where(study.c.id == self._study_id))).one()
         quotas = {int(cell): wanted for cell, wanted in row.quotas.items()}
@@ -108,7 +107,6 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         await self._database.write(work)
 
     async def audit_log(self) -> tuple[AuditRow, ...]:
-        """Who did what, in order."""
         columns = (audit.c.id, audit.c.at, audit.c.who, audit.c.action, audit.c.details)
         query = select(*columns).where(audit.c.study_id == self._study_id).order_by(audit.c.id)
         async with self._database.reading() as connection:

@@ -17,7 +17,6 @@ ACTIVE: tuple[Status, ...] = ("arrived", "assigned")
 
 
 def utc_now() -> datetime:
-    """The time now, in UTC."""
     return datetime.now(UTC)
 
 
@@ -65,7 +64,6 @@ class Person:
 
     @property
     def active(self) -> bool:
-        """Whether the participation is under way."""
         return self.status in ACTIVE
 
 

@@ -28,7 +28,6 @@ class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.words[name]
 
     def paragraphs(self, name: str = "text") -> list[str]:
-        """The paragraphs of a text."""
         return [part.strip() for part in self.words.get(name, "").split("\n\n") if part.strip()]
 
 
@@ -41,7 +40,6 @@ Texts = Mapping[str, Section]
 
 
 def languages() -> tuple[str, ...]:
-    """Languages of this package's files."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 

@@ -34,7 +34,6 @@ class QuickConnection(H11Protocol):
         self._forget()
 
     def data_received(self, data: bytes) -> None:
-        """Take a part of a request."""
         super().data_received(data)
         if self in self._open:
             self._watch()

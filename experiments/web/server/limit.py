@@ -39,7 +39,6 @@ class SessionLimit:
 
     @property
     def count(self) -> int:
-        """How many places there are."""
         return self._count
 
     @property

@@ -111,7 +111,6 @@ class WorkerPool:
             self.discard(starting.result())
 
     async def close(self) -> None:
-        """Wait until all workers have ended."""
         await asyncio.gather(*self._ending)
 
 

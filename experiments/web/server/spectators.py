@@ -54,7 +54,6 @@ class Spectators:
             )
 
     def leave(self, spectator: Spectator) -> None:
-        """Tell somebody nothing any more."""
         self._all.discard(spectator)
 
     def close(self) -> None:

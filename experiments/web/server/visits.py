@@ -72,11 +72,9 @@ class Visit:
         return self._stored.trials[phase]
 
     def run(self, phase: str) -> Path:
-        """Run directory of a phase."""
         return self._folder / phase
 
     def journal(self, phase: str) -> Path:
-        """Folder of a phase's journal."""
         return self._folder / JOURNALS / phase
 
     def before(self, phase: str) -> list[dict[str, Any]]:
@@ -198,7 +196,6 @@ class Visits:
 
 
 def new_token() -> str:
-    """A token that cannot be guessed."""
     return secrets.token_urlsafe(32)
 
 

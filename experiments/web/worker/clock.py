@@ -135,7 +135,6 @@ class _Acknowledger:
             raise self._error
 
     def close(self) -> None:
-        """Wait until all is written."""
         self._thread.shutdown()
 
     def _acknowledge(self, number: int, step: int) -> None:

@@ -79,7 +79,6 @@ class Drawer:
             self._changed.notify()
 
     def note_seen(self, frame: int) -> None:
-        """The browser has shown a frame."""
         with self._changed:
             self._seen = max(self._seen, min(frame, self._sent))
             self._changed.notify()

@@ -209,7 +209,6 @@ class LiveSession:
         self.close()
 
     def close(self) -> None:
-        """Stop planning in the background."""
         self._planner.close()
 
 

@@ -57,7 +57,6 @@ class Worker:
         self._control = SessionControl(self._send)
 
     def run(self) -> None:
-        """Serve until the server is gone."""
         threading.Thread(target=self._receive, name="receiving", daemon=True).start()
         while True:
             opened, control = self._opened.get()
