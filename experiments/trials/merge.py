@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import RecordError
-from experiments.record.archive import copy, opened_run, run_paths
+from experiments.record.archive import adopt, copy, opened_run, run_paths
 from experiments.record.checksums import read_checksums
 from experiments.record.run_directory import TRIALS, check_batch_folder, is_batch, is_run, link_or_copy
 from experiments.trials.batch_folder import CHECKED, StoredTrial, put_aside, trial_key, write_rows
@@ -65,6 +65,8 @@ def merge_shards(
         if not is_batch(part):
             raise RecordError(f"{part} is not the folder of a batch; name the --out of shards")
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
+    for folder in (out, *others):
+        adopt(folder / TRIALS)  # of shards that were killed
     reader, *readers = (TrialReader(folder, workers=workers, on_read=on_read) for folder in (out, *others))
     chosen = {trial.path.name: trial for trial in reader.read()[0] if trial.complete}
     added: dict[Path, dict[str, StoredTrial]] = {}
