@@ -1,5 +1,6 @@
 """`mjsim bench` finds the benchmarks of a checkout."""
 
+import json
 import math
 import os
 from pathlib import Path
@@ -7,13 +8,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from benchmarks import _command, houses, play
+from benchmarks import _command, growth, houses, play
 from benchmarks._command import benchmark, benchmark_names
 from benchmarks.support import home_figures, play_load
 from benchmarks.support.play_browser import SeenFrame, SimulatedBrowser
 from benchmarks.support.play_load import median_width
 from experiments.cli.main import main
 from experiments.errors import ConfigError
+from experiments.trials.table import read_rows
 
 
 def test_the_benchmarks_of_the_checkout_are_found():
@@ -99,3 +101,20 @@ def test_a_generated_home_is_measured_without_a_fault():
     assert row["kinds"]["toilet"] == 1
     assert all(figure([row]) >= 0 for figure, *_ in houses.REQUIREMENTS.values())
     assert houses.COLUMNS["overlap"]([row, row]) == 1.0
+
+
+@pytest.mark.slow
+def test_grown_records_are_the_trials_of_their_design(tmp_path, capsys):
+    """A batch of them has nothing left to run, and their people all have a row."""
+    assert main(["bench", "growth", "--quick", "--count", "40", "--out", str(tmp_path), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert {name: found["records"] for name, found in result.items()} == {
+        "resume": 40, "analyze": 40, "collect": 40,
+    }  # fmt: skip
+    assert not (tmp_path / "batch" / "outdated").exists()
+    rows = read_rows(tmp_path / "batch" / "trials.parquet")
+    assert len({(row["assistance"], row["house_seed"]) for row in rows}) == 40
+    real = read_rows(tmp_path / "real" / "trials.parquet")
+    assert {row["task_distance_m"] for row in rows} == {row["task_distance_m"] for row in real}
+    with pytest.raises(ConfigError, match="there are resume, analyze, collect"):
+        growth.measure(parts=("speed",))
