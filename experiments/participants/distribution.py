@@ -79,8 +79,12 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return list(getattr(self, self.shape))
 
     def as_value(self) -> Any:
-        """The description, as in TOML."""
-        return self.constant if self.constant is not None else msgspec.json.decode(msgspec.json.encode(self))
+        """The description, as in TOML; without limits that are infinite, and equal in all processes."""
+        if self.constant is not None:
+            return self.constant
+        kinds = [[w, k.as_value() if isinstance(k, Distribution) else k] for w, k in self.mixture or ()]
+        limits = {name: limit for name in ("min", "max") if math.isfinite(limit := getattr(self, name))}
+        return {self.shape: kinds or self._numbers, **limits}
 
     def quantile(self, share: float, lowest: float = -math.inf, highest: float = math.inf) -> float:
         """The value below which a share (0 to 1) of the distribution between two values lies.

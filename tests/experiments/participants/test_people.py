@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import pickle
 import shutil
 from pathlib import Path
 
@@ -192,3 +193,15 @@ def test_who_looks_rarely_sees_later(house, monkeypatch):
     seconds_until_done(house, "none", looking_interval=1.0)
     assert len(looks) > 5
     assert np.diff(np.unique(looks)).min() >= 1.0 - 1e-6
+
+
+def test_a_description_is_the_same_in_another_process():
+    """Batches recognize finished trials by it, and worker processes get it pickled."""
+    described = {
+        "reach": {"mixture": [[0.6, 1.0], [0.4, {"beta": [2.0, 2.0], "max": 0.9}]]},
+        "reading_time": {"lognormal": [1.35, 0.35], "min": 0.5},
+        "walking_speed": {"uniform": [1.0, 1.2]},
+    }
+    people = Distributions.of(described)
+    assert pickle.loads(pickle.dumps(people)).as_dict() == people.as_dict() == described
+    assert Distributions.of(people.as_dict()) == people

@@ -5,7 +5,9 @@ import os
 import shutil
 
 import pytest
+from msgspec.structs import replace
 
+from experiments.participants.distribution import Distributions
 from experiments.record import records
 from experiments.trials import trial_reader
 from experiments.trials.batch import run_batch
@@ -140,9 +142,11 @@ def test_a_batch_reads_nothing_that_its_workers_have_read(tmp_path, monkeypatch)
         raise AssertionError(f"{path} is read again")
 
     monkeypatch.setattr(trial_reader, "read_trial", refuse)
-    design = Design((brief(0), brief(1)))
+    person = Distributions.of({"reach": {"mixture": [[1.0, {"uniform": [0.8, 1.1]}]]}})
+    design, reports = Design((brief(0), replace(brief(1), person=person))), []
     rows = run_batch(design, tmp_path / "out", workers=1)
     table = (tmp_path / "out/trials.parquet").read_bytes()
-    assert run_batch(design, tmp_path / "out", workers=1) == rows
+    assert run_batch(design, tmp_path / "out", workers=1, on_progress=reports.append) == rows
+    assert [(report.resumed, report.done) for report in reports] == [(2, 0)]
     assert (tmp_path / "out/trials.parquet").read_bytes() == table
     assert [row["house_seed"] for row in rows] == [0, 1]
