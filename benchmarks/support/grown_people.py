@@ -5,6 +5,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy import Engine, create_engine, insert
 
@@ -29,7 +30,7 @@ institution = "a benchmark"
 contact = "nobody@example.org"
 phases = ["consent", "comprehension", "task", "survey", "completion"]
 """
-ANSWERS = {
+ANSWERS: Mapping[str, Mapping[str, Any]] = {
     "consent": {"agreed": True},
     "comprehension": {"attempts": 1, "hands": "Two"},
     "survey": {"useful": 4, "games": "Every day", "age": 30, "comments": "It went well."},

@@ -168,7 +168,6 @@ def _walk(observation: Observation, stride: float, world: World) -> Steps:
 
 
 def _turn(observation: Observation, angle: float, world: World) -> Steps:
-    """Turn on the spot."""
     goal, error = observation.heading + angle, angle
     max_time = abs(angle) / world.scene.person.turning_speed + 1.0
     for _ in range(math.ceil(max_time / world.control_timestep)):

@@ -201,7 +201,6 @@ def _scene(house: CompiledHouse, catalogue: Catalogue, name: str) -> dict[str, A
 
 
 def _regions(house: CompiledHouse) -> dict[str, Any]:
-    """The outline of each room."""
     rooms = house.rooms
     parts: dict[str, list[Any]] = {}
     for key, centre, half, axes in zip(rooms.keys, *rooms.rectangles, strict=True):

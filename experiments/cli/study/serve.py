@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.people.recruitment import recruiter
 
     if arguments.rehearsal is not None:
-        from experiments.people.rehearsal.served import rehearsed
+        from experiments.people.rehearsal.plan import rehearsed
 
         study = rehearsed(study, arguments.rehearsal)
     phases_of_study(study)  # own ones may be missing

@@ -1,12 +1,14 @@
-"""Who comes to a rehearsal, when, and what they do that people do: leave, return, reload, lose the connection."""
+"""Plan of a rehearsal: its study, its simulated people, and when they leave, return, reload or lose the connection."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+import msgspec
 import numpy as np
 
-from experiments.people.study_file import COMPREHENSION, CONSENT, PLAYED
+from experiments.people.study_file import COMPREHENSION, CONSENT, PLAYED, Cell, Study
+from experiments.record.origin import REHEARSAL
 
 Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails"]
 RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # shares of people
@@ -90,3 +92,17 @@ def _leaving(phases: Sequence[str], rng: np.random.Generator) -> tuple[Leaving, 
 def moment(phase: str, rng: np.random.Generator) -> int:
     """After how many decisions something happens in a trial."""
     return int(rng.integers(2, 15 if phase == PLAYED[0] else 60))
+
+
+def rehearsed(study: Study, factor: float) -> Study:
+    """Mark the people of a study as simulated, and divide all its waiting times by `factor`."""
+    settings = study.settings
+    away = ("abandoned_after", "timed_out_after")
+    shorter = {name: getattr(settings.limits, name) / factor for name in away}
+    limits = msgspec.structs.replace(settings.limits, **shorter)
+    minimum = {name: seconds / factor for name, seconds in settings.minimum.items()}
+    cells = [
+        Cell([msgspec.structs.replace(trial, user=REHEARSAL) for trial in c.trials]) for c in study.cells
+    ]
+    settings = msgspec.structs.replace(settings, limits=limits, minimum=minimum)
+    return replace(study, cells=cells, settings=settings, rehearsal=True)

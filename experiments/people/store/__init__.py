@@ -1,6 +1,6 @@
 """The database of a study with people. Nothing outside of this package speaks to the database."""
 
-from experiments.people.store.choice import choose
+from experiments.people.store.assignments import choose
 from experiments.people.store.copies import restore
 from experiments.people.store.ledger import Ledger
 from experiments.people.store.store import Store, change_database

@@ -9,13 +9,22 @@ from sqlalchemy import Select, bindparam, func, insert, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
-from experiments.people.store.choice import choose
 from experiments.people.store.part import Part, lock_study, note
-from experiments.people.store.places import FIELDS, place_of, set_place, take_back
 from experiments.people.store.tables import assignment, person, study
-from experiments.people.store.values import ACTIVE, Assignment, CellCount, CellQuota, Counts, Rule, utc_now
+from experiments.people.store.values import (
+    ACTIVE,
+    Assignment,
+    CellCount,
+    CellQuota,
+    Counts,
+    PlaceState,
+    Rule,
+    utc_now,
+)
 
 SEEDS = 2**53  # exact as numbers of JavaScript as well
+FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
+_PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
 
 # Made once, as that takes as long as running them.
 _ACTIVE = update(person).where(
@@ -64,7 +73,7 @@ class Assignments(Part):
         Args:
             person_id: The person, whose participation must be under way.
             cells: What the study file wants of each cell; :meth:`set_quota` may have changed the numbers.
-            rule: How a cell is chosen, see :func:`~experiments.people.store.choice.choose`.
+            rule: How a cell is chosen, see :func:`choose`.
             rng: Source of the choice and of the person's own seeds.
             now: The time, with its zone.
             abandoned_after: How long a place is held without a sign of life.
@@ -226,3 +235,54 @@ async def _tally(
 ) -> dict[Any, int]:
     """Count the rows that have each value."""
     return {row[0]: row[1] for row in await connection.execute(query, values)}
+
+
+def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.random.Generator) -> int | None:
+    """The cell of the next person: `balanced` takes the one that is filled least, `uniform` any that has room.
+
+    Args:
+        counts: People in each cell.
+        quotas: Wanted people of each cell.
+        rule: The rule; ties are broken at random.
+        rng: Source of chance.
+
+    Returns:
+        Index of the cell; None if all are full.
+    """
+    room = [cell for cell, (count, quota) in enumerate(zip(counts, quotas, strict=True)) if count < quota]
+    if not room:
+        return None
+    if rule == "balanced":
+        filled = {cell: counts[cell] / quotas[cell] for cell in room}
+        least = min(filled.values())
+        room = [cell for cell in room if filled[cell] == least]
+    return room[int(rng.integers(len(room)))]
+
+
+async def place_of(connection: AsyncConnection, person_id: int) -> Assignment | None:
+    """The place that a person has or had."""
+    row = (await connection.execute(_PLACE, {"person": person_id})).first()
+    return None if row is None else Assignment(*row)
+
+
+async def take_back(connection: AsyncConnection, study_id: int, place: Assignment, state: PlaceState) -> bool:
+    """Give a person a released place again; False if somebody else has it."""
+    query = select(assignment.c.id).where(
+        assignment.c.study_id == study_id,
+        assignment.c.cell == place.cell,
+        assignment.c.place == place.place,
+        assignment.c.active == 1,
+    )
+    if (await connection.execute(query)).first() is not None:
+        return False
+    await set_place(connection, place.person_id, state)
+    return True
+
+
+async def set_place(connection: AsyncConnection, person_id: int, state: PlaceState) -> None:
+    """Hold, finish or release the place of a person."""
+    await connection.execute(
+        update(assignment)
+        .where(assignment.c.person_id == person_id)
+        .values(state=state, active=None if state == "released" else 1)
+    )

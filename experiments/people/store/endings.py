@@ -6,8 +6,8 @@ from sqlalchemy import delete as delete_rows
 from sqlalchemy import select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
+from experiments.people.store.assignments import place_of, set_place, take_back
 from experiments.people.store.part import Part, lock_study
-from experiments.people.store.places import place_of, set_place, take_back
 from experiments.people.store.tables import answer, identity, person
 from experiments.people.store.values import ACTIVE, Status, utc_now
 

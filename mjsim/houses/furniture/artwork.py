@@ -61,7 +61,6 @@ _RUGS = ("stripes", "lozenges", "medallion", "zigzag", "checks", "border")
 
 
 def _hills(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
-    """Hills under a sun."""
     aspect = x.shape[1] / x.shape[0]
     sun = np.hypot((x - rng.uniform(0.2, 0.8)) * aspect, y - rng.uniform(0.15, 0.35)) < rng.uniform(
         0.07, 0.13
@@ -74,7 +73,6 @@ def _hills(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: 
 
 
 def _discs(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
-    """Discs over one another."""
     aspect = x.shape[1] / x.shape[0]
     for colour in colours:
         at = np.hypot((x - rng.uniform(0.1, 0.9)) * aspect, y - rng.uniform(0.1, 0.9)) < rng.uniform(
@@ -84,7 +82,6 @@ def _discs(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: 
 
 
 def _fields(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
-    """Fields of colour."""
     rows = np.digitize(y + 0.01 * np.sin(20 * x), np.sort(rng.uniform(0.1, 0.9, 3)))
     for i in range(4):
         image[rows == i] = colours[i]
@@ -92,7 +89,6 @@ def _fields(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours:
 
 
 def _branch(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
-    """A branch with leaves."""
     aspect, stem, lean = x.shape[1] / x.shape[0], rng.uniform(0.4, 0.6), rng.uniform(-0.15, 0.15)
     image[np.abs(x - stem - lean * (1 - y)) < 0.008] = 0.5 * colours[1]
     for i in range(9):

@@ -70,7 +70,6 @@ def _filled(b: Builder, w: float, z: float, high: float, d: float, x: float) -> 
 
 
 def _shelf(b: Builder, w: float, h: float, d: float, columns: int, rows: int, back: bool = True) -> Piece:
-    """An open shelf with compartments."""
     frame = b.pick(b.wood, "white", b.wood2)
     b.shadow(w, (0, d))
     b.guard(w, (0, d), (0, h))

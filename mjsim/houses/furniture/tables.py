@@ -53,7 +53,6 @@ def table(b: Builder) -> Piece:
 
 
 def _laid(b: Builder, w: float, y: float) -> None:
-    """What lies on a dining table."""
     if b.chance(0.5):
         b.box(b.pick("linen", b.cloth2), 0.6 * w, (y - 0.16, y + 0.16), (0.74, 0.743), seen=True)
     b.clutter(0.5 * w, (y - 0.1, y + 0.1), 0.744, 2)

@@ -123,7 +123,6 @@ class _Reader:
         yield from self.models(model, frame, folder, depth + 1, static=static, name=name)
 
     def _shape(self, element: ET.Element, at: _Place) -> Iterator[Surface]:
-        """Surfaces of a <visual> or <collision>."""
         geometry = element.find("geometry")
         if geometry is None or not len(geometry):
             return

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.people.store.choice import choose
+from experiments.people.store import choose
 
 CELLS, PEOPLE = 12, 447
 HOUR = 60.0  # min
