@@ -25,7 +25,7 @@ def is_run(directory: Path) -> bool:
 
 
 def is_batch(directory: Path) -> bool:
-    """Whether `directory` is the folder of a batch: it holds archives and folders, some of which are checked."""
+    """True if `directory` is the folder of a batch: it holds archives and folders, some of which are checked."""
     trials = directory / TRIALS
     if not trials.is_dir():
         return False

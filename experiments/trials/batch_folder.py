@@ -59,11 +59,10 @@ class StoredTrial:
 
     @functools.cached_property
     def key(self) -> str:
-        """Its `trial_key`."""
         return trial_key(self.settings)
 
     def is_in(self, house: str, inputs: Inputs) -> bool:
-        """Whether it took place in that house: in one of the same content, or at the same place."""
+        """True if it took place in that house, or in a house of the same content."""
         return self.inputs["house"] == inputs["house"] or self.settings["house"] == house
 
 

@@ -88,7 +88,7 @@ def merge_shards(
 
 
 def _same(one: Path, other: Path) -> bool:
-    """Whether two runs of a trial have equal records; the time that they took does not count."""
+    """Compare the records of two runs of a trial. The time that they took does not count."""
     with opened_run(one) as first, opened_run(other) as second:
         sums = read_checksums(first), read_checksums(second)
     return all(sums[0].get(name) == sums[1].get(name) for name in CHECKED)
