@@ -69,8 +69,8 @@ class _ProcessContext:
             with _as_render_errors():
                 previous = self._current_binding()
                 self._gl.make_current()
-                self._depth = 1
                 try:
+                    self._depth = 1
                     yield
                 finally:
                     self._depth = 0
@@ -136,7 +136,8 @@ class _ProcessContext:
             return None
         egl = self._egl
         context = egl.eglGetCurrentContext()
-        if not context:
+        # Ours is current here if a signal interrupted an earlier drawing just before it was released.
+        if not context or context.address == self._gl._context.address:
             return None
         surfaces = egl.eglGetCurrentSurface(egl.EGL_DRAW), egl.eglGetCurrentSurface(egl.EGL_READ)
         return egl.eglGetCurrentDisplay(), *surfaces, context

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -13,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjsim.errors import RenderError
-from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile
+from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, context
 from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import outside
 
@@ -311,6 +312,15 @@ def test_renderers_of_several_models_interleave(room, renderer):
         np.testing.assert_array_equal(renderer.rgb(room[1], "ahead"), expected)
         np.testing.assert_array_equal(other.rgb(other_data, "ahead"), first)
     np.testing.assert_array_equal(renderer.rgb(room[1], "ahead"), expected)
+
+
+def test_other_threads_may_draw_after_a_drawing_that_was_interrupted(room, renderer):
+    """A signal may raise between the end of a drawing and the release of the context."""
+    expected = renderer.rgb(room[1], "ahead")
+    context._PROCESS._gl.make_current()
+    assert np.array_equal(renderer.rgb(room[1], "ahead"), expected)
+    with ThreadPoolExecutor(1) as pool:
+        assert np.array_equal(pool.submit(renderer.rgb, room[1], "ahead").result(), expected)
 
 
 def test_other_threads_may_draw(room, renderer):
