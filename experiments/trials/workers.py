@@ -59,13 +59,21 @@ def _begin(end_of_work: Connection, voice: Semaphore) -> None:
 
 
 def _end_with(end_of_work: Connection) -> None:
-    """End this process when the other end of the connection is closed, by whatever."""
+    """End this process when its parent terminates it, or closes the other end of the connection, also by its death."""
+    parent = os.getppid()
 
-    def watch() -> None:
+    def wait_for_end() -> None:
         wait([end_of_work])
         os._exit(1)
 
-    threading.Thread(target=watch, daemon=True).start()
+    def wait_for_parent() -> None:
+        # From Python 3.12 on, a pool that has lost a process waits until those that it terminates have ended.
+        while signal.sigwaitinfo({signal.SIGTERM}).si_pid != parent:
+            pass
+        os._exit(1)
+
+    for target in (wait_for_end, wait_for_parent):
+        threading.Thread(target=target, daemon=True).start()
 
 
 class Executor(Protocol):
