@@ -185,10 +185,13 @@ def _folder(folder: Path) -> Iterator[None]:
 
 
 def _place(path: Path) -> Path:
-    """The target of a path, links followed; raises `RecordError` for a link that leads nowhere."""
+    """The target of a path, links followed; raises `RecordError` for a link that leads nowhere, else `OSError`."""
     if path.is_symlink() and not path.exists():
         raise RecordError(f"{path} is a symbolic link that leads nowhere; remove it or choose another --out")
-    return Path(os.path.realpath(path))
+    place = Path(os.path.realpath(path))
+    with suppress(FileNotFoundError, NotADirectoryError):
+        place.stat()  # from Python 3.14 on, `exists` is False for a name that is too long
+    return place
 
 
 def _existing(folder: Path) -> Path:
