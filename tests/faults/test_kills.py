@@ -126,7 +126,7 @@ def test_killed_commands_end_up_with_the_files_of_undisturbed_ones(undisturbed, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("after", [False, True], ids=["before", "after"])
-@pytest.mark.parametrize("step", ["_link", "write_checksums", "exchange"])
+@pytest.mark.parametrize("step", ["link_or_copy", "write_checksums", "exchange"])
 def test_a_run_killed_at_its_floor_plan_has_it_whole_or_not_at_all(step, after, house, tmp_path, monkeypatch):
     """At each step by which the picture comes to the record; what draws it is not needed for that."""
     monkeypatch.setattr(trial, "draw_topdown", lambda path, *_: path.write_bytes(b"picture"))
