@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.synchronize import Semaphore
 from typing import Any, Protocol
 
-from experiments.session.signals import SIGNALS
+from experiments.session.signals import SIGNALS, signals_postponed
 from experiments.trials.ray_workers import ray_cluster
 
 QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
@@ -27,11 +27,14 @@ class _Pool(ProcessPoolExecutor):
         return int(self._max_workers * QUEUED_PER_WORKER)  # type: ignore[attr-defined]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-        try:
-            return super().submit(fn, *args, **kwargs)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        with signals_postponed() as signals:  # another thread may take a signal that this one blocks
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+            try:
+                future = super().submit(fn, *args, **kwargs)
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            signals.check()
+        return future
 
 
 @contextmanager
