@@ -189,7 +189,6 @@ def _serve(
 
 
 def _minimum(text: str) -> dict[str, float]:
-    """Seconds by phase before the task."""
     parts = dict(part.strip().partition("=")[::2] for part in text.split(","))
     if unknown := [name for name in parts if name not in PHASES or name == TASK]:
         raise argparse.ArgumentTypeError(f"no phase {unknown[0]!r} before the task in {text!r}")

@@ -136,7 +136,6 @@ def url_of(listener: socket.socket) -> str:
 
 
 def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
-    """Addresses and networks, joined by commas."""
     try:
         return tuple(ip_network(part.strip()) for part in text.split(","))
     except ValueError as error:

@@ -35,7 +35,6 @@ class Follower:
         self._conduct: Participant | None = None
 
     def act(self, percept: Percept) -> Action:
-        """Follow the best guidance on display."""
         if self._conduct is None:
             self._conduct = self._choose(percept.shown_roles)
         return self._conduct.act(percept)

@@ -43,7 +43,6 @@ class Variable:
     levels: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        """As a property of schema.org."""
         found: dict[str, Any] = {"@type": "PropertyValue", "name": self.name, "description": self.description}
         if self.low is not None:
             found["minValue"] = self.low

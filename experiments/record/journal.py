@@ -114,7 +114,6 @@ class Journal:
 
     @property
     def size(self) -> int:
-        """Bytes that it has now."""
         return os.fstat(self._file).st_size
 
     def sync(self) -> None:

@@ -139,7 +139,6 @@ def framed(figure: Figure, title: str, table: StudyTable, caption: str) -> Pictu
 
 
 def grid(figure: Figure, rows: int, columns: int) -> NDArray[Any]:
-    """Panels with small labels, (rows, columns)."""
     panels: NDArray[Any] = figure.subplots(rows, columns, squeeze=False)
     for axes in panels.ravel():
         axes.tick_params(labelsize=7)

@@ -89,7 +89,6 @@ def solver_source(config: TrialConfig, house: House) -> SolverSource:
 
 
 def regret_evaluator(config: TrialConfig, house: House) -> RegretEvaluator:
-    """Finds regrets in a trial."""
     return RegretEvaluator(house.geodesics, capacity=config.capacity)
 
 

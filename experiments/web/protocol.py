@@ -195,7 +195,6 @@ class Frame(WireMessage, frozen=True):
     data: bytes
 
     def packed(self) -> bytes:
-        """The frame as a binary message."""
         codec, key = CODECS[self.codec], KEY_FLAG if self.key else 0
         head = (VERSION, codec, key, 0, self.width, self.height, self.number, self.step, self.input)
         return FRAME_HEAD.pack(*head, self.milliseconds) + self.data

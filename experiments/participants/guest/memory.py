@@ -56,6 +56,5 @@ class Recollection:
             self.drop(name)
 
     def drop(self, name: str) -> None:
-        """An object is no longer there."""
         self.objects.pop(name, None)
         self._until.pop(name, None)

@@ -48,7 +48,6 @@ class Link:
         await self._wait(lambda: self._occupied, OPENING_TIMEOUT)
 
     def cut(self) -> None:
-        """Lose the connection without a word."""
         self._socket.transport.abort()
 
     async def play(self, decisions: int, delay: float) -> bool:

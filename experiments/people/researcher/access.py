@@ -71,7 +71,6 @@ class Access:
         )
 
     def forget(self, response: Response) -> None:
-        """Let the browser drop the token."""
         response.delete_cookie(self._cookie, httponly=True, secure=self._secure, samesite="strict")
 
     def _token(self, connection: HTTPConnection) -> str | None:

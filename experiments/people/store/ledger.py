@@ -215,7 +215,6 @@ async def events_of(connection: AsyncConnection, *which: ColumnElement[bool]) ->
 
 
 def by_key(events: Sequence[PaymentEvent]) -> dict[str, list[PaymentEvent]]:
-    """The events of each payment."""
     found: dict[str, list[PaymentEvent]] = {}
     for event in events:
         found.setdefault(event.key, []).append(event)
